@@ -1,0 +1,19 @@
+//! What a robot measured and the protocols it drives: the vocabulary that calibrators and the simulator share.
+//!
+//! A [`Dataset`] holds one robot's runs: what it counted ([`Odometry`]) and what an outside instrument saw of it (poses,
+//! displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`], [`RunView`]), so that a subset of the
+//! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
+//! simulator here, a real robot elsewhere.
+
+mod platform;
+mod program;
+mod record;
+mod session;
+
+pub use platform::{Platform, record_session};
+pub use program::{Motion, MotionProgram, Schedule};
+pub use record::{
+    Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
+    Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
+};
+pub use session::{RunView, Session};

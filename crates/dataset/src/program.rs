@@ -1,0 +1,211 @@
+//! Motion programs: what a protocol drives and where it measures, in the robot's own nominal units.
+//!
+//! A program is commanded in what the robot believes: "0.5 m" is so many counts by its nominal wheels, "a quarter turn" so many by its
+//! nominal wheelbase. How far the robot really goes is what calibration is about.
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::record::{Protocol, ProtocolSettings};
+
+/// One motion between two standstills, in nominal units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
+    /// A straight line of nominal length, metres, negative backward.
+    Straight {
+        /// Signed length, metres.
+        length_m: f64,
+    },
+    /// A turn on the spot by a nominal angle.
+    Spin {
+        /// Signed turn, radians, counter-clockwise.
+        turn_rad: f64,
+    },
+    /// A circular arc of the centre.
+    Arc {
+        /// Radius of the centre's path, metres, positive.
+        radius_m: f64,
+        /// Signed turn, radians, counter-clockwise; the robot drives forward.
+        turn_rad: f64,
+    },
+    /// Standing still.
+    Pause {
+        /// How long, seconds.
+        duration_s: f64,
+    },
+    /// The outside instrument reads the standing robot. The start and the end of a program are always read.
+    Measure,
+}
+
+/// What one run drives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionProgram {
+    /// The run's id.
+    pub id: String,
+    /// Its protocol, by which estimators find their runs.
+    pub protocol: Protocol,
+    /// What the protocol says of itself.
+    pub settings: ProtocolSettings,
+    /// The motions in order.
+    pub motions: Vec<Motion>,
+}
+
+/// A protocol with its numbers: how many runs of what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Schedule {
+    /// Straight runs of the paper, alternately forward and backward.
+    Straights {
+        /// Nominal length of each, metres.
+        length_m: f64,
+        /// How many.
+        runs: u32,
+    },
+    /// Spins of the paper, alternately counter-clockwise and clockwise.
+    Spins {
+        /// Nominal turn of each, radians.
+        turn_rad: f64,
+        /// How many.
+        runs: u32,
+    },
+    /// UMBmark squares, alternately clockwise and counter-clockwise (Borenstein & Feng 1995: five each way).
+    Squares {
+        /// Nominal side, metres.
+        side_m: f64,
+        /// How many in each direction.
+        runs_each_way: u32,
+    },
+    /// The paper's validation path: nine straight legs joined by eight quarter turns on the spot, read at even steps.
+    ValidationPath {
+        /// Length of the whole path, metres (the paper: about 40).
+        length_m: f64,
+        /// Distance between two readings, metres (the paper: 0.5).
+        measure_every_m: f64,
+        /// How many.
+        runs: u32,
+    },
+}
+
+/// Legs of the validation path: eight turns join nine.
+const VALIDATION_LEGS: usize = 9;
+
+impl Schedule {
+    /// The programs, with ids that sort in driving order.
+    #[must_use]
+    pub fn programs(&self) -> Vec<MotionProgram> {
+        match *self {
+            Self::Straights { length_m, runs } => (0..runs)
+                .map(|run| {
+                    let length_m = if run % 2 == 0 { length_m } else { -length_m };
+                    let settings = ProtocolSettings { length_m: Some(length_m), ..ProtocolSettings::default() };
+                    program("straight", run, Protocol::Straight, settings, vec![Motion::Straight { length_m }])
+                })
+                .collect(),
+            Self::Spins { turn_rad, runs } => (0..runs)
+                .map(|run| {
+                    let turn_rad = if run % 2 == 0 { turn_rad } else { -turn_rad };
+                    let settings = ProtocolSettings { turn_rad: Some(turn_rad), ..ProtocolSettings::default() };
+                    program("spin", run, Protocol::Spin, settings, vec![Motion::Spin { turn_rad }])
+                })
+                .collect(),
+            Self::Squares { side_m, runs_each_way } => {
+                (0..2 * runs_each_way).map(|run| square(run, side_m, run % 2 == 0)).collect()
+            }
+            Self::ValidationPath { length_m, measure_every_m, runs } => {
+                (0..runs).map(|run| validation_path(run, length_m, measure_every_m)).collect()
+            }
+        }
+    }
+}
+
+fn program(
+    prefix: &str,
+    run: u32,
+    protocol: Protocol,
+    settings: ProtocolSettings,
+    motions: Vec<Motion>,
+) -> MotionProgram {
+    MotionProgram { id: format!("{prefix}_{run:03}"), protocol, settings, motions }
+}
+
+/// Four sides, each followed by a quarter turn, so that the robot ends as it began. First leg along +x.
+fn square(run: u32, side_m: f64, clockwise: bool) -> MotionProgram {
+    let (turn_rad, protocol) =
+        if clockwise { (-FRAC_PI_2, Protocol::SquareCw) } else { (FRAC_PI_2, Protocol::SquareCcw) };
+    let side = [Motion::Straight { length_m: side_m }, Motion::Spin { turn_rad }];
+    let settings = ProtocolSettings { side_m: Some(side_m), ..ProtocolSettings::default() };
+    program(protocol.name(), run, protocol, settings, side.repeat(4))
+}
+
+/// A corridor loop: two rounds of a rectangle would close; this walks nine legs, four turns left and four right, as the paper's figure 7
+/// does not say which.
+fn validation_path(run: u32, length_m: f64, measure_every_m: f64) -> MotionProgram {
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let steps = (length_m / measure_every_m).round().max(1.0) as usize;
+    let mut motions = Vec::with_capacity(2 * steps + VALIDATION_LEGS);
+    for step in 0..steps {
+        if step > 0 && step * VALIDATION_LEGS / steps != (step - 1) * VALIDATION_LEGS / steps {
+            let turn = step * VALIDATION_LEGS / steps;
+            motions.push(Motion::Spin { turn_rad: if turn <= VALIDATION_LEGS / 2 { FRAC_PI_2 } else { -FRAC_PI_2 } });
+        }
+        motions.push(Motion::Straight { length_m: measure_every_m });
+        if step + 1 < steps {
+            motions.push(Motion::Measure);
+        }
+    }
+    let settings = ProtocolSettings { length_m: Some(length_m), ..ProtocolSettings::default() };
+    program("validation", run, Protocol::Path, settings, motions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn length_m(program: &MotionProgram) -> f64 {
+        program
+            .motions
+            .iter()
+            .map(|motion| if let Motion::Straight { length_m } = motion { length_m.abs() } else { 0.0 })
+            .sum()
+    }
+
+    fn turns(program: &MotionProgram) -> Vec<f64> {
+        program
+            .motions
+            .iter()
+            .filter_map(|motion| if let Motion::Spin { turn_rad } = motion { Some(*turn_rad) } else { None })
+            .collect()
+    }
+
+    #[test]
+    fn straights_and_spins_alternate() {
+        let straights = Schedule::Straights { length_m: 0.5, runs: 3 }.programs();
+        assert_eq!(straights[0].motions, [Motion::Straight { length_m: 0.5 }]);
+        assert_eq!(straights[1].motions, [Motion::Straight { length_m: -0.5 }]);
+        assert_eq!(straights[2].id, "straight_002");
+        let spins = Schedule::Spins { turn_rad: TAU, runs: 2 }.programs();
+        assert_eq!(spins[0].settings.turn_rad, Some(TAU));
+        assert_eq!(spins[1].settings.turn_rad, Some(-TAU));
+    }
+
+    #[test]
+    fn squares_close_in_both_directions() {
+        let squares = Schedule::Squares { side_m: 4.0, runs_each_way: 5 }.programs();
+        assert_eq!(squares.len(), 10);
+        assert_eq!(squares.iter().filter(|square| square.protocol == Protocol::SquareCw).count(), 5);
+        for square in &squares {
+            assert_eq!(length_m(square), 16.0);
+            let turn: f64 = turns(square).iter().sum();
+            assert_eq!(turn.abs(), TAU);
+            assert_eq!(turn < 0.0, square.protocol == Protocol::SquareCw);
+        }
+    }
+
+    #[test]
+    fn the_validation_path_is_the_papers() {
+        let path = &Schedule::ValidationPath { length_m: 40.0, measure_every_m: 0.5, runs: 1 }.programs()[0];
+        assert_eq!(length_m(path), 40.0);
+        assert_eq!(turns(path).len(), 8);
+        // The start, the end and 79 in between: every 0.5 m.
+        assert_eq!(path.motions.iter().filter(|motion| **motion == Motion::Measure).count(), 79);
+    }
+}

@@ -1,0 +1,317 @@
+//! The records of a dataset, as columns in memory: SI units, one [`Run`] a run.
+
+use std::collections::BTreeMap;
+
+use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
+use serde::{Deserialize, Serialize};
+
+/// One robot's measured runs and what is known of the robot beforehand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dataset {
+    /// Name, licence and source; all optional.
+    pub provenance: Provenance,
+    /// Nominal values: what the robot believes today.
+    pub robot: NominalRobot,
+    /// Precision of the outside instrument, where it is known.
+    pub truth_noise: TruthNoise,
+    /// Marked points of the robot that `points.csv` speaks of.
+    pub points: Vec<MarkedPoint>,
+    /// The runs in the order in which `dataset.toml` lists them.
+    pub runs: Vec<Run>,
+}
+
+/// Where a dataset comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Provenance {
+    /// A name for people.
+    pub name: Option<String>,
+    /// Licence of the data.
+    pub licence: Option<String>,
+    /// Where the originals are.
+    pub source: Option<String>,
+    /// Anything else worth saying.
+    pub notes: Option<String>,
+}
+
+/// Nominal geometry and encoder of the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NominalRobot {
+    /// Nominal diameter of the left wheel, metres.
+    pub left_wheel_diameter_m: f64,
+    /// Nominal diameter of the right wheel, metres.
+    pub right_wheel_diameter_m: f64,
+    /// Nominal distance between the wheel contacts, metres.
+    pub wheel_separation_m: f64,
+    /// Counts for one turn of a wheel, after decoding and gears; a real number. Absent when the robot reports no ticks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ticks_per_rev: Option<f64>,
+    /// Width of the tick counter, when it wraps and is to be unwrapped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counter_bits: Option<u8>,
+}
+
+impl NominalRobot {
+    /// The nominal drive.
+    ///
+    /// # Errors
+    /// [`GeometryError`] when a length is not positive; a dataset that was read from files has been checked.
+    pub fn geometry(&self) -> Result<DriveGeometry, GeometryError> {
+        DriveGeometry::new(
+            Wheels { left: self.left_wheel_diameter_m, right: self.right_wheel_diameter_m },
+            self.wheel_separation_m,
+        )
+    }
+}
+
+/// One standard deviation of the outside instrument; `None` is unknown, and then estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TruthNoise {
+    /// Of each position coordinate, metres.
+    pub sigma_xy_m: Option<f64>,
+    /// Of the heading, radians.
+    pub sigma_theta_rad: Option<f64>,
+}
+
+/// A point marked on the robot, in the body frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarkedPoint {
+    /// The id that `points.csv` uses.
+    pub id: String,
+    /// Where it is on the robot.
+    pub body: Point,
+}
+
+/// One run: what was driven, counted and seen.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Run {
+    /// Id, protocol and covariates.
+    pub info: RunInfo,
+    /// What the robot counted.
+    pub odometry: Odometry,
+    /// Absolute poses or positions of the outside instrument (`truth.csv`).
+    pub truth: Vec<TruthSample>,
+    /// Precision of each truth sample, where the file gives it; as long as `truth`.
+    pub truth_sigma: Option<Vec<TruthSigma>>,
+    /// Displacements between two instants (`displacement.csv`).
+    pub displacements: Vec<Displacement>,
+    /// Marked points read in the room (`points.csv`).
+    pub point_readings: Vec<PointReading>,
+    /// A tachometer's wheel speeds (`wheel_reference.csv`).
+    pub wheel_reference: Vec<WheelSpeed>,
+}
+
+/// What is known of a run as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunInfo {
+    /// Unique within the dataset.
+    pub id: String,
+    /// What was driven.
+    pub protocol: Option<Protocol>,
+    /// What the protocol says of itself.
+    pub settings: ProtocolSettings,
+    /// When the run began on the session's clock, seconds.
+    pub start_s: Option<f64>,
+    /// False when there are gaps inside: no wheel phase, no summing across rows.
+    pub continuous: bool,
+    /// Anything else that was measured of the run as a whole, by key with unit suffix (`payload_kg`).
+    pub covariates: BTreeMap<String, f64>,
+}
+
+impl Default for RunInfo {
+    fn default() -> Self {
+        Self {
+            id: String::new(),
+            protocol: None,
+            settings: ProtocolSettings::default(),
+            start_s: None,
+            continuous: true,
+            covariates: BTreeMap::new(),
+        }
+    }
+}
+
+/// The kinds of run that protocols know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Protocol {
+    /// A straight line, forward or backward.
+    Straight,
+    /// A turn on the spot.
+    Spin,
+    /// A square driven clockwise.
+    SquareCw,
+    /// A square driven counter-clockwise.
+    SquareCcw,
+    /// A circle driven clockwise.
+    CircleCw,
+    /// A circle driven counter-clockwise.
+    CircleCcw,
+    /// A given path.
+    Path,
+    /// Anything.
+    Free,
+}
+
+impl Protocol {
+    /// The name that files use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Straight => "straight",
+            Self::Spin => "spin",
+            Self::SquareCw => "square_cw",
+            Self::SquareCcw => "square_ccw",
+            Self::CircleCw => "circle_cw",
+            Self::CircleCcw => "circle_ccw",
+            Self::Path => "path",
+            Self::Free => "free",
+        }
+    }
+}
+
+/// What a protocol says of itself; never a covariate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ProtocolSettings {
+    /// Side of a square, metres.
+    pub side_m: Option<f64>,
+    /// Radius of a circle, metres.
+    pub radius_m: Option<f64>,
+    /// Length of a straight, metres, negative backward.
+    pub length_m: Option<f64>,
+    /// Turn of a spin, radians, counter-clockwise.
+    pub turn_rad: Option<f64>,
+}
+
+/// What the robot counted, as columns in time order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Odometry {
+    /// Seconds from the run's start, strictly increasing.
+    pub t_s: Vec<f64>,
+    /// The wheels.
+    pub wheels: WheelLog,
+    /// Further known columns, each as long as `t_s`.
+    pub extra: BTreeMap<ExtraChannel, Vec<f64>>,
+}
+
+/// The wheels' columns, each as long as [`Odometry::t_s`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum WheelLog {
+    /// Cumulative signed counts.
+    Ticks(Wheels<Vec<i64>>),
+    /// Cumulative wheel angles, radians.
+    Angles(Wheels<Vec<f64>>),
+    /// A robot that reports only its twist. The value of a row holds over the interval that ends there.
+    Twist {
+        /// Forward speed, m/s.
+        v_mps: Vec<f64>,
+        /// Yaw rate, rad/s.
+        omega_radps: Vec<f64>,
+    },
+}
+
+impl Default for WheelLog {
+    fn default() -> Self {
+        Self::Ticks(Wheels::default())
+    }
+}
+
+/// Columns beyond the wheels that a log may carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ExtraChannel {
+    /// Commanded forward speed, m/s.
+    CommandedSpeed,
+    /// Commanded yaw rate, rad/s.
+    CommandedYawRate,
+    /// A gyroscope's yaw rate, rad/s.
+    GyroYawRate,
+}
+
+impl ExtraChannel {
+    /// All channels.
+    pub const ALL: [Self; 3] = [Self::CommandedSpeed, Self::CommandedYawRate, Self::GyroYawRate];
+
+    /// The column's name in `odometry.csv`.
+    #[must_use]
+    pub const fn column(self) -> &'static str {
+        match self {
+            Self::CommandedSpeed => "cmd_v_mps",
+            Self::CommandedYawRate => "cmd_omega_radps",
+            Self::GyroYawRate => "gyro_radps",
+        }
+    }
+}
+
+/// Where the outside instrument saw the robot, 32 bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TruthSample {
+    /// Seconds from the run's start.
+    pub t_s: f64,
+    /// In the room, metres.
+    pub x_m: f64,
+    /// In the room, metres.
+    pub y_m: f64,
+    theta_or_nan_rad: f64,
+}
+
+impl TruthSample {
+    /// A sample; `theta_rad` is `None` when the instrument sees positions only.
+    #[must_use]
+    pub const fn new(t_s: f64, x_m: f64, y_m: f64, theta_rad: Option<f64>) -> Self {
+        let theta_or_nan_rad = match theta_rad {
+            Some(theta_rad) => theta_rad,
+            None => f64::NAN,
+        };
+        Self { t_s, x_m, y_m, theta_or_nan_rad }
+    }
+
+    /// Heading in the room, radians, wrapped or not; `None` for position-only truth.
+    #[must_use]
+    pub const fn theta_rad(&self) -> Option<f64> {
+        if self.theta_or_nan_rad.is_nan() { None } else { Some(self.theta_or_nan_rad) }
+    }
+}
+
+/// One standard deviation of one truth sample; `None` is unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TruthSigma {
+    /// Of each position coordinate, metres.
+    pub sigma_xy_m: Option<f64>,
+    /// Of the heading, radians.
+    pub sigma_theta_rad: Option<f64>,
+}
+
+/// The instrument's pose at `t1_s` seen from its pose at `t0_s`, in the instrument's own frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Displacement {
+    /// Start, seconds from the run's start.
+    pub t0_s: f64,
+    /// End, seconds from the run's start.
+    pub t1_s: f64,
+    /// Along the instrument's x axis at `t0_s`, metres.
+    pub dx_m: f64,
+    /// Along the instrument's y axis at `t0_s`, metres.
+    pub dy_m: f64,
+    /// Turn, radians.
+    pub dtheta_rad: f64,
+}
+
+/// Where a marked point stood in the room.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointReading {
+    /// Seconds from the run's start.
+    pub t_s: f64,
+    /// Which point: index into [`Dataset::points`].
+    pub point: usize,
+    /// Where it was read in the room.
+    pub room: Point,
+}
+
+/// A tachometer's reading of both wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelSpeed {
+    /// Seconds from the run's start.
+    pub t_s: f64,
+    /// Ground speed of each wheel, m/s.
+    pub speed_m_s: Wheels<f64>,
+}

@@ -1,0 +1,323 @@
+//! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies nothing.
+
+use kinematics::{Count, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near};
+
+use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, Run, RunInfo, TruthNoise, WheelLog};
+
+/// One robot's session: its nominal values and some of its runs.
+#[derive(Debug, Clone)]
+pub struct Session<'a> {
+    /// The dataset's name, for messages.
+    pub name: &'a str,
+    /// Nominal values.
+    pub robot: &'a NominalRobot,
+    /// Precision of the outside instrument.
+    pub truth_noise: TruthNoise,
+    /// Marked points of the robot.
+    pub points: &'a [MarkedPoint],
+    /// The runs.
+    pub runs: Vec<RunView<'a>>,
+}
+
+impl Dataset {
+    /// A view of all runs.
+    #[must_use]
+    pub fn session(&self) -> Session<'_> {
+        self.session_of(|_| true)
+    }
+
+    /// A view of the runs that `keep` accepts.
+    #[must_use]
+    pub fn session_of(&self, keep: impl Fn(&RunInfo) -> bool) -> Session<'_> {
+        Session {
+            name: self.provenance.name.as_deref().unwrap_or("dataset"),
+            robot: &self.robot,
+            truth_noise: self.truth_noise,
+            points: &self.points,
+            runs: self
+                .runs
+                .iter()
+                .filter(|run| keep(&run.info))
+                .map(|run| RunView { run, points: &self.points })
+                .collect(),
+        }
+    }
+}
+
+/// A view of one run, with the marked points that its readings speak of.
+#[derive(Debug, Clone, Copy)]
+pub struct RunView<'a> {
+    run: &'a Run,
+    points: &'a [MarkedPoint],
+}
+
+impl<'a> RunView<'a> {
+    /// Id, protocol and covariates.
+    #[must_use]
+    pub const fn info(&self) -> &'a RunInfo {
+        &self.run.info
+    }
+
+    /// What the robot counted.
+    #[must_use]
+    pub const fn odometry(&self) -> &'a Odometry {
+        &self.run.odometry
+    }
+
+    /// The run's records.
+    #[must_use]
+    pub const fn run(&self) -> &'a Run {
+        self.run
+    }
+
+    /// The turn of each wheel from the first row to the last, radians, or `None` when the run has no row.
+    ///
+    /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
+    #[must_use]
+    pub fn wheel_turn_rad(&self, robot: &NominalRobot) -> Option<Wheels<f64>> {
+        fn ends<C: Count>(column: &[C]) -> Option<f64> {
+            Some(column.last()?.since(*column.first()?))
+        }
+        match &self.run.odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let rad_per_tick = std::f64::consts::TAU / robot.ticks_per_rev?;
+                Some(Wheels { left: ends(&ticks.left)? * rad_per_tick, right: ends(&ticks.right)? * rad_per_tick })
+            }
+            WheelLog::Angles(angles) => Some(Wheels { left: ends(&angles.left)?, right: ends(&angles.right)? }),
+            WheelLog::Twist { .. } => {
+                let angles = self.rebuilt_angles_rad(robot)?;
+                Some(Wheels { left: *angles.left.last()?, right: *angles.right.last()? })
+            }
+        }
+    }
+
+    /// The counts of each wheel from the first row to the last; `None` when the robot does not report ticks.
+    #[must_use]
+    pub fn ticks(&self) -> Option<Wheels<f64>> {
+        match &self.run.odometry.wheels {
+            WheelLog::Ticks(ticks) => Some(Wheels {
+                left: ticks.left.last()?.since(*ticks.left.first()?),
+                right: ticks.right.last()?.since(*ticks.right.first()?),
+            }),
+            WheelLog::Angles(_) | WheelLog::Twist { .. } => None,
+        }
+    }
+
+    fn rebuilt_angles_rad(&self, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
+        let WheelLog::Twist { v_mps, omega_radps } = &self.run.odometry.wheels else { return None };
+        let geometry = robot.geometry().ok()?;
+        let m_per_rad = geometry.m_per_rad();
+        let (mut angle_rad, mut previous_s) = (Wheels::both(0.0), None);
+        let mut angles = Wheels { left: Vec::with_capacity(v_mps.len()), right: Vec::with_capacity(v_mps.len()) };
+        for ((&t_s, &v_m_s), &omega_rad_s) in self.run.odometry.t_s.iter().zip(v_mps).zip(omega_radps) {
+            let dt_s = t_s - previous_s.unwrap_or(t_s);
+            previous_s = Some(t_s);
+            let speed_m_s = geometry.wheel_speed_m_s(kinematics::Twist { v_m_s, omega_rad_s });
+            angle_rad = angle_rad.zip_with(
+                speed_m_s.zip_with(m_per_rad, |speed_m_s, m_per_rad| speed_m_s * dt_s / m_per_rad),
+                |angle, turn| angle + turn,
+            );
+            angles.left.push(angle_rad.left);
+            angles.right.push(angle_rad.right);
+        }
+        Some(angles)
+    }
+
+    /// Dead reckons the run from `start` and calls `visit` with time and pose at every row; `start` is the pose at the first row.
+    ///
+    /// `m_per_rad` and `wheel_separation_m` are the geometry to be used; the nominal robot gives the ticks of a turn and, for a robot
+    /// that reports only its twist, the geometry from which its wheels are rebuilt.
+    pub fn dead_reckon(
+        &self,
+        robot: &NominalRobot,
+        geometry: &kinematics::DriveGeometry,
+        rule: Rule,
+        start: Pose,
+        mut visit: impl FnMut(f64, Pose),
+    ) {
+        let mut times = self.run.odometry.t_s.iter();
+        let mut with_time = |pose| {
+            if let Some(&t_s) = times.next() {
+                visit(t_s, pose);
+            }
+        };
+        let reckoner =
+            |m_per_count| DeadReckoner { m_per_count, wheel_separation_m: geometry.wheel_separation_m(), rule };
+        match &self.run.odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let Some(Ok(m_per_count)) = robot.ticks_per_rev.map(|ticks| geometry.m_per_count(ticks)) else {
+                    return;
+                };
+                let columns = Wheels { left: &ticks.left[..], right: &ticks.right[..] };
+                reckoner(m_per_count).for_each_pose(start, columns, &mut with_time);
+            }
+            WheelLog::Angles(angles) => {
+                let columns = Wheels { left: &angles.left[..], right: &angles.right[..] };
+                reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);
+            }
+            WheelLog::Twist { .. } => {
+                let Some(angles) = self.rebuilt_angles_rad(robot) else { return };
+                let columns = Wheels { left: &angles.left[..], right: &angles.right[..] };
+                reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);
+            }
+        }
+    }
+
+    /// The instrument's poses of the run as (time, pose): from the truth where it has headings, else from the marked points read
+    /// at one instant. Empty when neither gives poses.
+    #[must_use]
+    pub fn observed_poses(&self) -> Vec<(f64, Pose)> {
+        let from_truth: Vec<_> = self
+            .run
+            .truth
+            .iter()
+            .filter_map(|sample| Some((sample.t_s, Pose::new(sample.x_m, sample.y_m, sample.theta_rad()?))))
+            .collect();
+        if from_truth.is_empty() { self.poses_from_points() } else { from_truth }
+    }
+
+    /// The first and the last observed pose, where there are two.
+    #[must_use]
+    pub fn observed_ends(&self) -> Option<(Pose, Pose)> {
+        let heading = |sample: &crate::TruthSample| {
+            sample.theta_rad().map(|theta_rad| Pose::new(sample.x_m, sample.y_m, theta_rad))
+        };
+        let mut poses = self.run.truth.iter().filter_map(heading);
+        if let Some(first) = poses.next() {
+            return Some((first, poses.next_back()?));
+        }
+        let points = self.poses_from_points();
+        match points.as_slice() {
+            [(_, first), .., (_, last)] => Some((*first, *last)),
+            _ => None,
+        }
+    }
+
+    /// The body's pose at every instant at which at least two marked points were read: the rigid motion that fits them best
+    /// (least squares, in closed form in the plane). Headings continue without jumps of whole turns.
+    fn poses_from_points(&self) -> Vec<(f64, Pose)> {
+        let mut poses: Vec<(f64, Pose)> = Vec::new();
+        for readings in self.run.point_readings.chunk_by(|a, b| a.t_s == b.t_s) {
+            let pairs =
+                readings.iter().filter_map(|reading| Some((self.points.get(reading.point)?.body, reading.room)));
+            if let Some(mut pose) = fit_rigid(pairs) {
+                if let Some((_, previous)) = poses.last() {
+                    pose.theta_rad = unwrap_near(pose.theta_rad, previous.theta_rad);
+                }
+                poses.push((readings[0].t_s, pose));
+            }
+        }
+        poses
+    }
+}
+
+/// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer than two distinct points.
+fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
+    let (mut count, mut body, mut room) = (0.0, Point::default(), Point::default());
+    for (b, r) in pairs.clone() {
+        count += 1.0;
+        body = Point::new(body.x_m + b.x_m, body.y_m + b.y_m);
+        room = Point::new(room.x_m + r.x_m, room.y_m + r.y_m);
+    }
+    if count < 2.0 {
+        return None;
+    }
+    let body = Point::new(body.x_m / count, body.y_m / count);
+    let room = Point::new(room.x_m / count, room.y_m / count);
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (b, r) in pairs {
+        let (bx, by) = (b.x_m - body.x_m, b.y_m - body.y_m);
+        let (rx, ry) = (r.x_m - room.x_m, r.y_m - room.y_m);
+        dot += bx * rx + by * ry;
+        cross += bx * ry - by * rx;
+    }
+    if dot == 0.0 && cross == 0.0 {
+        return None;
+    }
+    let theta_rad = cross.atan2(dot);
+    let turned = Pose::new(0.0, 0.0, theta_rad) * body;
+    Some(Pose::new(room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{PointReading, Provenance, TruthSample};
+
+    fn robot() -> NominalRobot {
+        NominalRobot {
+            left_wheel_diameter_m: 0.16,
+            right_wheel_diameter_m: 0.16,
+            wheel_separation_m: 0.363,
+            ticks_per_rev: Some(500.0),
+            counter_bits: None,
+        }
+    }
+
+    fn dataset(run: Run) -> Dataset {
+        let point = |id: &str, y_m| MarkedPoint { id: id.into(), body: Point::new(0.0, y_m) };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: robot(),
+            truth_noise: TruthNoise::default(),
+            points: vec![point("left", 0.25), point("right", -0.2)],
+            runs: vec![run],
+        }
+    }
+
+    #[test]
+    fn a_pose_is_recovered_from_its_marked_points_and_headings_do_not_jump() {
+        let mut run = Run::default();
+        let poses: Vec<_> = (0..40).map(|k| Pose::new(0.1 * f64::from(k), 1.0, 0.4 * f64::from(k) - 1.0)).collect();
+        let marks = dataset(Run::default()).points;
+        for (k, pose) in poses.iter().enumerate() {
+            for (point, mark) in marks.iter().enumerate() {
+                #[allow(clippy::cast_precision_loss)]
+                run.point_readings.push(PointReading { t_s: k as f64, point, room: *pose * mark.body });
+            }
+        }
+        let dataset = dataset(run);
+        let observed = dataset.session().runs[0].observed_poses();
+        assert_eq!(observed.len(), poses.len());
+        for ((_, observed), pose) in observed.iter().zip(&poses) {
+            // Half a metre of lever and a few roundings.
+            assert!(observed.position().distance_m(pose.position()) < 1e-14);
+            assert!((observed.theta_rad - pose.theta_rad).abs() < 1e-13, "{} {}", observed.theta_rad, pose.theta_rad);
+        }
+    }
+
+    #[test]
+    fn one_point_or_coinciding_points_give_no_pose() {
+        assert_eq!(fit_rigid([(Point::new(0.0, 1.0), Point::new(2.0, 2.0))].into_iter()), None);
+        let same = (Point::new(0.0, 1.0), Point::new(2.0, 2.0));
+        assert_eq!(fit_rigid([same, same].into_iter()), None);
+    }
+
+    #[test]
+    fn a_twist_log_is_rebuilt_into_wheels_that_drive_the_same_way() {
+        let mut run = Run::default();
+        run.odometry.t_s = (0..=100).map(|k| 0.05 * f64::from(k)).collect();
+        run.odometry.wheels = WheelLog::Twist { v_mps: vec![0.3; 101], omega_radps: vec![-0.2; 101] };
+        let dataset = dataset(run);
+        let session = dataset.session();
+        let geometry = robot().geometry().expect("valid");
+        let mut last = (0.0, Pose::IDENTITY);
+        session.runs[0]
+            .dead_reckon(&robot(), &geometry, Rule::ExactArc, Pose::IDENTITY, |t_s, pose| last = (t_s, pose));
+        let exact = kinematics::Increment { distance_m: 1.5, turn_rad: -1.0 }.arc();
+        assert_eq!(last.0, 5.0);
+        assert!(last.1.position().distance_m(exact.position()) < 1e-13);
+        assert!((last.1.theta_rad - exact.theta_rad).abs() < 1e-13);
+    }
+
+    #[test]
+    fn position_only_truth_gives_no_poses() {
+        let run = Run {
+            truth: vec![TruthSample::new(0.0, 0.0, 0.0, None), TruthSample::new(1.0, 1.0, 0.0, None)],
+            ..Run::default()
+        };
+        let dataset = dataset(run);
+        assert!(dataset.session().runs[0].observed_poses().is_empty());
+        assert!(dataset.session().runs[0].observed_ends().is_none());
+    }
+}
