@@ -1,0 +1,24 @@
+//! YAIR: a differential-drive robot simulated, calibrated and benched; the front door of the library.
+//!
+//! The rooms are crates of their own, named here as a user meets them:
+//! [`kinematics`] (poses, drive, dead reckoning), [`dataset`] (measured runs, their files and importers, protocols), [`effects`] (what makes odometry
+//! deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods) and [`bench`] (Monte Carlo).
+//!
+//! ```
+//! let text = include_str!("../scenarios/paper.toml");
+//! let scenario = yair::scenario::Scenario::parse(text, "paper.toml")?;
+//! let measured = yair::sim_yair::simulate(&scenario, 1, 0)?.dataset;
+//! let direct = yair::calib::method("direct").expect("a method of the table of contents");
+//! let found = direct.calibrate(&[measured.session()])?;
+//! // The robot believes in 363 mm; the paper's spins find it within a few millimetres.
+//! assert!((found.geometry.wheel_separation_m() - 0.363).abs() < 0.005);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub use ::bench;
+pub use calib;
+pub use dataset;
+pub use effects;
+pub use kinematics;
+pub use scenario;
+pub use sim_yair;

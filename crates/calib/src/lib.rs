@@ -1,1 +1,22 @@
+//! Calibration of a differential drive's odometry: one file a method in `methods/`, behind the trait [`Method`].
+//!
+//! A method takes borrowed sessions of one robot and returns values with covariance, what it rejected and what the data cannot show. It links neither
+//! the simulator nor the effects: what it is not given, it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
+mod drift;
+mod estimate;
+mod report;
+mod robust;
+
+pub mod methods;
+
+pub use drift::{CalibrationDrift, RunDrift, evaluate};
+pub use estimate::{
+    CalibError, Calibration, Covariance, Estimate, Method, NotObservable, Parameter, Rejected, refuse_wrapped_counters,
+};
+pub use methods::{METHODS, method};
+pub use report::{
+    CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,
+    ReportedValue,
+};
+pub use robust::{MedianMad, Summary};

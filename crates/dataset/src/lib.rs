@@ -5,15 +5,29 @@
 //! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
 //! simulator here, a real robot elsewhere.
 
+mod counter;
+mod error;
+pub mod import;
 mod platform;
 mod program;
+mod read;
 mod record;
 mod session;
+mod table;
+mod term;
+mod warning;
+mod write;
 
+pub use counter::suspected_wrap;
+pub use error::DatasetError;
 pub use platform::{Platform, record_session};
 pub use program::{Motion, MotionProgram, Schedule};
+pub use read::{Loaded, read};
 pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
 pub use session::{RunView, Session};
+pub use term::{Interval, ModelTerm, TermParameter};
+pub use warning::Warning;
+pub use write::{Existing, write};

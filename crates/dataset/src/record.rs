@@ -243,7 +243,7 @@ impl ExtraChannel {
 }
 
 /// Where the outside instrument saw the robot, 32 bytes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct TruthSample {
     /// Seconds from the run's start.
     pub t_s: f64,
@@ -269,6 +269,13 @@ impl TruthSample {
     #[must_use]
     pub const fn theta_rad(&self) -> Option<f64> {
         if self.theta_or_nan_rad.is_nan() { None } else { Some(self.theta_or_nan_rad) }
+    }
+}
+
+impl PartialEq for TruthSample {
+    /// Two samples without heading are equal where their positions are, though NaN stands for the heading.
+    fn eq(&self, other: &Self) -> bool {
+        (self.t_s, self.x_m, self.y_m, self.theta_rad()) == (other.t_s, other.x_m, other.y_m, other.theta_rad())
     }
 }
 

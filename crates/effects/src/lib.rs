@@ -1,1 +1,129 @@
-//! Physical effects.
+//! What makes real wheel odometry deviate: one file a physical effect in `catalogue/`, and this table of contents.
+//!
+//! An effect has two faces that share a file and its parameters, never code. The *forward* face ([`Forward`]) is how the world does it: it acts
+//! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
+//! The *hypothesis* face ([`dataset::ModelTerm`]) is how recorded data would show it: it sees recorded quantities only.
+//!
+//! Adding an effect is one new file in `catalogue/` and its line in [`contents!`] below: scenario parsing, the catalogue and the laws follow.
+
+mod effect;
+mod forward;
+mod stream;
+
+pub use effect::{EffectError, PhysicalEffect, Which};
+pub use forward::{Command, Forward, Readout, SampleClock, Sighting, Step};
+pub use stream::{Address, Stream, StreamName};
+
+/// Declares the catalogue: for each effect its module and its parameters' type.
+macro_rules! contents {
+    ($($module:ident :: $Type:ident),* $(,)?) => {
+        mod catalogue {
+            $(pub(crate) mod $module;)*
+
+            /// A step of 1 ms at rest on wheels of 80 mm radius, for the effects' own tests.
+            #[cfg(test)]
+            pub(crate) fn specimen_step() -> crate::Step {
+                use kinematics::{Pose, Wheels};
+                crate::Step {
+                    t_s: 0.0,
+                    dt_s: 1e-3,
+                    world_from_body: Pose::IDENTITY,
+                    nominal_radius_m: Wheels::both(0.08),
+                    shaft_rad: Wheels::both(0.0),
+                    rate_rad_s: Wheels::both(0.0),
+                    acceleration_rad_s2: Wheels::both(0.0),
+                    wheel_angle_rad: Wheels::both(0.0),
+                    wheel_rad: Wheels::both(0.0),
+                    radius_m: Wheels::both(0.08),
+                    travel_m: Wheels::both(0.0),
+                    wheel_separation_m: 0.363,
+                    lateral_m: 0.0,
+                    extra_turn_rad: 0.0,
+                    creep_m: [0.0; 2],
+                    encoder_rad: Wheels::both(0.0),
+                }
+            }
+        }
+        $(pub use catalogue::$module::$Type;)*
+
+        /// One effect of the catalogue with its sizes; `kind` in a scenario is its id.
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(tag = "kind", rename_all = "snake_case")]
+        pub enum Effect {
+            $(
+                #[doc = concat!("`", stringify!($module), "`")]
+                $Type($Type),
+            )*
+        }
+
+        impl Effect {
+            /// The effect behind its interface.
+            #[must_use]
+            pub fn physical(&self) -> &dyn PhysicalEffect {
+                match self {
+                    $(Self::$Type(effect) => effect,)*
+                }
+            }
+
+            /// The id that scenarios, findings and tests use.
+            #[must_use]
+            pub const fn id(&self) -> &'static str {
+                match self {
+                    $(Self::$Type(_) => stringify!($module),)*
+                }
+            }
+        }
+
+        /// Every id of the catalogue, in the order in which the effects act.
+        pub const CATALOGUE: &[&str] = &[$(stringify!($module)),*];
+    };
+}
+
+contents! {
+    wheel_scale::WheelScale,
+    wheel_mismatch::WheelMismatch,
+    wheelbase::Wheelbase,
+    contact_patch_wheelbase::ContactPatchWheelbase,
+    backlash::Backlash,
+    wheel_eccentricity::WheelEccentricity,
+    slip_speed::SlipSpeed,
+    slip_acceleration::SlipAcceleration,
+    traction_loss::TractionLoss,
+    missed_counts::MissedCounts,
+    sampling_skew::SamplingSkew,
+    quantization::Quantization,
+    counter_wrap::CounterWrap,
+}
+
+/// Puts effects into the order in which they act, so that a scenario's order does not matter.
+pub fn sort_by_stage(effects: &mut [Effect]) {
+    effects.sort_by_key(|effect| CATALOGUE.iter().position(|id| *id == effect.id()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn folder_and_list_agree() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/catalogue");
+        let files: BTreeSet<String> = std::fs::read_dir(folder)
+            .expect("the catalogue stands beside this file")
+            .map(|entry| entry.expect("readable").file_name().to_string_lossy().trim_end_matches(".rs").to_owned())
+            .collect();
+        let list: BTreeSet<String> = CATALOGUE.iter().map(ToString::to_string).collect();
+        assert_eq!(files, list);
+    }
+
+    #[test]
+    fn the_order_of_a_scenario_does_not_matter() {
+        let mut effects = vec![
+            Effect::CounterWrap(CounterWrap { bits: 16 }),
+            Effect::WheelScale(WheelScale { scale: 1.01 }),
+            Effect::SlipSpeed(SlipSpeed { slip_s_m: 0.01 }),
+        ];
+        sort_by_stage(&mut effects);
+        assert_eq!(effects.iter().map(Effect::id).collect::<Vec<_>>(), ["wheel_scale", "slip_speed", "counter_wrap"]);
+    }
+}

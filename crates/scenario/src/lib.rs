@@ -1,3 +1,11 @@
-//! The words of an experiment as data: TOML in and out, no behaviour.
+//! The words of an experiment as data: robot, noise, effects with sizes, instruments, protocols and sweep. TOML in and out, no behaviour.
+//!
+//! A scenario is all that a simulated number depends on besides seed and trial. Unknown keys are errors, and no physical quantity has a default.
+
+mod experiment;
 mod robot;
+mod sweep;
+
+pub use experiment::{Engine, Instrument, Log, Noise, Placement, ProtocolPart, Scenario, ScenarioError};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
+pub use sweep::{Axis, Point, Sweep};

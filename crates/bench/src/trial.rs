@@ -1,0 +1,55 @@
+//! One Monte-Carlo trial: the protocols driven once, into buffers that the next trial uses again.
+
+use dataset::{Dataset, MotionProgram, Platform, Run, Session};
+use scenario::Scenario;
+use sim_yair::{SimulatedRobot, SimulationError};
+
+/// A simulated robot with its protocols and the dataset that they fill.
+pub struct Trial {
+    robot: SimulatedRobot,
+    programs: Vec<MotionProgram>,
+    dataset: Dataset,
+}
+
+impl Trial {
+    /// Prepares a scenario.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when the scenario cannot be simulated.
+    pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, SimulationError> {
+        let robot = SimulatedRobot::new(scenario, seed, 0)?;
+        let programs = scenario.programs();
+        let dataset = Dataset {
+            provenance: dataset::Provenance::default(),
+            robot: robot.robot(),
+            truth_noise: robot.truth_noise(),
+            points: robot.points().to_vec(),
+            runs: vec![Run::default(); programs.len()],
+        };
+        Ok(Self { robot, programs, dataset })
+    }
+
+    /// Drives trial number `trial` and shows what was measured.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when a motion cannot be driven.
+    pub fn drive(&mut self, trial: u64) -> Result<Session<'_>, SimulationError> {
+        self.robot.restart(trial);
+        for (program, run) in self.programs.iter().zip(&mut self.dataset.runs) {
+            self.robot.drive_into(program, run)?;
+        }
+        Ok(self.dataset.session())
+    }
+
+    /// The drive that a perfect calibration would find.
+    #[must_use]
+    pub const fn true_geometry(&self) -> kinematics::DriveGeometry {
+        self.robot.true_geometry()
+    }
+
+    /// Ticks of a wheel turn in what is measured.
+    #[must_use]
+    pub const fn ticks_per_rev(&self) -> Option<f64> {
+        self.dataset.robot.ticks_per_rev
+    }
+}

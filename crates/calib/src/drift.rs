@@ -1,0 +1,215 @@
+//! Drift of dead reckoning under a calibration, measured against the outside instrument.
+//!
+//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is compared at the truth's instants; between two
+//! rows of the log the pose is interpolated along the chord. Instants outside of the log are left out.
+
+use dataset::{RunView, Session};
+use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
+use serde::Serialize;
+
+use crate::report::NamedCalibration;
+
+/// A truth sample may miss a row's instant by the rounding of its file.
+const SAME_INSTANT_S: f64 = 1e-9;
+
+/// Drift of every run under one calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CalibrationDrift {
+    /// The calibration's name; `nominal` for what the robot believes.
+    pub name: String,
+    /// Run by run.
+    pub runs: Vec<RunDrift>,
+    /// Largest position error at any instant of any run, metres.
+    pub max_position_m: Option<f64>,
+    /// Largest heading error at any instant of any run, radians.
+    pub max_heading_rad: Option<f64>,
+    /// Largest position error at a run's end, metres.
+    pub max_final_position_m: Option<f64>,
+    /// Largest heading error at a run's end, radians.
+    pub max_final_heading_rad: Option<f64>,
+    /// Mean position error at the runs' ends, metres.
+    pub mean_final_position_m: Option<f64>,
+    /// Mean heading error at the runs' ends, radians.
+    pub mean_final_heading_rad: Option<f64>,
+    /// 100 · sum of final position errors / sum of lengths.
+    pub drift_percent: Option<f64>,
+    /// Why something is null.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why_null: Option<String>,
+}
+
+/// Drift of one run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunDrift {
+    /// The session, where several are evaluated together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
+    /// The run's id.
+    pub run: String,
+    /// Path length of the drive's centre by the odometry, metres; turns on the spot have none.
+    pub length_m: f64,
+    /// Largest position error, metres.
+    pub max_position_m: Option<f64>,
+    /// Largest heading error, radians.
+    pub max_heading_rad: Option<f64>,
+    /// Position error at the last truth instant, metres.
+    pub final_position_m: Option<f64>,
+    /// Heading error at the last truth instant, radians.
+    pub final_heading_rad: Option<f64>,
+    /// Why something is null.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why_null: Option<&'static str>,
+}
+
+/// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values when there is none.
+///
+/// `name_runs` adds each session's name to its runs.
+#[must_use]
+pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>, name_runs: bool) -> CalibrationDrift {
+    let mut runs = Vec::new();
+    for session in sessions {
+        let nominal = session.robot.geometry().ok();
+        let geometry = match calibration {
+            Some(calibration) => nominal.and_then(|nominal| calibration.geometry(session.robot, nominal)),
+            None => nominal,
+        };
+        let body_from_instrument = calibration.map_or(Pose::IDENTITY, NamedCalibration::body_from_instrument);
+        for run in &session.runs {
+            let mut drift = match geometry {
+                Some(geometry) => run_drift(session, run, geometry, body_from_instrument),
+                None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
+            };
+            drift.dataset = name_runs.then(|| session.name.to_owned());
+            runs.push(drift);
+        }
+    }
+    let name = calibration.map_or_else(|| "nominal".to_owned(), |calibration| calibration.name.clone());
+    summarise(name, runs)
+}
+
+fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {
+    RunDrift {
+        dataset: None,
+        run: run.info().id.clone(),
+        length_m,
+        max_position_m: None,
+        max_heading_rad: None,
+        final_position_m: None,
+        final_heading_rad: None,
+        why_null: Some(why),
+    }
+}
+
+fn run_drift(
+    session: &Session<'_>,
+    run: &RunView<'_>,
+    geometry: DriveGeometry,
+    body_from_instrument: Pose,
+) -> RunDrift {
+    let observed = run.observed_poses();
+    let start =
+        observed.first().map(|(_, world_from_instrument)| *world_from_instrument * body_from_instrument.inverse());
+    let mut log: Vec<(f64, Pose)> = Vec::with_capacity(run.odometry().t_s.len());
+    let mut length_m = 0.0;
+    run.dead_reckon(session.robot, &geometry, Rule::Midpoint, start.unwrap_or_default(), |t_s, pose| {
+        if let Some((_, last)) = log.last() {
+            length_m += pose.position().distance_m(last.position());
+        }
+        log.push((t_s, pose));
+    });
+    let Some(start) = start else {
+        let why = if run.run().truth.is_empty() {
+            "no absolute truth: displacements and wheel speeds give no drift from the start pose"
+        } else {
+            "position-only truth gives no start heading"
+        };
+        return unknown(run, length_m, why);
+    };
+    let Some(&(log_start_s, _)) = log.first() else { return unknown(run, length_m, "the run has no odometry") };
+    // The start pose holds at the first truth instant, which may be later than the log's first row.
+    let first_s = observed[0].0;
+    let moved = if first_s > log_start_s + SAME_INSTANT_S {
+        match at(&log, first_s, &mut 0) {
+            Some(reckoned) => start * reckoned.inverse(),
+            None => return unknown(run, length_m, "the truth does not overlap the odometry in time"),
+        }
+    } else {
+        Pose::IDENTITY
+    };
+    let identity = moved == Pose::IDENTITY;
+    let (mut row, mut largest, mut last) = (0, None::<(f64, f64)>, None);
+    for (t_s, world_from_instrument) in &observed {
+        let Some(reckoned) = at(&log, *t_s, &mut row) else { continue };
+        let reckoned = if identity { reckoned } else { moved * reckoned };
+        let seen = *world_from_instrument * body_from_instrument.inverse();
+        let position_m = reckoned.position().distance_m(seen.position());
+        let heading_rad = wrap_to_pi(reckoned.theta_rad - seen.theta_rad).abs();
+        let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
+        largest = Some((position_m.max(max_position_m), heading_rad.max(max_heading_rad)));
+        last = Some((position_m, heading_rad));
+    }
+    if largest.is_none() {
+        return unknown(run, length_m, "the truth does not overlap the odometry in time");
+    }
+    RunDrift {
+        dataset: None,
+        run: run.info().id.clone(),
+        length_m,
+        max_position_m: largest.map(|largest| largest.0),
+        max_heading_rad: largest.map(|largest| largest.1),
+        final_position_m: last.map(|last| last.0),
+        final_heading_rad: last.map(|last| last.1),
+        why_null: None,
+    }
+}
+
+/// The reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the log.
+fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
+    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + SAME_INSTANT_S {
+        *row += 1;
+    }
+    let (row_s, pose) = *log.get(*row)?;
+    if (t_s - row_s).abs() <= SAME_INSTANT_S {
+        return Some(pose);
+    }
+    let (next_s, next) = *log.get(*row + 1)?;
+    if t_s < row_s {
+        return None;
+    }
+    let share = (t_s - row_s) / (next_s - row_s);
+    let between = |a: f64, b: f64| a + share * (b - a);
+    Some(Pose::new(between(pose.x_m, next.x_m), between(pose.y_m, next.y_m), between(pose.theta_rad, next.theta_rad)))
+}
+
+fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {
+    let values = |of: fn(&RunDrift) -> Option<f64>| runs.iter().filter_map(of).collect::<Vec<f64>>();
+    let largest = |of| values(of).into_iter().reduce(f64::max);
+    #[allow(clippy::cast_precision_loss)] // counts of runs
+    let mean = |of| {
+        let values = values(of);
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let measured = || runs.iter().filter(|run| run.final_position_m.is_some());
+    let length_m: f64 = measured().map(|run| run.length_m).sum();
+    let final_m: f64 = measured().filter_map(|run| run.final_position_m).sum();
+    let drift_percent = (length_m > 0.0 && measured().next().is_some()).then(|| 100.0 * final_m / length_m);
+    let why_null = if measured().next().is_none() {
+        runs.iter().find_map(|run| run.why_null).map(str::to_owned)
+    } else if drift_percent.is_none() {
+        Some("the runs have no length: turns on the spot only".to_owned())
+    } else {
+        None
+    };
+    CalibrationDrift {
+        name,
+        max_position_m: largest(|run| run.max_position_m),
+        max_heading_rad: largest(|run| run.max_heading_rad),
+        max_final_position_m: largest(|run| run.final_position_m),
+        max_final_heading_rad: largest(|run| run.final_heading_rad),
+        mean_final_position_m: mean(|run| run.final_position_m),
+        mean_final_heading_rad: mean(|run| run.final_heading_rad),
+        drift_percent,
+        why_null,
+        runs,
+    }
+}

@@ -1,0 +1,222 @@
+//! What a calibration is: the trait of a method and the form of its result.
+
+use dataset::{NominalRobot, Session};
+use kinematics::{DriveGeometry, GeometryError, Wheels};
+use nalgebra::DMatrix;
+
+/// A quantity that calibration estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Parameter {
+    /// Effective diameter of the left wheel, metres.
+    LeftWheelDiameter,
+    /// Effective diameter of the right wheel, metres.
+    RightWheelDiameter,
+    /// Effective distance between the wheel contacts, metres (`B`).
+    WheelSeparation,
+    /// Travel of the left wheel per tick, metres (`C_L`).
+    LeftPerTick,
+    /// Travel of the right wheel per tick, metres (`C_R`).
+    RightPerTick,
+    /// The factor common to both wheels; only ever not observable.
+    CommonScale,
+}
+
+impl Parameter {
+    /// The key in JSON and calibration files.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::LeftWheelDiameter => "left_wheel_diameter_m",
+            Self::RightWheelDiameter => "right_wheel_diameter_m",
+            Self::WheelSeparation => "wheel_separation_m",
+            Self::LeftPerTick => "left_m_per_tick",
+            Self::RightPerTick => "right_m_per_tick",
+            Self::CommonScale => "common_scale",
+        }
+    }
+
+    /// Every parameter that a result may carry a value of.
+    pub const ESTIMATED: [Self; 5] = [
+        Self::LeftWheelDiameter,
+        Self::RightWheelDiameter,
+        Self::WheelSeparation,
+        Self::LeftPerTick,
+        Self::RightPerTick,
+    ];
+}
+
+/// A value with its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Of what.
+    pub parameter: Parameter,
+    /// In SI units.
+    pub value: f64,
+    /// One standard deviation of the value's error, or `None` when the data do not show it.
+    pub sigma: Option<f64>,
+}
+
+/// Joint covariance of the drive's geometry, order: left diameter, right diameter, separation (m²).
+pub type Covariance = DMatrix<f64>;
+
+/// A parameter that the data do not determine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NotObservable {
+    /// Which.
+    pub parameter: Parameter,
+    /// Why, and what would show it.
+    pub why: &'static str,
+}
+
+/// A run that was left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rejected {
+    /// The run's id.
+    pub run: String,
+    /// Why.
+    pub why: String,
+}
+
+/// What a method found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// The method's name.
+    pub method: &'static str,
+    /// The geometry that dead reckoning is to use.
+    pub geometry: DriveGeometry,
+    /// Ticks of a wheel turn, when the robot reports ticks.
+    pub ticks_per_rev: Option<f64>,
+    /// Covariance of the geometry; `None` when the data do not show a scatter (one run a direction, say).
+    pub covariance: Option<Covariance>,
+    /// What the data do not determine.
+    pub not_observable: Vec<NotObservable>,
+    /// How many runs the values rest on.
+    pub runs_used: usize,
+    /// What was left out, run by run and wheel by wheel.
+    pub runs_rejected: Vec<Rejected>,
+    /// False when an iteration stopped without an answer; closed-form methods always converge.
+    pub converged: bool,
+}
+
+impl Calibration {
+    /// The value of a parameter with its standard deviation; `None` when the method has no such parameter.
+    #[must_use]
+    pub fn estimate(&self, parameter: Parameter) -> Option<Estimate> {
+        let diameter_m = self.geometry.wheel_diameter_m();
+        let per_tick = || self.ticks_per_rev.map(|ticks| std::f64::consts::PI / ticks);
+        let (row, value, factor) = match parameter {
+            Parameter::LeftWheelDiameter => (0, diameter_m.left, 1.0),
+            Parameter::RightWheelDiameter => (1, diameter_m.right, 1.0),
+            Parameter::WheelSeparation => (2, self.geometry.wheel_separation_m(), 1.0),
+            Parameter::LeftPerTick => (0, diameter_m.left, per_tick()?),
+            Parameter::RightPerTick => (1, diameter_m.right, per_tick()?),
+            Parameter::CommonScale => return None,
+        };
+        let sigma = self.covariance.as_ref().map(|covariance| covariance[(row, row)].sqrt() * factor);
+        Some(Estimate { parameter, value: value * factor, sigma })
+    }
+
+    /// Every value that the method has.
+    pub fn estimates(&self) -> impl Iterator<Item = Estimate> + '_ {
+        Parameter::ESTIMATED.into_iter().filter_map(|parameter| self.estimate(parameter))
+    }
+}
+
+/// Why a method gives no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibError {
+    /// The sessions do not hold what the method needs.
+    #[error("{method} cannot be applied: {why}")]
+    NotApplicable {
+        /// The method.
+        method: &'static str,
+        /// What is missing and how to get it.
+        why: String,
+    },
+    /// A parameter that the method must have is not determined by the runs.
+    #[error("{method}: {} cannot be told from these runs: {why}", parameter.key())]
+    Unobservable {
+        /// The method.
+        method: &'static str,
+        /// Which parameter.
+        parameter: Parameter,
+        /// What would show it.
+        why: String,
+    },
+    /// The counters wrap and nobody said at how many bits.
+    #[error(
+        "run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml"
+    )]
+    CounterWraps {
+        /// The run.
+        run: String,
+        /// `left` or `right`.
+        side: &'static str,
+        /// The width that the jumps show.
+        bits: u8,
+    },
+    /// The estimate is no drive.
+    #[error("{method}: the estimate is not a drive: {source}")]
+    NotADrive {
+        /// The method.
+        method: &'static str,
+        /// Which value.
+        source: GeometryError,
+    },
+}
+
+/// A calibration method.
+pub trait Method: Sync + Send {
+    /// The name that commands and files use.
+    fn name(&self) -> &'static str;
+
+    /// One line for `--help` and tables: what it needs and what it gives.
+    fn about(&self) -> &'static str;
+
+    /// Calibrates one robot from its sessions. Where sessions disagree about nominal values, the first one's are used.
+    ///
+    /// # Errors
+    /// [`CalibError`] when the method does not apply to these sessions, with the reason.
+    fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError>;
+}
+
+/// Refuses sessions whose counters wrap unannounced: a calibration would swallow a jump of 2ⁿ counts as a parameter.
+///
+/// # Errors
+/// [`CalibError::CounterWraps`] for the first run that shows it.
+pub fn refuse_wrapped_counters(sessions: &[Session<'_>]) -> Result<(), CalibError> {
+    for view in sessions.iter().flat_map(|session| &session.runs) {
+        if let dataset::WheelLog::Ticks(ticks) = &view.odometry().wheels {
+            for side in kinematics::Side::BOTH {
+                if let Some(bits) = dataset::suspected_wrap(&ticks[side]) {
+                    let run = view.info().id.clone();
+                    return Err(CalibError::CounterWraps { run, side: side.name(), bits });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The nominal drive of the first session.
+pub(crate) fn nominal(
+    method: &'static str,
+    sessions: &[Session<'_>],
+) -> Result<(NominalRobot, DriveGeometry), CalibError> {
+    let Some(first) = sessions.first() else {
+        return Err(CalibError::NotApplicable { method, why: "there is no session".to_owned() });
+    };
+    let geometry = first.robot.geometry().map_err(|source| CalibError::NotADrive { method, source })?;
+    Ok((*first.robot, geometry))
+}
+
+/// A drive from its estimated lengths.
+pub(crate) fn drive(
+    method: &'static str,
+    diameter_m: Wheels<f64>,
+    separation_m: f64,
+) -> Result<DriveGeometry, CalibError> {
+    DriveGeometry::new(diameter_m, separation_m).map_err(|source| CalibError::NotADrive { method, source })
+}

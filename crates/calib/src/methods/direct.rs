@@ -1,0 +1,311 @@
+//! `direct`: the paper's method, straight runs for the sensitivities and spins for the wheelbase.
+//!
+//! Model: each wheel rolls C metres a count; the contacts are B apart. A straight run of small turn Δθ moves the mark beside a wheel along a chord, from
+//! which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
+//! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses instead of marks, the wheel contacts serve as marks.
+//! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that the outlier rule leaves, wheel by wheel.
+//! Two departures from the print, both in the digest: chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed
+//! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
+//! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
+
+use dataset::{Protocol, RunView, Session};
+use kinematics::{DriveGeometry, Point, Side, Wheels, sinc, unwrap_near};
+
+use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
+use crate::robust::{MedianMad, Summary};
+
+/// The method with its outlier rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Direct {
+    /// Which values are atypical.
+    pub outliers: MedianMad,
+}
+
+/// Marks farther from the axle's line than this break (6): at 5 mm a 2° turn shifts the chord by 0.003 mm.
+const MARK_OFF_AXLE_M: f64 = 5e-3;
+
+/// A spin of less than this says little of the wheelbase and its sign is not sure.
+const SMALLEST_SPIN_RAD: f64 = 0.5;
+
+/// What one run says, with its id.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunValue<'a> {
+    /// The run.
+    pub run: &'a str,
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation by the instrument's stated precision alone; 0 when none is stated.
+    pub stated_sigma: f64,
+}
+
+/// Standard deviation of one coordinate of a mark, by the instrument's statement, metres; 0 when it states none.
+fn mark_sigma_m(session: &Session<'_>) -> f64 {
+    session.truth_noise.sigma_xy_m.unwrap_or(0.0)
+}
+
+/// The two marks of a run at its start and its end, in the room.
+struct Marks {
+    start: Wheels<Point>,
+    end: Wheels<Point>,
+    /// Distance of each mark outside its wheel's contact, metres (m2 left, m1 right).
+    outside_m: Wheels<f64>,
+}
+
+impl Marks {
+    /// Turn between start and end, the multiple of whole turns nearest to `about_rad` (paper, eq. 8 and 14).
+    fn turn_rad(&self, about_rad: f64) -> f64 {
+        let axle = |marks: &Wheels<Point>| (marks.left.x_m - marks.right.x_m, marks.left.y_m - marks.right.y_m);
+        let ((x0, y0), (x1, y1)) = (axle(&self.start), axle(&self.end));
+        unwrap_near((x0 * y1 - y0 * x1).atan2(x0 * x1 + y0 * y1), about_rad)
+    }
+}
+
+impl Direct {
+    /// The method as the table of contents offers it.
+    pub const DEFAULT: Self = Self { outliers: MedianMad { cut: 3.5 } };
+
+    const NAME: &'static str = "direct";
+
+    fn not_applicable(why: String) -> CalibError {
+        CalibError::NotApplicable { method: Self::NAME, why }
+    }
+
+    fn marks(session: &Session<'_>, run: &RunView<'_>, geometry: &DriveGeometry) -> Result<Option<Marks>, CalibError> {
+        let half_m = 0.5 * geometry.wheel_separation_m();
+        let readings = &run.run().point_readings;
+        if readings.is_empty() {
+            // Poses: the contacts themselves are the marks.
+            return Ok(run.observed_ends().map(|(start, end)| {
+                let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
+                Marks { start: contacts.map(|p| start * p), end: contacts.map(|p| end * p), outside_m: Wheels::both(0.0) }
+            }));
+        }
+        let by_y = |a: &usize, b: &usize| session.points[*a].body.y_m.total_cmp(&session.points[*b].body.y_m);
+        let (Some(left), Some(right)) = ((0..session.points.len()).max_by(by_y), (0..session.points.len()).min_by(by_y))
+        else {
+            return Ok(None);
+        };
+        let body = Wheels { left: session.points[left].body, right: session.points[right].body };
+        if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
+            return Err(Self::not_applicable("it needs one marked point on each side of the robot".to_owned()));
+        }
+        if body.left.x_m.abs().max(body.right.x_m.abs()) > MARK_OFF_AXLE_M {
+            return Err(Self::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
+        }
+        let reading = |point: usize, last: bool| {
+            let mut of_point = readings.iter().filter(|reading| reading.point == point);
+            if last { of_point.next_back() } else { of_point.next() }.map(|reading| reading.room)
+        };
+        let both = |last| Some(Wheels { left: reading(left, last)?, right: reading(right, last)? });
+        let (Some(start), Some(end)) = (both(false), both(true)) else { return Ok(None) };
+        Ok(Some(Marks { start, end, outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m } }))
+    }
+
+    /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of its pulses.
+    ///
+    /// # Errors
+    /// [`CalibError::NotApplicable`] when marks are where (6) does not hold.
+    pub fn straight_values<'a>(sessions: &[Session<'a>]) -> Result<Wheels<Vec<RunValue<'a>>>, CalibError> {
+        let mut values = Wheels { left: Vec::new(), right: Vec::new() };
+        for session in sessions {
+            let geometry = session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Self::NAME, source })?;
+            for run in session.runs.iter().filter(|run| run.info().protocol == Some(Protocol::Straight)) {
+                let Some(wheel_rad) = run.wheel_turn_rad(session.robot) else { continue };
+                let Some(marks) = Self::marks(session, run, &geometry)? else { continue };
+                let turn_rad = marks.turn_rad(0.0);
+                for side in Side::BOTH {
+                    // Signed with the direction of travel: backward runs have negative chords and negative counts.
+                    let chord_m = marks.start[side].distance_m(marks.end[side]) * wheel_rad[side].signum();
+                    let outward = if side == Side::Left { 1.0 } else { -1.0 };
+                    let arc_m = chord_m / sinc(0.5 * turn_rad) + outward * marks.outside_m[side] * turn_rad;
+                    if wheel_rad[side] != 0.0 {
+                        // Both ends of the chord are read.
+                        let stated_sigma = 2_f64.sqrt() * mark_sigma_m(session) / wheel_rad[side].abs();
+                        values[side].push(RunValue { run: &run.run().info.id, value: arc_m / wheel_rad[side], stated_sigma });
+                    }
+                }
+            }
+        }
+        Ok(values)
+    }
+
+    /// The wheelbase from every spin, metres, given metres per radian of each wheel; with it the two wheels' turns over the robot's (∂B/∂C).
+    ///
+    /// # Errors
+    /// [`CalibError::NotApplicable`] when marks are where (14) does not hold.
+    pub fn spin_values<'a>(
+        sessions: &[Session<'a>],
+        m_per_rad: Wheels<f64>,
+    ) -> Result<Vec<(RunValue<'a>, Wheels<f64>)>, CalibError> {
+        let mut values = Vec::new();
+        for session in sessions {
+            let geometry = session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Self::NAME, source })?;
+            for run in session.runs.iter().filter(|run| run.info().protocol == Some(Protocol::Spin)) {
+                let Some(wheel_rad) = run.wheel_turn_rad(session.robot) else { continue };
+                let Some(marks) = Self::marks(session, run, &geometry)? else { continue };
+                // Whole turns come from the counts and the sensitivities already found.
+                let travel_m = wheel_rad.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad);
+                let turn_rad = marks.turn_rad(geometry.increment(travel_m).turn_rad);
+                if turn_rad.abs() > SMALLEST_SPIN_RAD {
+                    let value = (travel_m.right - travel_m.left) / turn_rad;
+                    let slope = Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad };
+                    // Two marks across the axle, read at both ends, give the turn to 2σ/w.
+                    let across_m = marks.start.left.distance_m(marks.start.right);
+                    let stated_sigma = (value / turn_rad).abs() * 2.0 * mark_sigma_m(session) / across_m;
+                    values.push((RunValue { run: &run.run().info.id, value, stated_sigma }, slope));
+                }
+            }
+        }
+        Ok(values)
+    }
+
+    /// Keeps the typical values and notes the others.
+    fn filter(&self, values: &[RunValue<'_>], of: &str, rejected: &mut Vec<Rejected>) -> Vec<bool> {
+        let numbers: Vec<f64> = values.iter().map(|value| value.value).collect();
+        let stated_sigma = values.iter().map(|value| value.stated_sigma).fold(0.0, f64::max);
+        let keep = self.outliers.keep(&numbers, stated_sigma);
+        for (value, _) in values.iter().zip(&keep).filter(|(_, keep)| !**keep) {
+            let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
+            rejected.push(Rejected { run: value.run.to_owned(), why });
+        }
+        keep
+    }
+}
+
+fn kept<'v>(values: &'v [f64], keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
+    values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value)
+}
+
+impl Method for Direct {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn about(&self) -> &'static str {
+        "the paper's: straight runs give both sensitivities, spins the wheelbase (points or poses at both ends)"
+    }
+
+    fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
+        let (robot, _) = nominal(Self::NAME, sessions)?;
+        let straights = Self::straight_values(sessions)?;
+        if straights.left.is_empty() || straights.right.is_empty() {
+            return Err(Self::not_applicable(
+                "no run with protocol = \"straight\" has its ends measured: drive straight runs and read two marks or the pose at both ends".to_owned(),
+            ));
+        }
+        let mut runs_rejected = Vec::new();
+        let mut radius = Wheels::both(None);
+        for side in Side::BOTH {
+            let keep = self.filter(&straights[side], side.name(), &mut runs_rejected);
+            let numbers: Vec<f64> = straights[side].iter().map(|value| value.value).collect();
+            radius[side] = Summary::of(kept(&numbers, &keep));
+        }
+        let (Some(left), Some(right)) = (radius.left, radius.right) else {
+            return Err(Self::not_applicable("no straight run is left".to_owned()));
+        };
+        let m_per_rad = Wheels { left: left.mean, right: right.mean };
+
+        let spins = Self::spin_values(sessions, m_per_rad)?;
+        let values: Vec<_> = spins.iter().map(|(value, _)| *value).collect();
+        let keep = self.filter(&values, "wheelbase", &mut runs_rejected);
+        let numbers: Vec<f64> = values.iter().map(|value| value.value).collect();
+        let Some(base) = Summary::of(kept(&numbers, &keep)) else {
+            return Err(CalibError::Unobservable {
+                method: Self::NAME,
+                parameter: Parameter::WheelSeparation,
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way".to_owned(),
+            });
+        };
+
+        let slope = Wheels::from_sides(|side| {
+            let slopes: Vec<f64> = spins.iter().map(|(_, slope)| slope[side]).collect();
+            Summary::of(kept(&slopes, &keep)).map_or(0.0, |summary| summary.mean)
+        });
+        let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
+        Ok(Calibration {
+            method: Self::NAME,
+            geometry: drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?,
+            ticks_per_rev: robot.ticks_per_rev,
+            covariance,
+            not_observable: Vec::new(),
+            runs_used: straights.left.len().max(straights.right.len()) + spins.len(),
+            runs_rejected,
+            converged: true,
+        })
+    }
+}
+
+/// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has its own scatter.
+fn covariance(left: Option<f64>, right: Option<f64>, base: Option<f64>, slope: Wheels<f64>) -> Option<Covariance> {
+    let (left, right, base) = (left?, right?, base?);
+    let base_var = base + slope.left * slope.left * left + slope.right * slope.right * right;
+    Some(Covariance::from_row_slice(
+        3,
+        3,
+        &[
+            4.0 * left,
+            0.0,
+            2.0 * slope.left * left,
+            0.0,
+            4.0 * right,
+            2.0 * slope.right * right,
+            2.0 * slope.left * left,
+            2.0 * slope.right * right,
+            base_var,
+        ],
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinematics::{Increment, Pose};
+
+    fn marks_after(increment: Increment, outside_m: Wheels<f64>) -> Marks {
+        let half_m = 0.5 * 0.363;
+        let start_pose = Pose::new(0.3, -0.2, 0.8);
+        let body = Wheels { left: Point::new(0.0, half_m + outside_m.left), right: Point::new(0.0, -half_m - outside_m.right) };
+        let end_pose = start_pose * increment.arc();
+        Marks { start: body.map(|p| start_pose * p), end: body.map(|p| end_pose * p), outside_m }
+    }
+
+    #[test]
+    fn paper_eq_6_the_arc_of_a_wheel_follows_from_the_chord_of_its_mark_forward_and_backward() {
+        let outside_m = Wheels { left: 0.05, right: 0.07 };
+        for distance_m in [0.5, -0.5] {
+            for turn_rad in [0.0, 0.02, -0.02] {
+                let increment = Increment { distance_m, turn_rad };
+                let marks = marks_after(increment, outside_m);
+                let measured_rad = marks.turn_rad(0.0);
+                assert!((measured_rad - turn_rad).abs() < 1e-14);
+                let arc_m = Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
+                for side in Side::BOTH {
+                    let chord_m = marks.start[side].distance_m(marks.end[side]) * distance_m.signum();
+                    let outward = if side == Side::Left { 1.0 } else { -1.0 };
+                    let found_m = chord_m / sinc(0.5 * measured_rad) + outward * outside_m[side] * measured_rad;
+                    assert!((found_m - arc_m[side]).abs() < 1e-14, "{side:?} {distance_m} {turn_rad}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn paper_eq_6_unsigned_is_off_backward_by_the_digests_amount() {
+        // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03 % at m = 50 mm means Δθ = 1.5 mrad,
+        // the turn that the paper's wheels (1.0334 and 1.0322) make over 500 pulses: 0.6/363 = 1.65 mrad.
+        let marks = marks_after(Increment { distance_m: -0.5, turn_rad: 1.65e-3 }, Wheels::both(0.05));
+        let arc_m = -0.5 - 0.5 * 0.363 * 1.65e-3;
+        let chord_m = marks.start.left.distance_m(marks.end.left);
+        let unsigned_m = chord_m / sinc(0.5 * 1.65e-3) + 0.05 * 1.65e-3;
+        let error = unsigned_m / arc_m.abs() - 1.0;
+        assert!((error.abs() - 3.3e-4).abs() < 1e-5, "{error}");
+    }
+
+    #[test]
+    fn paper_eq_8_and_14_do_not_fold_and_hold_both_ways_round() {
+        for turn_rad in [2.0, -2.0, 6.49, -6.49, 12.6] {
+            let marks = marks_after(Increment { distance_m: 0.001, turn_rad }, Wheels::both(0.05));
+            assert!((marks.turn_rad(turn_rad * 0.97) - turn_rad).abs() < 1e-13, "{turn_rad}");
+        }
+    }
+}

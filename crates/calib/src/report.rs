@@ -1,0 +1,360 @@
+//! Calibrations as documents: the JSON of `yair calibrate` and the TOML file that `yair evaluate --calibration` takes, which have the same names.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use dataset::NominalRobot;
+use kinematics::{DriveGeometry, Pose, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{CalibError, Calibration, Parameter};
+
+/// Why a calibration file is not one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The text is no calibration.
+    #[error("{place}: not a calibration: {message}")]
+    NotACalibration {
+        /// File, and line where it is known.
+        place: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+/// What `yair calibrate` found, for one robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationReport {
+    /// The dataset's name, or a list of them.
+    #[serde(default)]
+    pub dataset: Names,
+    /// What each method found.
+    pub methods: Vec<MethodReport>,
+}
+
+/// One name or several.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Names {
+    /// A single dataset.
+    One(String),
+    /// Sessions of one robot.
+    Several(Vec<String>),
+}
+
+impl Default for Names {
+    fn default() -> Self {
+        Self::Several(Vec::new())
+    }
+}
+
+impl Names {
+    /// A single name for one, a list for several.
+    #[must_use]
+    pub fn of(names: Vec<String>) -> Self {
+        match <[String; 1]>::try_from(names) {
+            Ok([name]) => Self::One(name),
+            Err(names) => Self::Several(names),
+        }
+    }
+}
+
+/// What one method found, or why it found nothing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MethodReport {
+    /// The method's name.
+    pub method: String,
+    /// Why the method cannot be applied; then there are no parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// The values by key.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, ReportedValue>,
+    /// What the data do not determine.
+    #[serde(default)]
+    pub not_observable: Vec<ReportedBlindness>,
+    /// How many runs the values rest on.
+    #[serde(default)]
+    pub runs_used: usize,
+    /// What was left out.
+    #[serde(default)]
+    pub runs_rejected: Vec<ReportedRejection>,
+    /// Whether the method came to an answer.
+    #[serde(default)]
+    pub converged: bool,
+}
+
+/// A value with its standard deviation. A bare number is read as a value without one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "ValueOrNumber")]
+pub struct ReportedValue {
+    /// In SI units.
+    pub value: f64,
+    /// One standard deviation.
+    pub sigma: Option<f64>,
+    /// Why there is no sigma.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_why_null: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum ValueOrNumber {
+    Number(f64),
+    Value { value: f64, sigma: Option<f64> },
+}
+
+impl From<ValueOrNumber> for ReportedValue {
+    fn from(from: ValueOrNumber) -> Self {
+        match from {
+            ValueOrNumber::Number(value) => Self { value, sigma: None, sigma_why_null: None },
+            ValueOrNumber::Value { value, sigma } => Self { value, sigma, sigma_why_null: None },
+        }
+    }
+}
+
+/// A parameter that the data do not determine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportedBlindness {
+    /// Its key.
+    pub parameter: String,
+    /// Why.
+    pub why: String,
+}
+
+/// A run that was left out.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportedRejection {
+    /// The run's id.
+    pub run: String,
+    /// Why.
+    pub why: String,
+}
+
+impl MethodReport {
+    /// The document's form of a method's outcome.
+    #[must_use]
+    pub fn new(method: &str, outcome: &Result<Calibration, CalibError>) -> Self {
+        let empty = Self {
+            method: method.to_owned(),
+            error: None,
+            parameters: BTreeMap::new(),
+            not_observable: Vec::new(),
+            runs_used: 0,
+            runs_rejected: Vec::new(),
+            converged: false,
+        };
+        let calibration = match outcome {
+            Ok(calibration) => calibration,
+            Err(error) => return Self { error: Some(error.to_string()), ..empty },
+        };
+        let value = |estimate: crate::Estimate| ReportedValue {
+            value: estimate.value,
+            sigma: estimate.sigma,
+            sigma_why_null: estimate.sigma.is_none().then(|| "too few runs to show a scatter".to_owned()),
+        };
+        Self {
+            parameters: calibration
+                .estimates()
+                .map(|estimate| (estimate.parameter.key().to_owned(), value(estimate)))
+                .collect(),
+            not_observable: calibration
+                .not_observable
+                .iter()
+                .map(|blind| ReportedBlindness {
+                    parameter: blind.parameter.key().to_owned(),
+                    why: blind.why.to_owned(),
+                })
+                .collect(),
+            runs_used: calibration.runs_used,
+            runs_rejected: calibration
+                .runs_rejected
+                .iter()
+                .map(|rejected| ReportedRejection { run: rejected.run.clone(), why: rejected.why.clone() })
+                .collect(),
+            converged: calibration.converged,
+            ..empty
+        }
+    }
+}
+
+/// Calibration files are small; anything larger is another file.
+const LARGEST_FILE_BYTES: u64 = 1 << 24;
+
+impl CalibrationReport {
+    /// The calibration file's text.
+    ///
+    /// # Errors
+    /// [`ReportError::NotACalibration`] when a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, ReportError> {
+        toml::to_string(self).map_err(|error| ReportError::NotACalibration {
+            place: "calibration".to_owned(),
+            message: error.to_string(),
+        })
+    }
+
+    /// Reads a calibration file.
+    ///
+    /// # Errors
+    /// [`ReportError`] with the file and, where it is known, the line.
+    pub fn read(path: &Path) -> Result<Self, ReportError> {
+        let io = |source| ReportError::Io { path: path.to_owned(), source };
+        let place = path.display().to_string();
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > LARGEST_FILE_BYTES {
+            return Err(ReportError::NotACalibration { place, message: format!("{size} bytes are too many") });
+        }
+        let text = std::fs::read_to_string(path).map_err(io)?;
+        let report: Self = toml::from_str(&text).map_err(|error| {
+            let line = error.span().map(|span| text[..span.start].matches('\n').count() + 1);
+            let place = line.map_or_else(|| place.clone(), |line| format!("{place}:{line}"));
+            ReportError::NotACalibration { place, message: error.message().trim().replace('\n', "; ") }
+        })?;
+        let known: Vec<&str> = KNOWN_KEYS.to_vec();
+        for method in &report.methods {
+            if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
+                let length = !key.starts_with("instrument_");
+                !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
+            }) {
+                let message = format!(
+                    "[methods.parameters] of {}: {key} = {} is no known length in metres; known: {}",
+                    method.method,
+                    value.value,
+                    known.join(", ")
+                );
+                return Err(ReportError::NotACalibration { place, message });
+            }
+        }
+        Ok(report)
+    }
+
+    /// The calibrations in the file that have values, each under the name of its method.
+    #[must_use]
+    pub fn calibrations(&self) -> Vec<NamedCalibration> {
+        self.methods
+            .iter()
+            .filter(|method| method.error.is_none())
+            .map(|method| NamedCalibration {
+                name: method.method.clone(),
+                values: method.parameters.iter().map(|(key, value)| (key.clone(), value.value)).collect(),
+            })
+            .collect()
+    }
+}
+
+/// Keys that a calibration file may have under `parameters`.
+const KNOWN_KEYS: &[&str] = &[
+    Parameter::LeftWheelDiameter.key(),
+    Parameter::RightWheelDiameter.key(),
+    Parameter::WheelSeparation.key(),
+    Parameter::LeftPerTick.key(),
+    Parameter::RightPerTick.key(),
+    INSTRUMENT_X,
+    INSTRUMENT_Y,
+    INSTRUMENT_THETA,
+];
+
+const INSTRUMENT_X: &str = "instrument_x_m";
+const INSTRUMENT_Y: &str = "instrument_y_m";
+const INSTRUMENT_THETA: &str = "instrument_theta_rad";
+
+/// Values to dead reckon with, under a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedCalibration {
+    /// The name that tables show.
+    pub name: String,
+    /// Values by key.
+    pub values: BTreeMap<String, f64>,
+}
+
+impl NamedCalibration {
+    /// The drive for a robot: what the calibration does not say stays nominal; a diameter missing beside a travel per tick follows from it.
+    #[must_use]
+    pub fn geometry(&self, robot: &NominalRobot, nominal: DriveGeometry) -> Option<DriveGeometry> {
+        let value = |parameter: Parameter| self.values.get(parameter.key()).copied();
+        let diameter_m = |diameter: Parameter, per_tick: Parameter, nominal_m: f64| {
+            let from_ticks = || Some(value(per_tick)? * robot.ticks_per_rev? / std::f64::consts::PI);
+            value(diameter).or_else(from_ticks).unwrap_or(nominal_m)
+        };
+        let nominal_m = nominal.wheel_diameter_m();
+        let diameter_m = Wheels {
+            left: diameter_m(Parameter::LeftWheelDiameter, Parameter::LeftPerTick, nominal_m.left),
+            right: diameter_m(Parameter::RightWheelDiameter, Parameter::RightPerTick, nominal_m.right),
+        };
+        DriveGeometry::new(diameter_m, value(Parameter::WheelSeparation).unwrap_or(nominal.wheel_separation_m())).ok()
+    }
+
+    /// Where the outside instrument's frame is on the robot; at its centre unless the calibration says otherwise.
+    #[must_use]
+    pub fn body_from_instrument(&self) -> Pose {
+        let value = |key| self.values.get(key).copied().unwrap_or(0.0);
+        Pose::new(value(INSTRUMENT_X), value(INSTRUMENT_Y), value(INSTRUMENT_THETA))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report() -> CalibrationReport {
+        let value = |value, sigma| ReportedValue { value, sigma, sigma_why_null: None };
+        CalibrationReport {
+            dataset: Names::of(vec!["a".to_owned()]),
+            methods: vec![MethodReport {
+                method: "umbmark".to_owned(),
+                error: None,
+                parameters: [
+                    ("left_wheel_diameter_m".to_owned(), value(0.084, Some(1e-5))),
+                    ("wheel_separation_m".to_owned(), value(0.2, None)),
+                ]
+                .into(),
+                not_observable: vec![ReportedBlindness {
+                    parameter: "common_scale".to_owned(),
+                    why: "closed".to_owned(),
+                }],
+                runs_used: 6,
+                runs_rejected: vec![ReportedRejection { run: "run-01".to_owned(), why: "far".to_owned() }],
+                converged: true,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_calibration_file_reads_back_as_it_was_written() {
+        let text = report().to_toml().expect("serialises");
+        assert_eq!(toml::from_str::<CalibrationReport>(&text).expect("parses"), report());
+    }
+
+    #[test]
+    fn bare_numbers_are_values() {
+        let text = "[[methods]]\nmethod = \"published\"\n[methods.parameters]\nwheel_separation_m = 0.2\n";
+        let report: CalibrationReport = toml::from_str(text).expect("parses");
+        assert_eq!(report.calibrations()[0].values["wheel_separation_m"], 0.2);
+    }
+
+    #[test]
+    fn what_a_calibration_does_not_say_stays_nominal() {
+        let robot = NominalRobot {
+            left_wheel_diameter_m: 0.08,
+            right_wheel_diameter_m: 0.09,
+            wheel_separation_m: 0.2,
+            ticks_per_rev: Some(1000.0),
+            counter_bits: None,
+        };
+        let calibration =
+            NamedCalibration { name: "x".to_owned(), values: [("left_m_per_tick".to_owned(), 3e-4)].into() };
+        let geometry = calibration.geometry(&robot, robot.geometry().expect("valid")).expect("valid");
+        assert_eq!(geometry.wheel_diameter_m().left, 0.3 / std::f64::consts::PI);
+        assert_eq!(geometry.wheel_diameter_m().right, 0.09);
+        assert_eq!(geometry.wheel_separation_m(), 0.2);
+    }
+}

@@ -1,0 +1,186 @@
+//! `odometry.csv`: what the robot counted, in one of three forms.
+
+use std::path::Path;
+
+use kinematics::{Side, Wheels};
+
+use super::warn_of_unknown;
+use crate::counter;
+use crate::error::{DatasetError, shown};
+use crate::record::{ExtraChannel, Odometry, Run, WheelLog};
+use crate::table::{Row, RunIndex, Table};
+use crate::warning::Warning;
+
+const HEADER: &str = "a header like run,t_s,left_ticks,right_ticks";
+
+/// The forms in which wheels are reported, the most telling first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Ticks,
+    Angles,
+    Twist,
+}
+
+impl Form {
+    const ALL: [Self; 3] = [Self::Ticks, Self::Angles, Self::Twist];
+
+    const fn columns(self) -> [&'static str; 2] {
+        match self {
+            Self::Ticks => ["left_ticks", "right_ticks"],
+            Self::Angles => ["left_rad", "right_rad"],
+            Self::Twist => ["v_mps", "omega_radps"],
+        }
+    }
+
+    const fn names(self) -> &'static str {
+        match self {
+            Self::Ticks => "left_ticks,right_ticks",
+            Self::Angles => "left_rad,right_rad",
+            Self::Twist => "v_mps,omega_radps",
+        }
+    }
+
+    fn empty_log(self, rows: usize) -> WheelLog {
+        match self {
+            Self::Ticks => WheelLog::Ticks(Wheels::from_sides(|_| exactly(rows))),
+            Self::Angles => WheelLog::Angles(Wheels::from_sides(|_| exactly(rows))),
+            Self::Twist => WheelLog::Twist { v_mps: exactly(rows), omega_radps: exactly(rows) },
+        }
+    }
+}
+
+/// A vector that will hold so many items and has room for no more.
+fn exactly<T>(rows: usize) -> Vec<T> {
+    let mut column = Vec::new();
+    column.reserve_exact(rows);
+    column
+}
+
+/// The open table and where its columns stand.
+#[derive(Debug)]
+pub(super) struct OdometryTable {
+    table: Table,
+    t_s: usize,
+    form: Form,
+    wheels: [usize; 2],
+    extra: Vec<(ExtraChannel, usize)>,
+}
+
+impl OdometryTable {
+    pub(super) fn open(file: &Path, warnings: &mut Vec<Warning>) -> Result<Self, DatasetError> {
+        let table = Table::open(file, HEADER)?;
+        table.require(crate::table::RUN_COLUMN)?;
+        let t_s = table.require("t_s")?;
+        let has_any = |form: &Form| form.columns().iter().any(|column| table.column(column).is_some());
+        let has_both = |form: &Form| form.columns().iter().all(|column| table.column(column).is_some());
+        // A whole pair before half a pair: that one then names what it lacks.
+        let form = Form::ALL.into_iter().find(has_both).or_else(|| Form::ALL.into_iter().find(has_any));
+        let Some(form) = form else {
+            let alternatives: Vec<_> = Form::ALL.into_iter().map(Form::names).collect();
+            return Err(table.missing(&alternatives.join(" or ")));
+        };
+        let [first, second] = form.columns();
+        let wheels = [table.require(first)?, table.require(second)?];
+        let mut known = vec!["t_s"];
+        known.extend(Form::ALL.iter().flat_map(|form| form.columns()));
+        known.extend(ExtraChannel::ALL.map(ExtraChannel::column));
+        warn_of_unknown(&table, &known, warnings);
+        for column in Form::ALL.into_iter().filter(|other| *other != form).flat_map(Form::columns) {
+            if table.column(column).is_some() {
+                warnings.push(Warning::RedundantColumn { file: file.to_owned(), column, used: form.names() });
+            }
+        }
+        let extra = ExtraChannel::ALL
+            .into_iter()
+            .filter_map(|channel| Some((channel, table.column(channel.column())?)))
+            .collect();
+        Ok(Self { table, t_s, form, wheels, extra })
+    }
+
+    pub(super) fn has_ticks(&self) -> bool {
+        self.form == Form::Ticks
+    }
+
+    /// Fills every run's odometry.
+    pub(super) fn read(mut self, index: &RunIndex, runs: &mut [Run]) -> Result<(), DatasetError> {
+        let rows = self.table.count_rows(index)?;
+        for (run, &rows) in runs.iter_mut().zip(&rows) {
+            run.odometry =
+                Odometry { t_s: exactly(rows), wheels: self.form.empty_log(rows), extra: Default::default() };
+        }
+        let Self { table, t_s, wheels, extra, .. } = &mut self;
+        table.for_each_row(index, |run, row| {
+            let odometry = &mut runs[run].odometry;
+            let first = odometry.t_s.is_empty();
+            odometry.t_s.push(row.time_after(*t_s, odometry.t_s.last().copied())?);
+            match &mut odometry.wheels {
+                WheelLog::Ticks(ticks) => {
+                    ticks.left.push(row.count(wheels[0])?);
+                    ticks.right.push(row.count(wheels[1])?);
+                }
+                WheelLog::Angles(angles) => {
+                    angles.left.push(row.number(wheels[0])?);
+                    angles.right.push(row.number(wheels[1])?);
+                }
+                WheelLog::Twist { v_mps, omega_radps } => {
+                    v_mps.push(row.number(wheels[0])?);
+                    omega_radps.push(row.number(wheels[1])?);
+                }
+            }
+            for &(channel, column) in extra.iter() {
+                push_extra(odometry, channel, row, column, first.then_some(rows[run]))?;
+            }
+            Ok(())
+        })?;
+        // Only now: a fault in a row is the better reason, as it may be what cut the file short.
+        match runs.iter().zip(rows).find(|(_, rows)| *rows == 0) {
+            None => Ok(()),
+            Some((run, _)) => {
+                let (file, run) = (self.table.file().to_owned(), shown(run.info.id.as_bytes()));
+                Err(DatasetError::RunWithoutRows { file, run })
+            }
+        }
+    }
+}
+
+/// A run whose first row leaves a channel empty does not have it; else every row must.
+fn push_extra(
+    odometry: &mut Odometry,
+    channel: ExtraChannel,
+    row: &Row<'_>,
+    column: usize,
+    rows_if_first: Option<usize>,
+) -> Result<(), DatasetError> {
+    if let Some(rows) = rows_if_first
+        && !row.bytes(column).is_empty()
+    {
+        odometry.extra.insert(channel, exactly(rows));
+    }
+    match odometry.extra.get_mut(&channel) {
+        Some(values) => values.push(row.number(column)?),
+        None if row.bytes(column).is_empty() => {}
+        None => {
+            let (file, line, column) = (row.file(), row.line(), channel.column());
+            return Err(DatasetError::SparseColumn { file, line, column });
+        }
+    }
+    Ok(())
+}
+
+/// Unwraps both counters of a run.
+pub(super) fn unwrap_counters(run: &mut Run, bits: u8) {
+    if let WheelLog::Ticks(ticks) = &mut run.odometry.wheels {
+        for side in Side::BOTH {
+            counter::unwrap(&mut ticks[side], bits);
+        }
+    }
+}
+
+/// The columns of the wheels, for the writer.
+pub(crate) fn wheel_columns(wheels: &WheelLog) -> [&'static str; 2] {
+    match wheels {
+        WheelLog::Ticks(_) => Form::Ticks.columns(),
+        WheelLog::Angles(_) => Form::Angles.columns(),
+        WheelLog::Twist { .. } => Form::Twist.columns(),
+    }
+}

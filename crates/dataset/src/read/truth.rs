@@ -1,0 +1,297 @@
+//! The four tables of an outside instrument: poses, displacements, marked points and wheel speeds.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use kinematics::{Point, Wheels};
+
+use super::warn_of_unknown;
+use crate::error::{DatasetError, shown};
+use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
+use crate::table::{RUN_COLUMN, Row, RunIndex, Table};
+use crate::warning::Warning;
+
+pub(crate) const TRUTH: &str = "truth.csv";
+pub(crate) const DISPLACEMENT: &str = "displacement.csv";
+pub(crate) const POINTS: &str = "points.csv";
+pub(crate) const WHEEL_REFERENCE: &str = "wheel_reference.csv";
+
+/// Marked points that an error lists.
+const LISTED_POINTS: usize = 20;
+
+/// One kind of table: adding one is one line in [`KINDS`] and its columns.
+#[derive(Debug)]
+struct Kind {
+    file: &'static str,
+    header: &'static str,
+    known: &'static [&'static str],
+    find: fn(&Table) -> Result<Box<dyn TruthColumns>, DatasetError>,
+}
+
+const KINDS: [Kind; 4] = [
+    Kind {
+        file: TRUTH,
+        header: "a header like run,t_s,x_m,y_m,theta_rad",
+        known: &["t_s", "x_m", "y_m", "theta_rad", "sigma_xy_m", "sigma_theta_rad"],
+        find: |table| Ok(Box::new(PoseColumns::find(table)?)),
+    },
+    Kind {
+        file: DISPLACEMENT,
+        header: "a header like run,t0_s,t1_s,dx_m,dy_m,dtheta_rad",
+        known: &["t0_s", "t1_s", "dx_m", "dy_m", "dtheta_rad"],
+        find: |table| Ok(Box::new(DisplacementColumns::find(table)?)),
+    },
+    Kind {
+        file: POINTS,
+        header: "a header like run,t_s,point,x_m,y_m",
+        known: &["t_s", "point", "x_m", "y_m"],
+        find: |table| Ok(Box::new(PointColumns::find(table)?)),
+    },
+    Kind {
+        file: WHEEL_REFERENCE,
+        header: "a header like run,t_s,left_mps,right_mps",
+        known: &["t_s", "left_mps", "right_mps"],
+        find: |table| Ok(Box::new(WheelReferenceColumns::find(table)?)),
+    },
+];
+
+/// Where the columns of one kind of table stand, and what a row becomes.
+trait TruthColumns: std::fmt::Debug {
+    fn reserve(&self, run: &mut Run, rows: usize);
+    fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
+}
+
+/// An open truth table.
+#[derive(Debug)]
+pub(super) struct TruthTable {
+    name: &'static str,
+    table: Table,
+    columns: Box<dyn TruthColumns>,
+}
+
+/// Opens the truth tables that are there; one at least must be.
+pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<TruthTable>, DatasetError> {
+    let mut tables = Vec::new();
+    for kind in &KINDS {
+        let file = dir.join(kind.file);
+        if file.exists() {
+            let table = Table::open(&file, kind.header)?;
+            table.require(RUN_COLUMN)?;
+            let columns = (kind.find)(&table)?;
+            warn_of_unknown(&table, kind.known, warnings);
+            tables.push(TruthTable { name: kind.file, table, columns });
+        }
+    }
+    if tables.is_empty() { Err(DatasetError::NoTruth { dir: dir.to_owned() }) } else { Ok(tables) }
+}
+
+impl TruthTable {
+    pub(super) const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Fills every run's records of this kind.
+    pub(super) fn read(
+        mut self,
+        index: &RunIndex,
+        points: &[MarkedPoint],
+        runs: &mut [Run],
+    ) -> Result<(), DatasetError> {
+        let rows = self.table.count_rows(index)?;
+        for (run, &rows) in runs.iter_mut().zip(&rows) {
+            self.columns.reserve(run, rows);
+        }
+        let points = PointIndex::new(points);
+        let columns = &self.columns;
+        self.table.for_each_row(index, |run, row| columns.push(row, &mut runs[run], &points))
+    }
+}
+
+/// Which marked point an id speaks of.
+#[derive(Debug)]
+struct PointIndex {
+    by_id: HashMap<Box<[u8]>, usize>,
+    known: String,
+}
+
+impl PointIndex {
+    fn new(points: &[MarkedPoint]) -> Self {
+        let by_id = points.iter().map(|point| point.id.as_bytes().into()).zip(0..).collect();
+        let mut known: Vec<_> = points.iter().take(LISTED_POINTS).map(|point| shown(point.id.as_bytes())).collect();
+        if points.len() > LISTED_POINTS {
+            known.push("…".to_owned());
+        } else if points.is_empty() {
+            known.push("none".to_owned());
+        }
+        Self { by_id, known: known.join(", ") }
+    }
+}
+
+#[derive(Debug)]
+struct PoseColumns {
+    t_s: usize,
+    x_m: usize,
+    y_m: usize,
+    theta_rad: usize,
+    sigma_xy_m: Option<usize>,
+    sigma_theta_rad: Option<usize>,
+}
+
+impl PoseColumns {
+    fn find(table: &Table) -> Result<Self, DatasetError> {
+        Ok(Self {
+            t_s: table.require("t_s")?,
+            x_m: table.require("x_m")?,
+            y_m: table.require("y_m")?,
+            theta_rad: table.require("theta_rad")?,
+            sigma_xy_m: table.column("sigma_xy_m"),
+            sigma_theta_rad: table.column("sigma_theta_rad"),
+        })
+    }
+
+    fn sigma(&self, row: &Row<'_>) -> Result<TruthSigma, DatasetError> {
+        let of = |column: Option<usize>| column.map_or(Ok(None), |column| row.sigma(column));
+        Ok(TruthSigma { sigma_xy_m: of(self.sigma_xy_m)?, sigma_theta_rad: of(self.sigma_theta_rad)? })
+    }
+}
+
+/// Nothing is known of a sample's precision.
+pub(crate) const UNKNOWN_SIGMA: TruthSigma = TruthSigma { sigma_xy_m: None, sigma_theta_rad: None };
+
+impl TruthColumns for PoseColumns {
+    fn reserve(&self, run: &mut Run, rows: usize) {
+        run.truth.reserve_exact(rows);
+    }
+
+    fn push(&self, row: &Row<'_>, run: &mut Run, _: &PointIndex) -> Result<(), DatasetError> {
+        let t_s = row.time_after(self.t_s, run.truth.last().map(|sample| sample.t_s))?;
+        let theta_rad = row.optional_number(self.theta_rad)?;
+        // A run gets the column once it has something to say: most tables never do.
+        let sigma = self.sigma(row)?;
+        if run.truth_sigma.is_none() && sigma != UNKNOWN_SIGMA {
+            let mut sigmas = Vec::new();
+            sigmas.reserve_exact(run.truth.capacity());
+            sigmas.resize(run.truth.len(), UNKNOWN_SIGMA);
+            run.truth_sigma = Some(sigmas);
+        }
+        if let Some(sigmas) = &mut run.truth_sigma {
+            sigmas.push(sigma);
+        }
+        run.truth.push(TruthSample::new(t_s, row.number(self.x_m)?, row.number(self.y_m)?, theta_rad));
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct DisplacementColumns {
+    t0_s: usize,
+    t1_s: usize,
+    dx_m: usize,
+    dy_m: usize,
+    dtheta_rad: usize,
+}
+
+impl DisplacementColumns {
+    fn find(table: &Table) -> Result<Self, DatasetError> {
+        Ok(Self {
+            t0_s: table.require("t0_s")?,
+            t1_s: table.require("t1_s")?,
+            dx_m: table.require("dx_m")?,
+            dy_m: table.require("dy_m")?,
+            dtheta_rad: table.require("dtheta_rad")?,
+        })
+    }
+}
+
+impl TruthColumns for DisplacementColumns {
+    fn reserve(&self, run: &mut Run, rows: usize) {
+        run.displacements.reserve_exact(rows);
+    }
+
+    fn push(&self, row: &Row<'_>, run: &mut Run, _: &PointIndex) -> Result<(), DatasetError> {
+        let t0_s = row.time_after(self.t0_s, run.displacements.last().map(|before| before.t0_s))?;
+        let t1_s = row.number(self.t1_s)?;
+        if t1_s <= t0_s {
+            return Err(DatasetError::EmptyInterval { file: row.file(), line: row.line(), t0_s, t1_s });
+        }
+        run.displacements.push(Displacement {
+            t0_s,
+            t1_s,
+            dx_m: row.number(self.dx_m)?,
+            dy_m: row.number(self.dy_m)?,
+            dtheta_rad: row.number(self.dtheta_rad)?,
+        });
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct PointColumns {
+    t_s: usize,
+    point: usize,
+    x_m: usize,
+    y_m: usize,
+}
+
+impl PointColumns {
+    fn find(table: &Table) -> Result<Self, DatasetError> {
+        Ok(Self {
+            t_s: table.require("t_s")?,
+            point: table.require("point")?,
+            x_m: table.require("x_m")?,
+            y_m: table.require("y_m")?,
+        })
+    }
+}
+
+impl TruthColumns for PointColumns {
+    fn reserve(&self, run: &mut Run, rows: usize) {
+        run.point_readings.reserve_exact(rows);
+    }
+
+    fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError> {
+        let t_s = row.time_from(self.t_s, run.point_readings.last().map(|before| before.t_s))?;
+        let id = row.bytes(self.point);
+        let Some(&point) = points.by_id.get(id) else {
+            let (point, known) = (shown(id), points.known.clone());
+            return Err(DatasetError::UnknownPoint { file: row.file(), line: row.line(), point, known });
+        };
+        let same_instant = run.point_readings.iter().rev().take_while(|before| before.t_s == t_s);
+        if same_instant.into_iter().any(|before| before.point == point) {
+            return Err(row.duplicate_instant(self.t_s, t_s));
+        }
+        let room = Point::new(row.number(self.x_m)?, row.number(self.y_m)?);
+        run.point_readings.push(PointReading { t_s, point, room });
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct WheelReferenceColumns {
+    t_s: usize,
+    left_mps: usize,
+    right_mps: usize,
+}
+
+impl WheelReferenceColumns {
+    fn find(table: &Table) -> Result<Self, DatasetError> {
+        Ok(Self {
+            t_s: table.require("t_s")?,
+            left_mps: table.require("left_mps")?,
+            right_mps: table.require("right_mps")?,
+        })
+    }
+}
+
+impl TruthColumns for WheelReferenceColumns {
+    fn reserve(&self, run: &mut Run, rows: usize) {
+        run.wheel_reference.reserve_exact(rows);
+    }
+
+    fn push(&self, row: &Row<'_>, run: &mut Run, _: &PointIndex) -> Result<(), DatasetError> {
+        let t_s = row.time_after(self.t_s, run.wheel_reference.last().map(|before| before.t_s))?;
+        let speed_m_s = Wheels { left: row.number(self.left_mps)?, right: row.number(self.right_mps)? };
+        run.wheel_reference.push(WheelSpeed { t_s, speed_m_s });
+        Ok(())
+    }
+}

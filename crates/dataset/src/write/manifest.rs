@@ -1,0 +1,107 @@
+//! `dataset.toml` as text: the mirror of the reader's manifest.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::read::FORMAT;
+use crate::record::{Dataset, NominalRobot, Protocol, ProtocolSettings, Provenance, RunInfo};
+
+#[derive(Serialize)]
+struct ManifestOut<'a> {
+    format: i64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    licence: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    notes: Option<&'a str>,
+    robot: &'a NominalRobot,
+    truth: TruthOut,
+    run: Vec<RunOut<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    point: Vec<PointOut<'a>>,
+}
+
+#[derive(Serialize)]
+struct TruthOut {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sigma_xy_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sigma_theta_rad: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct RunOut<'a> {
+    id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    protocol: Option<Protocol>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    start_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    side_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    length_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turn_rad: Option<f64>,
+    #[serde(skip_serializing_if = "is_true")]
+    continuous: bool,
+    #[serde(flatten)]
+    covariates: &'a BTreeMap<String, f64>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+const fn is_true(value: &bool) -> bool {
+    *value
+}
+
+#[derive(Serialize)]
+struct PointOut<'a> {
+    id: &'a str,
+    x_m: f64,
+    y_m: f64,
+}
+
+/// `dataset.toml` of a dataset that has been checked.
+pub(crate) fn to_toml(dataset: &Dataset) -> Result<String, toml::ser::Error> {
+    let Provenance { name, licence, source, notes } = &dataset.provenance;
+    toml::to_string(&ManifestOut {
+        format: FORMAT,
+        name: name.as_deref(),
+        licence: licence.as_deref(),
+        source: source.as_deref(),
+        notes: notes.as_deref(),
+        robot: &dataset.robot,
+        truth: TruthOut {
+            sigma_xy_m: dataset.truth_noise.sigma_xy_m,
+            sigma_theta_rad: dataset.truth_noise.sigma_theta_rad,
+        },
+        run: dataset.runs.iter().map(|run| RunOut::new(&run.info)).collect(),
+        point: dataset
+            .points
+            .iter()
+            .map(|point| PointOut { id: &point.id, x_m: point.body.x_m, y_m: point.body.y_m })
+            .collect(),
+    })
+}
+
+impl<'a> RunOut<'a> {
+    fn new(info: &'a RunInfo) -> Self {
+        let ProtocolSettings { side_m, radius_m, length_m, turn_rad } = info.settings;
+        Self {
+            id: &info.id,
+            protocol: info.protocol,
+            start_s: info.start_s,
+            side_m,
+            radius_m,
+            length_m,
+            turn_rad,
+            continuous: info.continuous,
+            covariates: &info.covariates,
+        }
+    }
+}

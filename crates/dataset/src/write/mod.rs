@@ -1,0 +1,255 @@
+//! Writing a dataset: all of it or nothing, in the shortest numbers that read back to the same bits.
+//!
+//! The files are made in a temporary sibling of the target, and that folder is renamed into place: whoever looks sees the old
+//! state or the new one.
+
+mod check;
+mod manifest;
+mod tables;
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{DatasetError, shown};
+use crate::read::{DISPLACEMENT, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, TRUTH, WHEEL_REFERENCE};
+use crate::record::{Dataset, Run};
+
+/// Every file that a dataset may have; what [`Existing::ReplaceDataset`] may delete.
+const FILES: [&str; 6] = [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE];
+
+/// What to do with something that stands where a dataset is to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Write only where nothing is, or an empty folder.
+    Refuse,
+    /// Replace a folder that holds a dataset and nothing else.
+    ReplaceDataset,
+}
+
+/// Writes a dataset into the folder `dir`, which is made together with its parents.
+///
+/// What was written reads back equal to the last bit. Two things have one form on disk and come back in it: a standard deviation of 0
+/// is unknown, and a run whose samples all have unknown sigmas has no [`Run::truth_sigma`].
+///
+/// # Errors
+/// [`DatasetError::AlreadyExists`] as `existing` says; [`DatasetError::RunNotWritable`] and [`DatasetError::NotWritable`] when the
+/// dataset could not be read back (a NaN, unequal columns, a run without truth …); [`DatasetError::Io`]. In each case `dir` is as
+/// it was.
+pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), DatasetError> {
+    check::check(dataset)?;
+    let target = resolved(dir)?;
+    let replaced = may_write(&target, existing)?;
+    let parent = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
+    // The folder that tempfile makes is private to the user; the dataset inside gets the usual permissions.
+    let workshop =
+        tempfile::Builder::new().prefix(".writing-").tempdir_in(parent).map_err(|source| io_error(parent, source))?;
+    let made = workshop.path().join("made");
+    write_files(dataset, &made)?;
+    if !replaced {
+        return fs::rename(&made, &target).map_err(|source| io_error(&target, source));
+    }
+    let old = workshop.path().join("replaced");
+    fs::rename(&target, &old).map_err(|source| io_error(&target, source))?;
+    fs::rename(&made, &target).map_err(|source| {
+        // Back as it was; when not even that works, the first reason is still the one to tell.
+        let _ = fs::rename(&old, &target);
+        io_error(&target, source)
+    })
+}
+
+fn io_error(path: &Path, source: io::Error) -> DatasetError {
+    DatasetError::Io { path: path.to_owned(), source }
+}
+
+/// The folder itself where `dir` is a link to it or ends in `..`, as only that can be renamed.
+fn resolved(dir: &Path) -> Result<PathBuf, DatasetError> {
+    match dir.canonicalize() {
+        Ok(target) => Ok(target),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && dir.file_name().is_some() => Ok(dir.to_owned()),
+        Err(source) => Err(io_error(dir, source)),
+    }
+}
+
+/// Whether something stands at `target` that must be moved away first; an error when it must stay.
+fn may_write(target: &Path, existing: Existing) -> Result<bool, DatasetError> {
+    let refuse = |why: String| Err(DatasetError::AlreadyExists { path: target.to_owned(), why });
+    match target.symlink_metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(source) => return Err(io_error(target, source)),
+        Ok(metadata) if !metadata.is_dir() => return refuse("is not a folder".to_owned()),
+        Ok(_) => {}
+    }
+    let (mut is_empty, mut foreign) = (true, None);
+    for entry in target.read_dir().map_err(|source| io_error(target, source))? {
+        let entry = entry.map_err(|source| io_error(target, source))?;
+        is_empty = false;
+        if !FILES.iter().any(|file| entry.file_name() == **file) {
+            foreign = Some(entry.file_name());
+        }
+    }
+    if is_empty {
+        return Ok(true);
+    }
+    match (existing, foreign) {
+        (Existing::Refuse, _) => refuse("is not empty".to_owned()),
+        (Existing::ReplaceDataset, _) if !target.join(MANIFEST).is_file() => {
+            refuse(format!("is not a dataset: there is no {MANIFEST} in it"))
+        }
+        (Existing::ReplaceDataset, Some(name)) => {
+            refuse(format!("holds more than a dataset: \"{}\"", shown(name.to_string_lossy().as_bytes())))
+        }
+        (Existing::ReplaceDataset, None) => Ok(true),
+    }
+}
+
+fn write_files(dataset: &Dataset, dir: &Path) -> Result<(), DatasetError> {
+    fs::create_dir(dir).map_err(|source| io_error(dir, source))?;
+    let toml = manifest::to_toml(dataset).map_err(|error| DatasetError::NotWritable { what: error.to_string() })?;
+    if toml.len() as u64 > MANIFEST_LIMIT_BYTES {
+        let what =
+            format!("{MANIFEST} would be longer than {MANIFEST_LIMIT_BYTES} bytes; write fewer runs in one dataset");
+        return Err(DatasetError::NotWritable { what });
+    }
+    let file = dir.join(MANIFEST);
+    fs::write(&file, toml).map_err(|source| io_error(&file, source))?;
+
+    let any = |has: fn(&Run) -> bool| dataset.runs.iter().any(has);
+    write_table(&dir.join(ODOMETRY), |out| tables::odometry(dataset, out))?;
+    if any(|run| !run.truth.is_empty()) {
+        write_table(&dir.join(TRUTH), |out| tables::truth(dataset, out))?;
+    }
+    if any(|run| !run.displacements.is_empty()) {
+        write_table(&dir.join(DISPLACEMENT), |out| tables::displacement(dataset, out))?;
+    }
+    if any(|run| !run.point_readings.is_empty()) {
+        write_table(&dir.join(POINTS), |out| tables::points(dataset, out))?;
+    }
+    if any(|run| !run.wheel_reference.is_empty()) {
+        write_table(&dir.join(WHEEL_REFERENCE), |out| tables::wheel_reference(dataset, out))?;
+    }
+    Ok(())
+}
+
+type Out = BufWriter<fs::File>;
+
+fn write_table(file: &Path, table: impl FnOnce(&mut Out) -> io::Result<()>) -> Result<(), DatasetError> {
+    let written = || {
+        let mut out = BufWriter::with_capacity(1 << 16, fs::File::create_new(file)?);
+        table(&mut out)?;
+        out.flush()
+    };
+    written().map_err(|source| io_error(file, source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{NominalRobot, Odometry, Provenance, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use kinematics::Wheels;
+
+    fn dataset(name: &str) -> Dataset {
+        let run = Run {
+            info: RunInfo { id: "a".into(), ..RunInfo::default() },
+            odometry: Odometry {
+                t_s: vec![0.0, 0.1],
+                wheels: WheelLog::Ticks(Wheels { left: vec![0, 5], right: vec![0, 7] }),
+                ..Odometry::default()
+            },
+            truth: vec![TruthSample::new(0.0, 0.0, 0.0, None)],
+            ..Run::default()
+        };
+        Dataset {
+            provenance: Provenance { name: Some(name.into()), ..Provenance::default() },
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.1,
+                right_wheel_diameter_m: 0.1,
+                wheel_separation_m: 0.3,
+                ticks_per_rev: Some(1000.0),
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![run],
+        }
+    }
+
+    fn name_in(dir: &Path) -> String {
+        crate::read(dir).expect("readable").dataset.provenance.name.expect("a name")
+    }
+
+    fn entries(dir: &Path) -> Vec<String> {
+        let mut names: Vec<_> = dir
+            .read_dir()
+            .expect("a folder")
+            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn parents_are_made_and_nothing_else_is_left_behind() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let dir = temp.path().join("a/b/c");
+        write(&dataset("one"), &dir, Existing::Refuse).expect("written");
+        assert_eq!(name_in(&dir), "one");
+        assert_eq!(entries(&temp.path().join("a/b")), ["c"]);
+        assert_eq!(entries(&dir), ["dataset.toml", "odometry.csv", "truth.csv"]);
+    }
+
+    #[test]
+    fn an_empty_folder_is_filled_and_a_full_one_refused() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let dir = temp.path().join("set");
+        fs::create_dir(&dir).expect("made");
+        write(&dataset("one"), &dir, Existing::Refuse).expect("written");
+        let refused = write(&dataset("two"), &dir, Existing::Refuse).expect_err("not empty");
+        assert!(refused.to_string().contains("already exists and is not empty"), "{refused}");
+        assert_eq!(name_in(&dir), "one");
+        write(&dataset("two"), &dir, Existing::ReplaceDataset).expect("replaced");
+        assert_eq!(name_in(&dir), "two");
+        assert_eq!(entries(temp.path()), ["set"]);
+    }
+
+    #[test]
+    fn only_a_dataset_and_nothing_beside_it_is_replaced() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let dir = temp.path().join("thesis");
+        fs::create_dir(&dir).expect("made");
+        fs::write(dir.join("chapter.tex"), "years of work").expect("written");
+        let refused = write(&dataset("one"), &dir, Existing::ReplaceDataset).expect_err("no dataset");
+        assert!(refused.to_string().contains("no dataset.toml"), "{refused}");
+        fs::write(dir.join(MANIFEST), "format = 1").expect("written");
+        let refused = write(&dataset("one"), &dir, Existing::ReplaceDataset).expect_err("more than a dataset");
+        assert!(refused.to_string().contains("chapter.tex"), "{refused}");
+        assert_eq!(entries(&dir), ["chapter.tex", "dataset.toml"]);
+        let file = temp.path().join("file");
+        fs::write(&file, "x").expect("written");
+        let refused = write(&dataset("one"), &file, Existing::ReplaceDataset).expect_err("a file");
+        assert!(refused.to_string().contains("is not a folder"), "{refused}");
+    }
+
+    #[test]
+    fn a_manifest_that_would_be_too_long_to_read_is_not_written() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let mut long = dataset("one");
+        long.provenance.notes = Some("word ".repeat(1 << 20));
+        let refused = write(&long, &temp.path().join("set"), Existing::Refuse).expect_err("too long");
+        assert!(refused.to_string().contains("dataset.toml would be longer than 4194304 bytes"), "{refused}");
+        assert!(entries(temp.path()).is_empty());
+    }
+
+    #[test]
+    fn a_dataset_that_could_not_be_read_back_leaves_no_trace() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let mut wrong = dataset("one");
+        wrong.runs[0].odometry.t_s[1] = f64::NAN;
+        write(&wrong, &temp.path().join("a/set"), Existing::Refuse).expect_err("NaN");
+        assert!(entries(temp.path()).is_empty());
+    }
+}

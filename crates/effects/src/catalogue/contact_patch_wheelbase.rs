@@ -1,0 +1,134 @@
+//! `contact_patch_wheelbase`: the wheels touch the floor with a patch, so the distance between the contacts varies.
+//!
+//! Model: B = B̄ + ε, with ε ~ N(0, σ_b²) drawn once a motion, and within a motion a slow part: a Gauss–Markov process along the wheels' travel,
+//! corr = exp(−Δs/ℓ). Signature: scatter of the heading in proportion to the turned angle, σ_θ = |Δθ| σ_b/B.
+//! Observability: repeated turns. Alias: wheel noise, whose heading variance grows with travel and not with the square of the turn.
+//! Reference: Navarro et al., eq. (10) and (11).
+
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Step};
+use crate::stream::Stream;
+
+/// Scatter of the effective wheelbase.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactPatchWheelbase {
+    /// Standard deviation from motion to motion, metres (σ_b).
+    pub sigma_m: f64,
+    /// Standard deviation of the slow variation within a motion, metres.
+    #[serde(default)]
+    pub slow_sigma_m: f64,
+    /// Wheel travel over which the slow variation forgets itself, metres; needed when `slow_sigma_m` is not 0.
+    #[serde(default)]
+    pub slow_length_m: f64,
+}
+
+impl PhysicalEffect for ContactPatchWheelbase {
+    fn check(&self) -> Result<(), EffectError> {
+        let id = "contact_patch_wheelbase";
+        let sigma = |parameter, value: f64| {
+            EffectError::unless(value.is_finite() && value >= 0.0, id, parameter, value, "0 or more")
+        };
+        sigma("sigma_m", self.sigma_m)?;
+        sigma("slow_sigma_m", self.slow_sigma_m)?;
+        let holds = self.slow_sigma_m == 0.0 || self.slow_length_m > 0.0;
+        EffectError::unless(holds, id, "slow_length_m", self.slow_length_m, "positive when slow_sigma_m is not 0")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, stream: None, motion_m: 0.0, slow_m: 0.0 }))
+    }
+}
+
+struct State {
+    size: ContactPatchWheelbase,
+    stream: Option<Stream>,
+    motion_m: f64,
+    slow_m: f64,
+}
+
+impl Forward for State {
+    fn start_run(&mut self, mut stream: Stream) {
+        self.slow_m = self.size.slow_sigma_m * stream.normal();
+        self.stream = Some(stream);
+    }
+
+    fn start_motion(&mut self) {
+        if let Some(stream) = &mut self.stream {
+            self.motion_m = self.size.sigma_m * stream.normal();
+        }
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        if self.size.slow_sigma_m > 0.0
+            && let Some(stream) = &mut self.stream
+        {
+            let travel_m = 0.5 * (step.travel_m.left.abs() + step.travel_m.right.abs());
+            let kept = (-travel_m / self.size.slow_length_m).exp();
+            self.slow_m = kept * self.slow_m + self.size.slow_sigma_m * (1.0 - kept * kept).sqrt() * stream.normal();
+        }
+        step.wheel_separation_m += self.motion_m + self.slow_m;
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        (self.size.slow_sigma_m > 0.0).then_some("its slow part varies within a motion")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Address, StreamName};
+    use crate::catalogue::specimen_step;
+
+    #[test]
+    fn paper_eq_11_the_wheelbase_is_normal_from_motion_to_motion() {
+        let size = ContactPatchWheelbase { sigma_m: 1e-3, slow_sigma_m: 0.0, slow_length_m: 0.0 };
+        let mut state = size.forward().expect("acts in steps");
+        state.start_run(Address { seed: 5, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        let (n, mut sum, mut squares) = (20_000, 0.0, 0.0);
+        for _ in 0..n {
+            state.start_motion();
+            let mut step = specimen_step();
+            state.floor(&mut step);
+            let excess_m = step.wheel_separation_m - specimen_step().wheel_separation_m;
+            sum += excess_m;
+            squares += excess_m * excess_m;
+        }
+        let n = f64::from(n);
+        // Five standard errors of a mean and of a variance.
+        assert!((sum / n).abs() < 5.0 * 1e-3 / n.sqrt());
+        assert!((squares / n / 1e-6 - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
+    }
+
+    #[test]
+    fn the_slow_part_has_the_same_variance_however_the_path_is_cut() {
+        for parts in [1_u32, 16] {
+            let size = ContactPatchWheelbase { sigma_m: 0.0, slow_sigma_m: 1e-3, slow_length_m: 0.2 };
+            let mut state = size.forward().expect("acts in steps");
+            let (runs, mut squares, mut products) = (4000_u32, 0.0, 0.0);
+            for run in 0..runs {
+                state.start_run(Address { seed: 6, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")));
+                let excess = |state: &mut Box<dyn Forward>, travel_m: f64| {
+                    let mut step = specimen_step();
+                    step.travel_m = kinematics::Wheels::both(travel_m);
+                    state.floor(&mut step);
+                    step.wheel_separation_m - specimen_step().wheel_separation_m
+                };
+                let before = excess(&mut state, 0.0);
+                let mut after = before;
+                for _ in 0..parts {
+                    after = excess(&mut state, 0.2 / f64::from(parts));
+                }
+                squares += after * after;
+                products += before * after;
+            }
+            let n = f64::from(runs);
+            assert!((squares / n / 1e-6 - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{parts}");
+            // One length apart the correlation is 1/e.
+            assert!((products / n / 1e-6 - (-1.0_f64).exp()).abs() < 5.0 * (2.0 / n).sqrt(), "{parts}");
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! `quantization`: the log keeps whole ticks, each of several counts.
+//!
+//! Model: tick = ⌊count / n⌋. A noise model, never a finding: Δ²/12 a pose, so increments have a lag-1 correlation of −½.
+//! Observability: the record itself. Reference: Navarro et al.: a pulse of about 1 mm is a number of the controller's counts.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Readout};
+
+/// Coarseness of the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantization {
+    /// Controller counts in one recorded tick (the paper's pulse).
+    pub counts_per_tick: u32,
+}
+
+impl PhysicalEffect for Quantization {
+    fn check(&self) -> Result<(), EffectError> {
+        let n = self.counts_per_tick;
+        EffectError::unless(n >= 1, "quantization", "counts_per_tick", f64::from(n), "1 or more")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+}
+
+struct State {
+    size: Quantization,
+}
+
+impl Forward for State {
+    fn readout(&mut self, readout: &mut Readout) {
+        readout.ticks = readout.ticks.map(|counts| counts.div_euclid(i64::from(self.size.counts_per_tick)));
+    }
+
+    fn counts_per_tick(&self) -> Option<u32> {
+        Some(self.size.counts_per_tick)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinematics::Wheels;
+
+    #[test]
+    fn ticks_are_floors_on_both_sides_of_zero() {
+        let mut state = State { size: Quantization { counts_per_tick: 80 } };
+        let mut readout = Readout { ticks: Wheels { left: 159, right: -1 } };
+        state.readout(&mut readout);
+        assert_eq!(readout.ticks, Wheels { left: 1, right: -1 });
+    }
+}

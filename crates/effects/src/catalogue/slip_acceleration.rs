@@ -1,0 +1,63 @@
+//! `slip_acceleration`: a tyre transmits force by slipping a little, so the ground speed lags behind the wheel's.
+//!
+//! Model: δv_w = −κ a_w. Signature: e_dx ∝ a; zero net over a symmetric start and stop.
+//! Observability: speed changes seen from outside. Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
+//! Reference: tyre slip stiffness; κ = v/(C_s g) with C_s = 20 to 40 gives 1 to 10 ms.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Step};
+
+/// Slip in proportion to acceleration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlipAcceleration {
+    /// Lost speed per acceleration (κ), seconds.
+    pub kappa_s: f64,
+}
+
+impl PhysicalEffect for SlipAcceleration {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless(self.kappa_s.is_finite(), "slip_acceleration", "kappa_s", self.kappa_s, "finite")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+}
+
+struct State {
+    size: SlipAcceleration,
+}
+
+impl Forward for State {
+    fn floor(&mut self, step: &mut Step) {
+        let lost_m = step.contact_acceleration_m_s2().map(|a_m_s2| self.size.kappa_s * a_m_s2 * step.dt_s);
+        step.travel_m = step.travel_m.zip_with(lost_m, |travel_m, lost_m| travel_m - lost_m);
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        Some("the closed form starts and stops at once")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+
+    #[test]
+    fn a_symmetric_start_and_stop_leaves_nothing() {
+        let mut state = State { size: SlipAcceleration { kappa_s: 5e-3 } };
+        let mut lost_m = Vec::new();
+        for acceleration_rad_s2 in [10.0, 0.0, -10.0] {
+            let mut step = specimen_step();
+            step.acceleration_rad_s2.right = acceleration_rad_s2;
+            state.floor(&mut step);
+            lost_m.push(specimen_step().travel_m.right - step.travel_m.right);
+        }
+        assert!((lost_m[0] - 5e-3 * 10.0 * 0.08 * specimen_step().dt_s).abs() < 1e-17);
+        assert_eq!(lost_m.iter().sum::<f64>(), 0.0);
+    }
+}

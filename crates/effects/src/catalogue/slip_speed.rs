@@ -1,0 +1,78 @@
+//! `slip_speed`: the faster a wheel turns, the larger the share of its motion that slips.
+//!
+//! Model: ground speed = v_w (1 − c|v_w|) for each wheel. Signature: e_dx = −c v|v|, e_dθ = −2c|v|ω; in a spin −(cb/2)ω|ω|.
+//! Observability: at least two speeds. Alias: `missed_counts`, load, `turn_rate_wheelbase`.
+//! Reference: longitudinal slip with rolling resistance that grows with speed; sizes are rules of thumb.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Step};
+
+/// Slip in proportion to speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlipSpeed {
+    /// Share lost per m/s of wheel speed (c), s/m.
+    pub slip_s_m: f64,
+}
+
+impl PhysicalEffect for SlipSpeed {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless(self.slip_s_m.is_finite(), "slip_speed", "slip_s_m", self.slip_s_m, "finite")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+        Some(Box::new(Term))
+    }
+}
+
+struct State {
+    size: SlipSpeed,
+}
+
+impl Forward for State {
+    fn floor(&mut self, step: &mut Step) {
+        let slip = step.contact_speed_m_s().map(|speed_m_s| self.size.slip_s_m * speed_m_s.abs());
+        step.travel_m = step.travel_m.zip_with(slip, |travel_m, slip| travel_m * (1.0 - slip));
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "slip_s_m", unit: "s/m" }]
+    }
+
+    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
+        let lost_m = interval.travel_m.map(|travel_m| -travel_m * travel_m.abs() / interval.dt_s);
+        let change = Interval { travel_m: lost_m, ..*interval }.increment();
+        gradient[0] = Pose::new(change.distance_m, 0.0, change.turn_rad);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+
+    #[test]
+    fn slip_grows_with_the_square_of_speed_and_opposes_it() {
+        let mut state = State { size: SlipSpeed { slip_s_m: 0.02 } };
+        for rate_rad_s in [-6.0, 3.0] {
+            let mut step = specimen_step();
+            step.rate_rad_s.left = rate_rad_s;
+            step.travel_m.left = rate_rad_s * 0.08 * step.dt_s;
+            let before_m = step.travel_m.left;
+            state.floor(&mut step);
+            assert!((step.travel_m.left / before_m - (1.0 - 0.02 * (rate_rad_s * 0.08).abs())).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! `wheel_mismatch`: the wheels differ in diameter.
+//!
+//! Model: D_R/D_L = E_d with the mean kept: D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1). Signature: e_dθ = (E_d−1)v/b.
+//! Observability: heading after driving straight. Alias: none on paths that drive both ways round.
+//! Reference: Borenstein & Feng 1996, eq. for E_d; Navarro et al., eq. (4): the differential part of α_c.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{DriveGeometry, Pose, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::Forward;
+
+/// Ratio of the diameters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WheelMismatch {
+    /// Right over left diameter, relative to the nominal ratio (E_d).
+    pub right_over_left: f64,
+}
+
+impl PhysicalEffect for WheelMismatch {
+    fn check(&self) -> Result<(), EffectError> {
+        let holds = self.right_over_left.is_finite() && self.right_over_left > 0.0;
+        EffectError::unless(holds, "wheel_mismatch", "right_over_left", self.right_over_left, "positive")
+    }
+
+    fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
+        let ratio = self.right_over_left;
+        let diameter_m = geometry.wheel_diameter_m();
+        let diameter_m =
+            Wheels { left: diameter_m.left * 2.0 / (ratio + 1.0), right: diameter_m.right * 2.0 / (1.0 / ratio + 1.0) };
+        DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        None
+    }
+
+    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+        Some(Box::new(Term))
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "right_over_left", unit: "1" }]
+    }
+
+    /// D_R grows by half of the ratio's change and D_L shrinks by the other half.
+    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
+        let half_m = Wheels { left: -0.5 * interval.travel_m.left, right: 0.5 * interval.travel_m.right };
+        let change = Interval { travel_m: half_m, ..*interval }.increment();
+        gradient[0] = Pose::new(change.distance_m, 0.0, change.turn_rad);
+    }
+}

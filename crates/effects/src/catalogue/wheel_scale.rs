@@ -1,0 +1,53 @@
+//! `wheel_scale`: both wheels are larger or smaller than believed, by the same factor.
+//!
+//! Model: D = scale · D_nominal for both wheels. Signature: e_dx = εv, e_dθ = εω with ε = scale − 1.
+//! Observability: any distance measured from outside. Alias: `clock_rate` when speeds are logged; the wheelbase where a robot only spins.
+//! Reference: Navarro et al., eq. (4): the common part of α_c; Borenstein & Feng 1996 (who cannot see it on closed squares).
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{DriveGeometry, Pose};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::Forward;
+
+/// Common factor of both diameters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WheelScale {
+    /// True over nominal diameter.
+    pub scale: f64,
+}
+
+impl PhysicalEffect for WheelScale {
+    fn check(&self) -> Result<(), EffectError> {
+        let holds = self.scale.is_finite() && self.scale > 0.0;
+        EffectError::unless(holds, "wheel_scale", "scale", self.scale, "positive")
+    }
+
+    fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
+        let diameter_m = geometry.wheel_diameter_m().map(|diameter_m| self.scale * diameter_m);
+        DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        None
+    }
+
+    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+        Some(Box::new(Term))
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "scale", unit: "1" }]
+    }
+
+    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
+        let increment = interval.increment();
+        gradient[0] = Pose::new(increment.distance_m, 0.0, increment.turn_rad);
+    }
+}

@@ -1,0 +1,50 @@
+//! `wheelbase`: the wheels' contacts are farther apart or closer than believed.
+//!
+//! Model: B = ratio · b_nominal (E_b; 1+α_b in the paper). Signature: e_dθ = (1/E_b−1)ω̂.
+//! Observability: turns measured from outside. Alias: `wheel_scale` where the robot only spins; `turn_rate_wheelbase` at one yaw rate.
+//! Reference: Navarro et al., eq. (10); Borenstein & Feng 1996.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{DriveGeometry, Pose};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::Forward;
+
+/// Ratio of the wheelbases.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wheelbase {
+    /// Effective over nominal distance between the wheel contacts (E_b).
+    pub ratio: f64,
+}
+
+impl PhysicalEffect for Wheelbase {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless(self.ratio.is_finite() && self.ratio > 0.0, "wheelbase", "ratio", self.ratio, "positive")
+    }
+
+    fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
+        DriveGeometry::new(geometry.wheel_diameter_m(), self.ratio * geometry.wheel_separation_m()).unwrap_or(geometry)
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        None
+    }
+
+    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+        Some(Box::new(Term))
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "ratio", unit: "1" }]
+    }
+
+    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(0.0, 0.0, -interval.increment().turn_rad);
+    }
+}

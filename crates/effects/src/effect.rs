@@ -1,0 +1,86 @@
+//! What every effect of the catalogue offers.
+
+use dataset::ModelTerm;
+use kinematics::{DriveGeometry, Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::forward::Forward;
+
+/// Why the sizes of an effect make no sense.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EffectError {
+    /// A parameter is outside its physical range.
+    #[error("effect {id}: {parameter} is {value}; it must be {must_be}")]
+    OutOfRange {
+        /// The effect.
+        id: &'static str,
+        /// The parameter, with its unit suffix.
+        parameter: &'static str,
+        /// The offending value.
+        value: f64,
+        /// The range.
+        must_be: &'static str,
+    },
+}
+
+impl EffectError {
+    /// An error unless `holds`.
+    pub(crate) fn unless(
+        holds: bool,
+        id: &'static str,
+        parameter: &'static str,
+        value: f64,
+        must_be: &'static str,
+    ) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Self::OutOfRange { id, parameter, value, must_be }) }
+    }
+}
+
+/// An effect with its sizes.
+pub trait PhysicalEffect {
+    /// Checks that the sizes are physical.
+    ///
+    /// # Errors
+    /// [`EffectError`] names the parameter and its range.
+    fn check(&self) -> Result<(), EffectError>;
+
+    /// What the effect makes of the drive's geometry for good. Only the geometry effects, which every calibration fits, answer here.
+    fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
+        geometry
+    }
+
+    /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
+    fn forward(&self) -> Option<Box<dyn Forward>>;
+
+    /// The hypothesis face: how recorded data would show the effect, or `None` when no term is written for it yet.
+    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+        None
+    }
+}
+
+/// Which wheels an effect touches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Which {
+    /// The left wheel alone.
+    Left,
+    /// The right wheel alone.
+    Right,
+    /// Both wheels.
+    Both,
+}
+
+impl Which {
+    /// Does it touch this wheel?
+    #[must_use]
+    pub const fn includes(self, side: Side) -> bool {
+        matches!((self, side), (Self::Both, _) | (Self::Left, Side::Left) | (Self::Right, Side::Right))
+    }
+
+    /// `value` for the wheels touched and 0 for the others.
+    #[must_use]
+    pub fn scaled(self, value: f64) -> Wheels<f64> {
+        Wheels::from_sides(|side| if self.includes(side) { value } else { 0.0 })
+    }
+}

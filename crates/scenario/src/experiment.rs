@@ -1,0 +1,393 @@
+//! A scenario: reading, checking and writing it.
+
+use std::path::{Path, PathBuf};
+
+use dataset::{MotionProgram, Schedule};
+use effects::{Effect, EffectError};
+use kinematics::{DriveGeometry, GeometryError};
+use serde::{Deserialize, Serialize};
+
+use crate::robot::Robot;
+use crate::sweep::Sweep;
+
+/// Why a scenario is not one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    /// The file cannot be read.
+    #[error("{}: cannot read the scenario: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The text is not a scenario; the message carries line and column and lists the known words.
+    #[error("{place}: {message}")]
+    Toml {
+        /// File, and line where it is known.
+        place: String,
+        /// What is wrong, in one line.
+        message: String,
+    },
+    /// An effect's size is not physical.
+    #[error("{place}: {source}")]
+    Effect {
+        /// The file.
+        place: String,
+        /// Which and why.
+        source: EffectError,
+    },
+    /// The robot's nominal geometry is not physical.
+    #[error("{place}: robot: {source}")]
+    Geometry {
+        /// The file.
+        place: String,
+        /// Which and why.
+        source: GeometryError,
+    },
+    /// A value is outside its range.
+    #[error("{place}: {key} is {value}; it must be {must_be}")]
+    OutOfRange {
+        /// The file.
+        place: String,
+        /// Dotted key.
+        key: String,
+        /// The offending value.
+        value: f64,
+        /// The range.
+        must_be: &'static str,
+    },
+    /// A sweep's axis names a key that the scenario does not have, or one that is not a number.
+    #[error("{place}: sweep axis \"{key}\": {problem}")]
+    Axis {
+        /// The file.
+        place: String,
+        /// Dotted key.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// Scenarios are written by hand; anything larger is another file.
+const LARGEST_FILE_BYTES: u64 = 1 << 20;
+
+/// An experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// A name for people.
+    pub name: String,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// How motion is computed.
+    pub engine: Engine,
+    /// The robot as specified.
+    pub robot: Robot,
+    /// What is random in every run.
+    pub noise: Noise,
+    /// Where runs start.
+    pub placement: Placement,
+    /// How often the robot writes down its counters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log: Option<Log>,
+    /// What sees the robot from outside.
+    #[serde(rename = "instrument")]
+    pub instruments: Vec<Instrument>,
+    /// The robot's imperfections.
+    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<Effect>,
+    /// What is driven, in order.
+    #[serde(rename = "protocol")]
+    pub protocols: Vec<ProtocolPart>,
+    /// What is varied and who estimates, for `yair sweep`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<Sweep>,
+}
+
+/// How motion is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Engine {
+    /// Whole motions as single arcs at constant speed; exact where every effect allows it.
+    ClosedForm,
+    /// Motors and controllers in steps of at most `step_s`.
+    Stepping {
+        /// Longest step, seconds, at most 1 ms.
+        step_s: f64,
+    },
+}
+
+/// Randomness of the robot itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Random walk of each wheel's travel over the ground, m/√m (`k`; Chong & Kleeman 1997).
+    pub wheel_sigma_m_per_sqrt_m: f64,
+    /// Relative scatter of each wheel's sensitivity, drawn once a motion (ε_c of the paper's eq. 4 and 5, over C).
+    pub sensitivity_sigma: f64,
+}
+
+/// How precisely a person puts the robot at the start of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placement {
+    /// Each coordinate is uniform within ± this of the origin, metres.
+    pub half_width_m: f64,
+    /// The heading is uniform within ± this, radians.
+    pub half_width_rad: f64,
+}
+
+/// The robot's own record.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Log {
+    /// Seconds between two rows. Without a log the counters are read at standstills only.
+    pub interval_s: f64,
+}
+
+/// What sees the robot from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Instrument {
+    /// The paper's floor grid: the robot's marked points are read while it stands (`points.csv`).
+    FloorGrid {
+        /// Spacing to which coordinates are rounded, metres; 0 = not rounded.
+        resolution_m: f64,
+        /// Standard deviation of reading one coordinate, metres.
+        reading_sigma_m: f64,
+    },
+    /// Motion capture: poses of a marker at a fixed rate (`truth.csv`).
+    MotionCapture {
+        /// Samples per second.
+        rate_hz: f64,
+        /// Standard deviation of each position coordinate, metres.
+        sigma_xy_m: f64,
+        /// Standard deviation of the heading, radians.
+        sigma_theta_rad: f64,
+        /// How much later than it is true a sample is stamped, seconds.
+        latency_s: f64,
+        /// Where the marker is on the robot, ahead of the axle, metres.
+        lever_x_m: f64,
+        /// Where the marker is on the robot, to the left of the centre, metres.
+        lever_y_m: f64,
+        /// How the marker's frame is turned on the robot, radians.
+        lever_theta_rad: f64,
+    },
+}
+
+/// One part of the campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ProtocolPart {
+    /// Straight runs, alternately forward and backward.
+    Straights {
+        /// Nominal length, metres.
+        length_m: f64,
+        /// How many.
+        runs: u32,
+    },
+    /// Spins, alternately counter-clockwise and clockwise.
+    Spins {
+        /// Nominal turn, radians.
+        turn_rad: f64,
+        /// How many.
+        runs: u32,
+    },
+    /// UMBmark squares.
+    Squares {
+        /// Nominal side, metres.
+        side_m: f64,
+        /// How many in each direction.
+        runs_each_way: u32,
+    },
+    /// The paper's validation path with eight quarter turns.
+    ValidationPath {
+        /// Length, metres.
+        length_m: f64,
+        /// Distance between readings, metres.
+        measure_every_m: f64,
+        /// How many.
+        runs: u32,
+    },
+}
+
+impl ProtocolPart {
+    /// The part in the vocabulary of whoever drives it.
+    #[must_use]
+    pub const fn schedule(&self) -> Schedule {
+        match *self {
+            Self::Straights { length_m, runs } => Schedule::Straights { length_m, runs },
+            Self::Spins { turn_rad, runs } => Schedule::Spins { turn_rad, runs },
+            Self::Squares { side_m, runs_each_way } => Schedule::Squares { side_m, runs_each_way },
+            Self::ValidationPath { length_m, measure_every_m, runs } => {
+                Schedule::ValidationPath { length_m, measure_every_m, runs }
+            }
+        }
+    }
+}
+
+impl Scenario {
+    /// Reads and checks a scenario file.
+    ///
+    /// # Errors
+    /// [`ScenarioError`]: unreadable, not a scenario, or values out of range; one line that names the file.
+    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
+        let io = |source| ScenarioError::Io { path: path.to_owned(), source };
+        let place = path.display().to_string();
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > LARGEST_FILE_BYTES {
+            let message = format!("{size} bytes is too large for a scenario (at most {LARGEST_FILE_BYTES})");
+            return Err(ScenarioError::Toml { place, message });
+        }
+        Self::parse(&std::fs::read_to_string(path).map_err(io)?, &place)
+    }
+
+    /// Parses and checks a scenario; `place` (the file) is named in errors.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(text: &str, place: &str) -> Result<Self, ScenarioError> {
+        let scenario: Self = toml::from_str(text).map_err(|error| {
+            let place = match error.span() {
+                Some(span) => format!("{place}:{}", text[..span.start].matches('\n').count() + 1),
+                None => place.to_owned(),
+            };
+            ScenarioError::Toml { place, message: error.message().trim().replace('\n', "; ") }
+        })?;
+        scenario.check(place)?;
+        if let Some(sweep) = &scenario.sweep {
+            sweep.points(&scenario, place)?;
+        }
+        Ok(scenario)
+    }
+
+    /// The scenario as TOML; [`Self::parse`] gives the same scenario back.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Toml`] when a value has no TOML form (a seed beyond 2⁶³).
+    pub fn to_toml(&self) -> Result<String, ScenarioError> {
+        toml::to_string(self)
+            .map_err(|error| ScenarioError::Toml { place: self.name.clone(), message: error.to_string() })
+    }
+
+    /// Everything that is driven, in order.
+    #[must_use]
+    pub fn programs(&self) -> Vec<MotionProgram> {
+        self.protocols.iter().flat_map(|part| part.schedule().programs()).collect()
+    }
+
+    /// The robot's specified drive.
+    ///
+    /// # Errors
+    /// [`GeometryError`]; a scenario that was read has been checked.
+    pub fn nominal_geometry(&self) -> Result<DriveGeometry, GeometryError> {
+        self.robot.nominal().geometry()
+    }
+
+    /// The drive that the effects leave, about which everything else scatters: what calibration should find.
+    ///
+    /// # Errors
+    /// [`GeometryError`]; a scenario that was read has been checked.
+    pub fn true_geometry(&self) -> Result<DriveGeometry, GeometryError> {
+        let nominal = self.nominal_geometry()?;
+        Ok(self.effects.iter().fold(nominal, |geometry, effect| effect.physical().true_geometry(geometry)))
+    }
+
+    pub(crate) fn check(&self, place: &str) -> Result<(), ScenarioError> {
+        let range = |key: &str, value: f64, holds: bool, must_be: &'static str| {
+            let error = || ScenarioError::OutOfRange { place: place.to_owned(), key: key.to_owned(), value, must_be };
+            if holds { Ok(()) } else { Err(error()) }
+        };
+        let positive = |key: &str, value: f64| range(key, value, value.is_finite() && value > 0.0, "positive");
+        let not_negative = |key: &str, value: f64| range(key, value, value.is_finite() && value >= 0.0, "0 or more");
+        let finite = |key: &str, value: f64| range(key, value, value.is_finite(), "finite");
+
+        self.nominal_geometry().map_err(|source| ScenarioError::Geometry { place: place.to_owned(), source })?;
+        let robot = &self.robot;
+        positive("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
+        positive("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
+        positive("robot.encoder.lines_per_rev", robot.encoder.lines_per_rev)?;
+        positive("robot.encoder.gear_ratio", robot.encoder.gear_ratio)?;
+        let width_error = robot.encoder.state_width_error;
+        range("robot.encoder.state_width_error", width_error, (0.0..1.0).contains(&width_error), "in [0, 1)")?;
+        not_negative("robot.controller.right_phase_s", robot.controller.right_phase_s)?;
+        positive("robot.controller.clock_hz", robot.controller.clock_hz)?;
+        positive("robot.motor.supply_v", robot.motor.supply_v)?;
+        positive("robot.motor.resistance_ohm", robot.motor.resistance_ohm)?;
+        positive("robot.motor.torque_constant_nm_a", robot.motor.torque_constant_nm_a)?;
+        positive("robot.motor.inertia_kg_m2", robot.motor.inertia_kg_m2)?;
+        not_negative("robot.motor.viscous_friction_nm_s", robot.motor.viscous_friction_nm_s)?;
+        not_negative("robot.motor.coulomb_friction_nm", robot.motor.coulomb_friction_nm)?;
+        for mark in &robot.points {
+            finite("robot.point.x_m", mark.x_m)?;
+            finite("robot.point.y_m", mark.y_m)?;
+        }
+        if let Engine::Stepping { step_s } = self.engine {
+            range("engine.step_s", step_s, step_s > 0.0 && step_s <= 1e-3, "positive and at most 0.001")?;
+        }
+        not_negative("noise.wheel_sigma_m_per_sqrt_m", self.noise.wheel_sigma_m_per_sqrt_m)?;
+        not_negative("noise.sensitivity_sigma", self.noise.sensitivity_sigma)?;
+        not_negative("placement.half_width_m", self.placement.half_width_m)?;
+        not_negative("placement.half_width_rad", self.placement.half_width_rad)?;
+        if let Some(log) = self.log {
+            positive("log.interval_s", log.interval_s)?;
+        }
+        #[allow(clippy::cast_precision_loss)]
+        let instruments = self.instruments.len() as f64;
+        range(
+            "instrument",
+            instruments,
+            !self.instruments.is_empty(),
+            "at least one: nothing else measures the truth",
+        )?;
+        for instrument in &self.instruments {
+            match *instrument {
+                Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
+                    not_negative("instrument.resolution_m", resolution_m)?;
+                    not_negative("instrument.reading_sigma_m", reading_sigma_m)?;
+                    #[allow(clippy::cast_precision_loss)]
+                    let marks = robot.points.len() as f64;
+                    let must_be = "at least two points with a floor grid: one point gives no heading";
+                    range("robot.point", marks, robot.points.len() >= 2, must_be)?;
+                }
+                Instrument::MotionCapture {
+                    rate_hz,
+                    sigma_xy_m,
+                    sigma_theta_rad,
+                    latency_s,
+                    lever_x_m,
+                    lever_y_m,
+                    lever_theta_rad,
+                } => {
+                    positive("instrument.rate_hz", rate_hz)?;
+                    not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
+                    not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
+                    not_negative("instrument.latency_s", latency_s)?;
+                    finite("instrument.lever_x_m", lever_x_m)?;
+                    finite("instrument.lever_y_m", lever_y_m)?;
+                    finite("instrument.lever_theta_rad", lever_theta_rad)?;
+                }
+            }
+        }
+        for effect in &self.effects {
+            effect.physical().check().map_err(|source| ScenarioError::Effect { place: place.to_owned(), source })?;
+        }
+        for part in &self.protocols {
+            match *part {
+                ProtocolPart::Straights { length_m, .. } => positive("protocol.length_m", length_m)?,
+                ProtocolPart::Spins { turn_rad, .. } => positive("protocol.turn_rad", turn_rad)?,
+                ProtocolPart::Squares { side_m, .. } => positive("protocol.side_m", side_m)?,
+                ProtocolPart::ValidationPath { length_m, measure_every_m, .. } => {
+                    positive("protocol.length_m", length_m)?;
+                    let holds = measure_every_m > 0.0 && measure_every_m <= length_m;
+                    range("protocol.measure_every_m", measure_every_m, holds, "positive and at most length_m")?;
+                }
+            }
+        }
+        let runs = self.programs().len();
+        #[allow(clippy::cast_precision_loss)]
+        range("protocol.runs", runs as f64, runs > 0, "at least one run in all")
+    }
+}

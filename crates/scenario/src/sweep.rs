@@ -1,0 +1,113 @@
+//! A sweep: axes over any numeric key of the scenario, crossed into points, and who estimates.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use crate::experiment::{Scenario, ScenarioError};
+
+/// What a sweep varies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// Trials at every point.
+    pub trials: u64,
+    /// Calibration methods that each trial is given to.
+    pub methods: Vec<String>,
+    /// Dotted keys of the scenario, each with its levels. A list is indexed by number (`protocol.0.runs`) or by its element's kind
+    /// (`effect.wheelbase.ratio`).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub axes: BTreeMap<String, Vec<f64>>,
+}
+
+/// One axis with the level that a point takes on it.
+pub type Axis = (String, f64);
+
+/// One point of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// The level on each axis, in the order of the axes.
+    pub levels: Vec<Axis>,
+    /// The scenario with these levels.
+    pub scenario: Scenario,
+}
+
+impl Sweep {
+    /// The full grid over the axes, the last axis varying fastest; one point when there is none.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's scenario invalid.
+    pub fn points(&self, scenario: &Scenario, place: &str) -> Result<Vec<Point>, ScenarioError> {
+        let toml_error = |message: String| ScenarioError::Toml { place: place.to_owned(), message };
+        if self.trials < 2 {
+            return Err(toml_error(format!("sweep.trials is {}; a spread needs at least 2", self.trials)));
+        }
+        if self.methods.is_empty() {
+            return Err(toml_error("sweep.methods is empty; name at least one method".to_owned()));
+        }
+        let base = Table::try_from(scenario).map_err(|error| toml_error(error.to_string()))?;
+        let mut tables = vec![(Vec::new(), base)];
+        for (key, levels) in &self.axes {
+            let axis_error =
+                |problem: String| ScenarioError::Axis { place: place.to_owned(), key: key.clone(), problem };
+            if levels.is_empty() {
+                return Err(axis_error("it has no levels".to_owned()));
+            }
+            let mut crossed = Vec::with_capacity(tables.len() * levels.len());
+            for (point, table) in tables {
+                for &level in levels {
+                    let (mut point, mut table) = (point.clone(), table.clone());
+                    set_number(&mut table, key, level).map_err(axis_error)?;
+                    point.push((key.clone(), level));
+                    crossed.push((point, table));
+                }
+            }
+            tables = crossed;
+        }
+        tables
+            .into_iter()
+            .map(|(levels, table)| {
+                let scenario: Scenario =
+                    table.try_into().map_err(|error: toml::de::Error| toml_error(error.message().to_owned()))?;
+                scenario.check(place)?;
+                Ok(Point { levels, scenario })
+            })
+            .collect()
+    }
+}
+
+/// Puts `level` at the dotted key, keeping integers integers.
+fn set_number(table: &mut Table, key: &str, level: f64) -> Result<(), String> {
+    let mut words = key.split('.');
+    let first = words.next().unwrap_or_default();
+    let known = |table: &Table| table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+    let unknown = format!("no \"{first}\" in the scenario; it has: {}", known(table));
+    let mut value = table.get_mut(first).ok_or(unknown)?;
+    for word in words {
+        value = match value {
+            Value::Table(table) => {
+                let unknown = format!("no \"{word}\" there; known keys: {}", known(table));
+                table.get_mut(word).ok_or(unknown)?
+            }
+            Value::Array(items) => {
+                let kinds: Vec<_> = items
+                    .iter()
+                    .map(|item| item.get("kind").and_then(Value::as_str).unwrap_or("?").to_owned())
+                    .collect();
+                let position = word.parse().ok().or_else(|| kinds.iter().position(|kind| kind == word));
+                let unknown = format!("no \"{word}\" in that list; it has: {}", kinds.join(", "));
+                position.and_then(|position: usize| items.get_mut(position)).ok_or(unknown)?
+            }
+            _ => return Err(format!("\"{word}\" asks for a part of a single value")),
+        };
+    }
+    match value {
+        Value::Float(number) => *number = level,
+        #[allow(clippy::cast_possible_truncation)]
+        Value::Integer(number) if level.fract() == 0.0 && level.abs() < 1e15 => *number = level as i64,
+        Value::Integer(_) => return Err(format!("{level} is not a whole number, as this key asks")),
+        _ => return Err("it is not a number".to_owned()),
+    }
+    Ok(())
+}

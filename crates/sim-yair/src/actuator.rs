@@ -1,0 +1,224 @@
+//! What turns the shafts: the closed form at constant speed, or motors under their controllers in small steps. One interface, so that everything
+//! from the shaft to the floor and the log is the same code in both engines.
+
+use effects::{Command, Step};
+use kinematics::Wheels;
+use scenario::Robot;
+
+use crate::servo::{Servo, ServoError, SetPoint};
+
+/// How the shafts turn over the next step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShaftMotion {
+    pub(crate) shaft_rad: Wheels<f64>,
+    pub(crate) rate_rad_s: Wheels<f64>,
+    pub(crate) acceleration_rad_s2: Wheels<f64>,
+}
+
+/// The two wheels' drives.
+#[derive(Debug)]
+pub(crate) enum Actuator {
+    ClosedForm(ConstantSpeed),
+    Stepping(Box<ServoPair>),
+}
+
+impl Actuator {
+    /// Starts a motion. `seen` is the share of a shaft's turn that its counter sees at a given motion: a controller drives *counts* to the target, so
+    /// that a counter that misses some makes the wheel go farther.
+    pub(crate) fn begin(&mut self, command: &Command, seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> Result<(), ServoError> {
+        match self {
+            Self::ClosedForm(drive) => {
+                drive.begin(command, seen);
+                Ok(())
+            }
+            Self::Stepping(pair) => pair.begin(command),
+        }
+    }
+
+    /// Holds still.
+    pub(crate) fn hold(&mut self, duration_s: f64) {
+        match self {
+            Self::ClosedForm(drive) => *drive = ConstantSpeed { remaining_s: duration_s, rate_rad_s: Wheels::both(0.0), ..*drive },
+            Self::Stepping(pair) => pair.hold_s = duration_s,
+        }
+    }
+
+    /// Seconds until the actuator wants a step to end; `None` when the motion is over.
+    pub(crate) fn next_event_s(&self) -> Option<f64> {
+        match self {
+            Self::ClosedForm(drive) => (drive.remaining_s > 0.0).then_some(drive.remaining_s),
+            Self::Stepping(pair) => pair.next_event_s(),
+        }
+    }
+
+    /// Turns the shafts for `dt_s`, at most [`Self::next_event_s`].
+    pub(crate) fn turn(&mut self, dt_s: f64) -> ShaftMotion {
+        match self {
+            Self::ClosedForm(drive) => drive.turn(dt_s),
+            Self::Stepping(pair) => pair.turn(dt_s),
+        }
+    }
+
+    /// What the counters saw of the step, after the effects.
+    pub(crate) fn count(&mut self, step: &Step) {
+        match self {
+            Self::ClosedForm(drive) => {
+                let counts = step.encoder_rad.zip_with(drive.counts_per_rad, |rad, counts_per_rad| rad * counts_per_rad);
+                drive.counts = drive.counts.zip_with(counts, |sum, counts| sum + counts);
+            }
+            Self::Stepping(pair) => pair.count(step),
+        }
+    }
+
+    /// The counters' values.
+    pub(crate) fn counts(&self) -> Wheels<i64> {
+        match self {
+            #[allow(clippy::cast_possible_truncation)] // 2^63 counts are beyond any run
+            Self::ClosedForm(drive) => drive.counts.map(|counts| counts.floor() as i64),
+            Self::Stepping(pair) => pair.servos.as_ref().map(Servo::counts),
+        }
+    }
+}
+
+/// The closed form: each wheel at constant speed from standstill to standstill.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ConstantSpeed {
+    counts_per_rad: Wheels<f64>,
+    counts: Wheels<f64>,
+    rate_rad_s: Wheels<f64>,
+    remaining_s: f64,
+}
+
+/// Rounds of the fixed point that finds the shaft's rate from the counted one; each gains the lost share's order, 1e-2 to 1e-3.
+const SEEN_ROUNDS: u32 = 12;
+
+impl ConstantSpeed {
+    pub(crate) fn new(robot: &Robot, start_counts: Wheels<f64>) -> Self {
+        let counts_per_rad = robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
+        Self {
+            counts_per_rad: Wheels::both(counts_per_rad),
+            counts: start_counts,
+            rate_rad_s: Wheels::both(0.0),
+            remaining_s: 0.0,
+        }
+    }
+
+    fn begin(&mut self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) {
+        let rad = command.travel_counts.zip_with(self.counts_per_rad, |counts, counts_per_rad| counts / counts_per_rad);
+        let duration_s = command.travel_counts.zip_with(command.speed_counts_s, |counts, speed| {
+            if counts == 0.0 { 0.0 } else { counts.abs() / speed }
+        });
+        let duration_s = duration_s.left.max(duration_s.right);
+        if duration_s <= 0.0 {
+            self.remaining_s = 0.0;
+            return;
+        }
+        let counted_rad_s = rad.map(|rad| rad / duration_s);
+        self.rate_rad_s = counted_rad_s;
+        for _ in 0..SEEN_ROUNDS {
+            let share = seen(self.rate_rad_s);
+            let rate_rad_s = counted_rad_s.zip_with(share, |counted, share| counted / share);
+            if rate_rad_s == self.rate_rad_s {
+                break;
+            }
+            self.rate_rad_s = rate_rad_s;
+        }
+        self.remaining_s = duration_s;
+    }
+
+    fn turn(&mut self, dt_s: f64) -> ShaftMotion {
+        self.remaining_s = if dt_s >= self.remaining_s { 0.0 } else { self.remaining_s - dt_s };
+        ShaftMotion {
+            shaft_rad: self.rate_rad_s.map(|rate| rate * dt_s),
+            rate_rad_s: self.rate_rad_s,
+            acceleration_rad_s2: Wheels::both(0.0),
+        }
+    }
+}
+
+/// Two servos that share no clock, and when their motion is over.
+#[derive(Debug)]
+pub(crate) struct ServoPair {
+    servos: Wheels<Servo>,
+    step_s: f64,
+    acceleration_counts_s2: f64,
+    moving: bool,
+    settling_s: f64,
+    hold_s: f64,
+}
+
+/// Longest wait for a wheel to settle on its target after its profile: friction may hold it a few counts away for good.
+const LONGEST_SETTLING_S: f64 = 1.0;
+
+impl ServoPair {
+    pub(crate) fn new(robot: &Robot, start_counts: Wheels<f64>, step_s: f64) -> Result<Self, ServoError> {
+        let servo = |phase_s, start| Servo::new(&robot.controller, &robot.motor, &robot.encoder, phase_s, start);
+        let nominal_m_per_count =
+            robot.wheel_diameter_m().map(|d_m| std::f64::consts::PI * d_m / robot.encoder.counts_per_wheel_turn());
+        Ok(Self {
+            servos: Wheels {
+                left: servo(0.0, start_counts.left)?,
+                right: servo(robot.controller.right_phase_s, start_counts.right)?,
+            },
+            step_s,
+            acceleration_counts_s2: robot.acceleration_m_s2 / nominal_m_per_count.left,
+            moving: false,
+            settling_s: 0.0,
+            hold_s: 0.0,
+        })
+    }
+
+    fn begin(&mut self, command: &Command) -> Result<(), ServoError> {
+        let fastest = command.speed_counts_s.left.max(command.speed_counts_s.right);
+        for side in kinematics::Side::BOTH {
+            let counts = command.travel_counts[side];
+            let speed_counts_s = command.speed_counts_s[side];
+            if counts != 0.0 {
+                self.servos[side].command(SetPoint::Travel {
+                    #[allow(clippy::cast_possible_truncation)] // targets are whole counts
+                    counts: counts.round() as i64,
+                    speed_counts_s,
+                    // Both wheels ramp for the same time, so that an arc keeps its radius while it starts and stops.
+                    acceleration_counts_s2: self.acceleration_counts_s2 * speed_counts_s / fastest,
+                })?;
+            }
+        }
+        self.moving = true;
+        self.settling_s = 0.0;
+        Ok(())
+    }
+
+    fn next_event_s(&self) -> Option<f64> {
+        if !self.moving && self.hold_s <= 0.0 {
+            return None;
+        }
+        let sample_s = self.servos.left.time_to_sample_s().min(self.servos.right.time_to_sample_s());
+        let next_s = sample_s.min(self.step_s);
+        Some(if self.moving { next_s } else { next_s.min(self.hold_s) })
+    }
+
+    fn turn(&mut self, dt_s: f64) -> ShaftMotion {
+        let shaft_rad = Wheels { left: self.servos.left.turn(dt_s), right: self.servos.right.turn(dt_s) };
+        ShaftMotion {
+            shaft_rad,
+            rate_rad_s: self.servos.as_ref().map(Servo::rate_rad_s),
+            acceleration_rad_s2: self.servos.as_ref().map(Servo::acceleration_rad_s2),
+        }
+    }
+
+    fn count(&mut self, step: &Step) {
+        for side in kinematics::Side::BOTH {
+            self.servos[side].count(step.encoder_rad[side], step.dt_s);
+            self.servos[side].sample_if_due();
+        }
+        if self.moving {
+            if self.servos.left.profile_done() && self.servos.right.profile_done() {
+                self.settling_s += step.dt_s;
+            }
+            let settled = self.servos.left.settled() && self.servos.right.settled();
+            self.moving = !settled && self.settling_s < LONGEST_SETTLING_S;
+        } else {
+            self.hold_s -= step.dt_s;
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! `yair calibrate DATASET... [--method M] [--out FILE]`
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use calib::{CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use dataset::Session;
+
+use crate::simulate::write_whole;
+use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+
+/// Calibrate one robot from its sessions.
+#[derive(Args)]
+#[command(after_help = methods())]
+pub(crate) struct Arguments {
+    /// Datasets; several are one robot's sessions, calibrated together.
+    #[arg(required = true, value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// Method, or `all` for each one that applies.
+    #[arg(long, default_value = "direct", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
+    method: String,
+    /// Write the calibration to a file that `yair evaluate --calibration` takes.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+const ALL: &str = "all";
+
+fn methods() -> String {
+    let lines: Vec<_> = METHODS.iter().map(|method| format!("  {:10} {}", method.name(), method.about())).collect();
+    format!("Methods:\n{}", lines.join("\n"))
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let datasets = read_datasets(&arguments.datasets, terminal)?;
+    let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    refuse_wrapped_counters(&sessions)?;
+    let chosen: Vec<&dyn Method> =
+        METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
+    let outcomes: Vec<_> = chosen.iter().map(|method| (method.name(), method.calibrate(&sessions))).collect();
+    let report = CalibrationReport {
+        dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
+        methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome)).collect(),
+    };
+    // One method asked for by name and not applicable is a failure; the JSON still says so in its place.
+    let refused = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().err());
+    let nothing_found = outcomes.iter().all(|(_, outcome)| outcome.is_err());
+    terminal.document(&report)?;
+    if let (true, Some(refused)) = (nothing_found, refused) {
+        return Err(refused.to_string().into());
+    }
+    if let Some(out) = &arguments.out {
+        write_whole(out, report.to_toml()?.as_bytes())?;
+        terminal.remark(&format!("calibration in {}", out.display()));
+    }
+    show(&report, terminal)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(report: &CalibrationReport, terminal: &Terminal) -> Result<(), Failure> {
+    let mut table = table(&["method", "parameter", "value", "sigma", "unit"], 2);
+    for method in &report.methods {
+        for (key, value) in &method.parameters {
+            table.add_row([
+                method.method.clone(),
+                key.clone(),
+                cell(Some(value.value), 1e3, 6),
+                cell(value.sigma, 1e3, 6),
+                "mm".to_owned(),
+            ]);
+        }
+    }
+    terminal.say(&table.to_string())?;
+    for method in &report.methods {
+        let name = &method.method;
+        if let Some(error) = &method.error {
+            terminal.say(&error.clone())?;
+            continue;
+        }
+        terminal.say(&format!("{name}: {} runs used, {} values rejected", method.runs_used, method.runs_rejected.len()))?;
+        for rejected in &method.runs_rejected {
+            terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
+        }
+        for blind in &method.not_observable {
+            terminal.say(&format!("  cannot tell {}: {}", blind.parameter, blind.why))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,97 @@
+//! `yair evaluate DATASET... [--calibration FILE]... [--max-drift PERCENT]`
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use calib::{CalibrationDrift, CalibrationReport, Names, ReportError};
+use clap::Args;
+use dataset::Session;
+use serde::Serialize;
+
+use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+
+/// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Datasets with absolute truth.
+    #[arg(required = true, value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// Calibration file from `yair calibrate --out`; may be given several times.
+    #[arg(long = "calibration", value_name = "FILE")]
+    calibrations: Vec<PathBuf>,
+    /// Exit with 3 when the last calibration drifts more than this, in per cent of the distance driven.
+    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    max_drift: Option<f64>,
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("it must be 0 or more".to_owned()) }
+}
+
+/// Exit code when the drift is above what is allowed.
+const DRIFTS_TOO_MUCH: u8 = 3;
+
+#[derive(Serialize)]
+struct Document {
+    dataset: Names,
+    calibrations: Vec<CalibrationDrift>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let datasets = read_datasets(&arguments.datasets, terminal)?;
+    let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    let several = sessions.len() > 1;
+    let mut calibrations = vec![calib::evaluate(&sessions, None, several)];
+    for path in &arguments.calibrations {
+        let found = CalibrationReport::read(path)?.calibrations();
+        if found.is_empty() {
+            let message = "it holds no values".to_owned();
+            return Err(ReportError::NotACalibration { place: path.display().to_string(), message }.into());
+        }
+        calibrations.extend(found.iter().map(|calibration| calib::evaluate(&sessions, Some(calibration), several)));
+    }
+    show(&calibrations, terminal)?;
+    let last_percent = calibrations.last().and_then(|last| last.drift_percent);
+    let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
+    terminal.document(&Document {
+        dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
+        calibrations,
+    })?;
+    match (arguments.max_drift, last_percent) {
+        (Some(_), None) => Err("--max-drift: the drift of these runs is not known (see why_null)".into()),
+        (Some(allowed), Some(percent)) if percent > allowed => {
+            terminal.failure(&format!("{name} drifts {percent:.3} % where {allowed} % is allowed"));
+            Ok(ExitCode::from(DRIFTS_TOO_MUCH))
+        }
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
+    let headers =
+        ["calibration", "max", "max", "max final", "max final", "mean final", "mean final", "drift"];
+    let units = ["", "mm", "deg", "mm", "deg", "mm", "deg", "%"];
+    let mut table = table(&headers, 1);
+    table.add_row(units);
+    for drift in calibrations {
+        let degrees = 180.0 / std::f64::consts::PI;
+        table.add_row([
+            drift.name.clone(),
+            cell(drift.max_position_m, 1e3, 2),
+            cell(drift.max_heading_rad, degrees, 3),
+            cell(drift.max_final_position_m, 1e3, 2),
+            cell(drift.max_final_heading_rad, degrees, 3),
+            cell(drift.mean_final_position_m, 1e3, 2),
+            cell(drift.mean_final_heading_rad, degrees, 3),
+            cell(drift.drift_percent, 1.0, 3),
+        ]);
+    }
+    terminal.say(&table.to_string())?;
+    for drift in calibrations {
+        if let Some(why) = &drift.why_null {
+            terminal.say(&format!("{}: {why}", drift.name))?;
+        }
+    }
+    Ok(())
+}

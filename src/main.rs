@@ -1,0 +1,53 @@
+//! The `yair` command: one file a subcommand, and the only code that knows the terminal.
+
+mod calibrate;
+mod evaluate;
+mod import;
+mod simulate;
+mod sweep;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::terminal::Terminal;
+
+/// Odometry of differential-drive robots: simulate, calibrate, evaluate, bench.
+#[derive(Parser)]
+#[command(name = "yair", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one JSON document on standard output and nothing else there.
+    #[arg(long, global = true)]
+    json: bool,
+    /// No progress and no remarks.
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Simulate(simulate::Arguments),
+    Import(import::Arguments),
+    Calibrate(calibrate::Arguments),
+    Evaluate(evaluate::Arguments),
+    Sweep(sweep::Arguments),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let terminal = Terminal::new(cli.json, cli.quiet);
+    let outcome = match &cli.command {
+        Command::Simulate(arguments) => simulate::run(arguments, &terminal),
+        Command::Import(arguments) => import::run(arguments, &terminal),
+        Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
+        Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
+        Command::Sweep(arguments) => sweep::run(arguments, &terminal),
+    };
+    outcome.unwrap_or_else(|failure| {
+        terminal.failure(&failure.to_string());
+        ExitCode::FAILURE
+    })
+}

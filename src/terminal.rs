@@ -1,0 +1,123 @@
+//! What a person or a script sees: results on standard output, everything else on standard error.
+
+use std::error::Error;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+use dataset::Dataset;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+/// Why a subcommand failed: one line for the user.
+pub(crate) type Failure = Box<dyn Error>;
+
+/// The terminal as the user's flags ask for it.
+pub(crate) struct Terminal {
+    pub(crate) json: bool,
+    pub(crate) quiet: bool,
+}
+
+/// A line above, below and under the header, and none between rows.
+const RULES: TableStyle = {
+    let rule = LineStyle::new('─', '─', '─', '─');
+    TableStyle::new().top_border(rule).header_separator(rule).bottom_border(rule)
+};
+
+/// Tables stay within this many columns, whatever the window.
+const TABLE_WIDTH: u16 = 100;
+
+impl Terminal {
+    pub(crate) const fn new(json: bool, quiet: bool) -> Self {
+        Self { json, quiet }
+    }
+
+    /// A result for people; not printed beside JSON.
+    pub(crate) fn say(&self, text: &str) -> Result<(), Failure> {
+        if !self.json {
+            writeln_to_stdout(text)?;
+        }
+        Ok(())
+    }
+
+    /// The one JSON document, when it is asked for.
+    pub(crate) fn document(&self, document: &impl Serialize) -> Result<(), Failure> {
+        if self.json {
+            writeln_to_stdout(&serde_json::to_string_pretty(document)?)?;
+        }
+        Ok(())
+    }
+
+    /// A remark on standard error.
+    pub(crate) fn remark(&self, text: &str) {
+        if !self.quiet {
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
+    }
+
+    /// The one message of a failure, on standard error even when quiet.
+    #[allow(clippy::unused_self)]
+    pub(crate) fn failure(&self, message: &str) {
+        let _ = writeln!(std::io::stderr(), "error: {}", message.replace('\n', "; "));
+    }
+
+    /// A progress bar over `total` steps with the time left; hidden when quiet or when nobody watches.
+    pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
+        if self.quiet || !std::io::stderr().is_terminal() {
+            return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        }
+        let bar = ProgressBar::new(total).with_message(what.to_owned());
+        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {human_pos}/{human_len}, {eta} left") {
+            bar.set_style(style);
+        }
+        bar
+    }
+}
+
+/// Writes a line; a reader that has gone away (`| head`) ends the program quietly and is no failure.
+fn writeln_to_stdout(text: &str) -> Result<(), Failure> {
+    match writeln!(std::io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+        result => Ok(result?),
+    }
+}
+
+/// A table whose first `left` columns are text and whose others are numbers.
+pub(crate) fn table(headers: &[&str], left: usize) -> Table {
+    let mut table = Table::new();
+    table.load_style(RULES).set_content_arrangement(ContentArrangement::Dynamic).set_width(TABLE_WIDTH);
+    table.set_header(headers);
+    for (position, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 1));
+        if position >= left {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// Reads datasets and passes their warnings on.
+pub(crate) fn read_datasets(paths: &[std::path::PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
+    paths
+        .iter()
+        .map(|path| {
+            let loaded = dataset::read(path)?;
+            for warning in &loaded.warnings {
+                terminal.remark(&format!("warning: {}: {warning}", path.display()));
+            }
+            let mut dataset = loaded.dataset;
+            dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+            Ok(dataset)
+        })
+        .collect()
+}
+
+fn folder_name(path: &Path) -> String {
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// A value in its table cell; a dash when there is none.
+pub(crate) fn cell(value: Option<f64>, scale: f64, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{:.decimals$}", value * scale))
+}
