@@ -79,7 +79,11 @@ fn show(report: &CalibrationReport, terminal: &Terminal) -> Result<(), Failure> 
             terminal.say(&error.clone())?;
             continue;
         }
-        terminal.say(&format!("{name}: {} runs used, {} values rejected", method.runs_used, method.runs_rejected.len()))?;
+        terminal.say(&format!(
+            "{name}: {} runs used, {} values rejected",
+            method.runs_used,
+            method.runs_rejected.len()
+        ))?;
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
         }

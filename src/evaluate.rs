@@ -69,8 +69,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 }
 
 fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
-    let headers =
-        ["calibration", "max", "max", "max final", "max final", "mean final", "mean final", "drift"];
+    let headers = ["calibration", "max", "max", "max final", "max final", "mean final", "mean final", "drift"];
     let units = ["", "mm", "deg", "mm", "deg", "mm", "deg", "%"];
     let mut table = table(&headers, 1);
     table.add_row(units);

@@ -64,7 +64,8 @@ fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Failure> {
         result.trials,
         result.points.len()
     ))?;
-    let axes: Vec<&str> = result.points.first().map_or(Vec::new(), |point| point.levels.keys().map(String::as_str).collect());
+    let axes: Vec<&str> =
+        result.points.first().map_or(Vec::new(), |point| point.levels.keys().map(String::as_str).collect());
     for (number, axis) in axes.iter().enumerate() {
         terminal.say(&format!("  axis {}: {axis}", number + 1))?;
     }
@@ -79,7 +80,10 @@ fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Failure> {
         let mut method = "";
         for estimator in &point.estimators {
             let percent = |pair: Option<(f64, f64)>| {
-                pair.map_or_else(|| "–".to_owned(), |(value, error)| percent(value / estimator.truth, error / estimator.truth))
+                pair.map_or_else(
+                    || "–".to_owned(),
+                    |(value, error)| percent(value / estimator.truth, error / estimator.truth),
+                )
             };
             let mark = if estimator.common_scale_observable { "" } else { "*" };
             blind |= !estimator.common_scale_observable;

@@ -5,7 +5,7 @@ use effects::{Command, Step};
 use kinematics::Wheels;
 use scenario::Robot;
 
-use crate::servo::{Servo, ServoError, SetPoint};
+use crate::servo::{Servo, ServoError, Travel};
 
 /// How the shafts turn over the next step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,11 @@ pub(crate) enum Actuator {
 impl Actuator {
     /// Starts a motion. `seen` is the share of a shaft's turn that its counter sees at a given motion: a controller drives *counts* to the target, so
     /// that a counter that misses some makes the wheel go farther.
-    pub(crate) fn begin(&mut self, command: &Command, seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> Result<(), ServoError> {
+    pub(crate) fn begin(
+        &mut self,
+        command: &Command,
+        seen: impl FnMut(Wheels<f64>) -> Wheels<f64>,
+    ) -> Result<(), ServoError> {
         match self {
             Self::ClosedForm(drive) => {
                 drive.begin(command, seen);
@@ -38,8 +42,13 @@ impl Actuator {
     /// Holds still.
     pub(crate) fn hold(&mut self, duration_s: f64) {
         match self {
-            Self::ClosedForm(drive) => *drive = ConstantSpeed { remaining_s: duration_s, rate_rad_s: Wheels::both(0.0), ..*drive },
-            Self::Stepping(pair) => pair.hold_s = duration_s,
+            Self::ClosedForm(drive) => {
+                *drive = ConstantSpeed { remaining_s: duration_s, rate_rad_s: Wheels::both(0.0), ..*drive }
+            }
+            Self::Stepping(pair) => {
+                pair.hold_s = duration_s;
+                pair.sample_if_due();
+            }
         }
     }
 
@@ -63,7 +72,8 @@ impl Actuator {
     pub(crate) fn count(&mut self, step: &Step) {
         match self {
             Self::ClosedForm(drive) => {
-                let counts = step.encoder_rad.zip_with(drive.counts_per_rad, |rad, counts_per_rad| rad * counts_per_rad);
+                let counts =
+                    step.encoder_rad.zip_with(drive.counts_per_rad, |rad, counts_per_rad| rad * counts_per_rad);
                 drive.counts = drive.counts.zip_with(counts, |sum, counts| sum + counts);
             }
             Self::Stepping(pair) => pair.count(step),
@@ -75,7 +85,9 @@ impl Actuator {
         match self {
             #[allow(clippy::cast_possible_truncation)] // 2^63 counts are beyond any run
             Self::ClosedForm(drive) => drive.counts.map(|counts| counts.floor() as i64),
-            Self::Stepping(pair) => pair.servos.as_ref().map(Servo::counts),
+            Self::Stepping(pair) => {
+                pair.servos.as_ref().map(Servo::counts).zip_with(pair.start_counts, |counts, start| counts + start)
+            }
         }
     }
 }
@@ -105,9 +117,9 @@ impl ConstantSpeed {
 
     fn begin(&mut self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) {
         let rad = command.travel_counts.zip_with(self.counts_per_rad, |counts, counts_per_rad| counts / counts_per_rad);
-        let duration_s = command.travel_counts.zip_with(command.speed_counts_s, |counts, speed| {
-            if counts == 0.0 { 0.0 } else { counts.abs() / speed }
-        });
+        let duration_s = command
+            .travel_counts
+            .zip_with(command.speed_counts_s, |counts, speed| if counts == 0.0 { 0.0 } else { counts.abs() / speed });
         let duration_s = duration_s.left.max(duration_s.right);
         if duration_s <= 0.0 {
             self.remaining_s = 0.0;
@@ -145,6 +157,8 @@ pub(crate) struct ServoPair {
     moving: bool,
     settling_s: f64,
     hold_s: f64,
+    /// Where the counters stood when the run began; the servos count from there.
+    start_counts: Wheels<i64>,
 }
 
 /// Longest wait for a wheel to settle on its target after its profile: friction may hold it a few counts away for good.
@@ -165,6 +179,8 @@ impl ServoPair {
             moving: false,
             settling_s: 0.0,
             hold_s: 0.0,
+            #[allow(clippy::cast_possible_truncation)] // within one wheel turn
+            start_counts: start_counts.map(|counts| counts.floor() as i64),
         })
     }
 
@@ -174,7 +190,7 @@ impl ServoPair {
             let counts = command.travel_counts[side];
             let speed_counts_s = command.speed_counts_s[side];
             if counts != 0.0 {
-                self.servos[side].command(SetPoint::Travel {
+                self.servos[side].command(Travel {
                     #[allow(clippy::cast_possible_truncation)] // targets are whole counts
                     counts: counts.round() as i64,
                     speed_counts_s,
@@ -185,7 +201,14 @@ impl ServoPair {
         }
         self.moving = true;
         self.settling_s = 0.0;
+        self.sample_if_due();
         Ok(())
+    }
+
+    /// Lets the controllers whose instant has come take their sample.
+    fn sample_if_due(&mut self) {
+        self.servos.left.sample_if_due();
+        self.servos.right.sample_if_due();
     }
 
     fn next_event_s(&self) -> Option<f64> {
@@ -209,8 +232,8 @@ impl ServoPair {
     fn count(&mut self, step: &Step) {
         for side in kinematics::Side::BOTH {
             self.servos[side].count(step.encoder_rad[side], step.dt_s);
-            self.servos[side].sample_if_due();
         }
+        self.sample_if_due();
         if self.moving {
             if self.servos.left.profile_done() && self.servos.right.profile_done() {
                 self.settling_s += step.dt_s;

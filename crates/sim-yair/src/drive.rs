@@ -146,11 +146,14 @@ impl<'a> Drive<'a> {
             self.sensitivity =
                 Wheels::from_sides(|_| 1.0 + self.setup.sensitivity_sigma * self.sensitivity_stream.normal());
         }
-        let mut probe = self.step(0.0, &ShaftMotion {
-            shaft_rad: Wheels::both(0.0),
-            rate_rad_s: Wheels::both(0.0),
-            acceleration_rad_s2: Wheels::both(0.0),
-        });
+        let mut probe = self.step(
+            0.0,
+            &ShaftMotion {
+                shaft_rad: Wheels::both(0.0),
+                rate_rad_s: Wheels::both(0.0),
+                acceleration_rad_s2: Wheels::both(0.0),
+            },
+        );
         let effects = &mut *self.effects;
         self.setup.actuator.begin(&command, |rate_rad_s| {
             probe.rate_rad_s = rate_rad_s;
@@ -313,8 +316,7 @@ fn command(robot: &Robot, nominal_geometry: &DriveGeometry, increment: Increment
     let m_per_count = nominal_geometry.m_per_rad().map(|m_per_rad| m_per_rad / counts_per_rad);
     let travel_counts = travel_m.zip_with(m_per_count, |travel_m, m_per_count| (travel_m / m_per_count).round());
     let longest = travel_counts.left.abs().max(travel_counts.right.abs()).max(1.0);
-    let speed_counts_s = travel_counts.zip_with(m_per_count, |counts, m_per_count| {
-        robot.cruise_speed_m_s / m_per_count * (counts.abs() / longest)
-    });
+    let speed_counts_s = travel_counts
+        .zip_with(m_per_count, |counts, m_per_count| robot.cruise_speed_m_s / m_per_count * (counts.abs() / longest));
     Command { travel_counts, speed_counts_s }
 }

@@ -217,6 +217,7 @@ impl Hctl1100 {
 
     /// Actual position at the last sample, 24-bit (R12–R14).
     #[must_use]
+    #[cfg(test)]
     pub(crate) const fn actual_position(&self) -> i32 {
         self.actual_position
     }

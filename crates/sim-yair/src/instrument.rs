@@ -30,8 +30,15 @@ impl Observer {
 
     /// A look at the moving robot at [`Self::next_look_s`].
     pub(crate) fn look(&mut self, sighting: Sighting, run: &mut Run) {
-        let Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, latency_s, lever_x_m, lever_y_m, lever_theta_rad, .. } =
-            self.instrument
+        let Instrument::MotionCapture {
+            sigma_xy_m,
+            sigma_theta_rad,
+            latency_s,
+            lever_x_m,
+            lever_y_m,
+            lever_theta_rad,
+            ..
+        } = self.instrument
         else {
             return;
         };

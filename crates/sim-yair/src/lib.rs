@@ -6,12 +6,12 @@
 
 mod actuator;
 mod drive;
-pub mod hctl1100;
+mod hctl1100;
 mod instrument;
-pub mod motor;
-pub mod quadrature;
+mod motor;
+mod quadrature;
 mod robot;
-pub mod servo;
+mod servo;
 mod simulation;
 
 pub use robot::{SimulatedRobot, SimulationError};

@@ -29,21 +29,15 @@ const HANDOVER_COUNTS: i64 = 1;
 /// A sample is due when less than this is missing, seconds: far above the rounding of summed steps, far below a clock period.
 const DUE_S: f64 = 1e-10;
 
-/// What a wheel is asked to do.
+/// What a wheel is asked to do: travel from its last target and hold there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum SetPoint {
-    /// Travel by a signed number of counts from the last target and hold there.
-    Travel {
-        /// Signed distance, counts.
-        counts: i64,
-        /// Cruising speed, counts/s.
-        speed_counts_s: f64,
-        /// Acceleration and deceleration, counts/s².
-        acceleration_counts_s2: f64,
-    },
-    /// Stop at once and hold the present position.
-    #[allow(dead_code, reason = "no protocol breaks a motion off yet")]
-    Hold,
+pub(crate) struct Travel {
+    /// Signed distance, counts.
+    pub(crate) counts: i64,
+    /// Cruising speed, counts/s.
+    pub(crate) speed_counts_s: f64,
+    /// Acceleration and deceleration, counts/s².
+    pub(crate) acceleration_counts_s2: f64,
 }
 
 /// The host's part of a move in a velocity mode.
@@ -124,43 +118,34 @@ impl Servo {
     ///
     /// # Errors
     /// For a travel while another runs, or one whose speed, acceleration or length the chip's registers cannot hold; nothing changes then.
-    pub(crate) fn command(&mut self, set_point: SetPoint) -> Result<(), ServoError> {
-        match set_point {
-            SetPoint::Hold => {
-                self.target = self.counts;
-                self.hold_target();
-            }
-            SetPoint::Travel { counts, speed_counts_s, acceleration_counts_s2 } => {
-                if !self.profile_done() {
-                    return Err(ServoError::ProfileRunning { remaining_counts: self.target - self.counts });
-                }
-                if counts.abs() > MOVE_MAX_COUNTS {
-                    return Err(ServoError::TooFar { counts });
-                }
-                let acceleration_q8 = self.chip.acceleration_q8(acceleration_counts_s2)?;
-                let cruise = match self.chip.mode() {
-                    ControlMode::Trapezoidal => {
-                        let max_velocity = self.chip.whole_velocity(speed_counts_s)?;
-                        self.chip.trapezoid(wrap_24(self.target + counts), max_velocity, acceleration_q8);
-                        None
-                    }
-                    ControlMode::IntegralVelocity => Some(f64::from(self.chip.whole_velocity(speed_counts_s)?)),
-                    ControlMode::ProportionalVelocity => {
-                        Some(f64::from(self.chip.fine_velocity_q4(speed_counts_s)?) / 16.0)
-                    }
-                };
-                let acceleration = f64::from(acceleration_q8) / 256.0;
-                self.target += counts;
-                self.host = cruise.filter(|_| counts != 0).map(|cruise| VelocityMove {
-                    direction: counts.signum(),
-                    cruise,
-                    acceleration,
-                    acceleration_q8,
-                    velocity: 0.0,
-                    standing_counts: 0.0,
-                });
-            }
+    pub(crate) fn command(&mut self, travel: Travel) -> Result<(), ServoError> {
+        let Travel { counts, speed_counts_s, acceleration_counts_s2 } = travel;
+        if !self.profile_done() {
+            return Err(ServoError::ProfileRunning { remaining_counts: self.target - self.counts });
         }
+        if counts.abs() > MOVE_MAX_COUNTS {
+            return Err(ServoError::TooFar { counts });
+        }
+        let acceleration_q8 = self.chip.acceleration_q8(acceleration_counts_s2)?;
+        let cruise = match self.chip.mode() {
+            ControlMode::Trapezoidal => {
+                let max_velocity = self.chip.whole_velocity(speed_counts_s)?;
+                self.chip.trapezoid(wrap_24(self.target + counts), max_velocity, acceleration_q8);
+                None
+            }
+            ControlMode::IntegralVelocity => Some(f64::from(self.chip.whole_velocity(speed_counts_s)?)),
+            ControlMode::ProportionalVelocity => Some(f64::from(self.chip.fine_velocity_q4(speed_counts_s)?) / 16.0),
+        };
+        let acceleration = f64::from(acceleration_q8) / 256.0;
+        self.target += counts;
+        self.host = cruise.filter(|_| counts != 0).map(|cruise| VelocityMove {
+            direction: counts.signum(),
+            cruise,
+            acceleration,
+            acceleration_q8,
+            velocity: 0.0,
+            standing_counts: 0.0,
+        });
         self.quiet_samples = 0;
         Ok(())
     }
@@ -265,7 +250,7 @@ impl Servo {
 
     /// The 24-bit actual position as it would be read now.
     #[must_use]
-    #[allow(dead_code, reason = "for hosts that read the chip; the engine logs unwrapped counts")]
+    #[cfg(test)]
     pub(crate) const fn position_register(&self) -> i32 {
         wrap_24(self.chip.actual_position() as i64 + self.counts - self.sampled_counts)
     }
@@ -314,8 +299,8 @@ mod tests {
         Servo::new(&controller(mode), &MOTOR, &ENCODER, 0.0007, 0.3).expect("a valid servo")
     }
 
-    fn travel(counts: i64) -> SetPoint {
-        SetPoint::Travel { counts, speed_counts_s: SPEED_COUNTS_S, acceleration_counts_s2: ACCELERATION_COUNTS_S2 }
+    fn travel(counts: i64) -> Travel {
+        Travel { counts, speed_counts_s: SPEED_COUNTS_S, acceleration_counts_s2: ACCELERATION_COUNTS_S2 }
     }
 
     fn step(servo: &mut Servo, longest_s: f64) -> f64 {
@@ -448,28 +433,13 @@ mod tests {
     }
 
     #[test]
-    fn hold_ends_a_move_where_it_is() {
-        for mode in MODES {
-            let mut servo = servo(mode);
-            servo.command(travel(40_000)).expect("a free servo");
-            let _ = run_until(&mut servo, 4.0, |servo| servo.counts() > 10_000);
-            assert!(matches!(servo.command(travel(5)), Err(ServoError::ProfileRunning { .. })));
-            servo.command(SetPoint::Hold).expect("hold is always allowed");
-            let held = servo.target;
-            let _ = run_until(&mut servo, 1.0, Servo::settled);
-            assert!((servo.counts() - held).abs() <= 2, "{mode:?}: as every move");
-        }
-    }
-
-    #[test]
     fn moves_off_the_registers_are_refused_and_change_nothing() {
         for mode in MODES {
             let mut servo = servo(mode);
             let fresh = servo.clone();
-            let fast =
-                SetPoint::Travel { counts: 5, speed_counts_s: 1.1e6, acceleration_counts_s2: ACCELERATION_COUNTS_S2 };
+            let fast = Travel { counts: 5, speed_counts_s: 1.1e6, acceleration_counts_s2: ACCELERATION_COUNTS_S2 };
             assert!(matches!(servo.command(fast), Err(ServoError::SpeedCeiling { .. })));
-            let lazy = SetPoint::Travel { counts: 5, speed_counts_s: SPEED_COUNTS_S, acceleration_counts_s2: 1.0 };
+            let lazy = Travel { counts: 5, speed_counts_s: SPEED_COUNTS_S, acceleration_counts_s2: 1.0 };
             assert!(matches!(servo.command(lazy), Err(ServoError::Acceleration { .. })));
             assert_eq!(servo.command(travel(1 << 23)), Err(ServoError::TooFar { counts: 1 << 23 }));
             assert_eq!(servo, fresh);
@@ -485,7 +455,7 @@ mod tests {
         for mode in MODES {
             let mut servo = servo(mode);
             for move_counts in [MOVE_MAX_COUNTS, 2_000] {
-                let set_point = SetPoint::Travel {
+                let set_point = Travel {
                     counts: move_counts,
                     speed_counts_s: 40_000.0,
                     acceleration_counts_s2: ACCELERATION_COUNTS_S2,
