@@ -20,7 +20,7 @@ pub enum Motion {
         /// Signed turn, radians, counter-clockwise.
         turn_rad: f64,
     },
-    /// A circular arc of the centre.
+    /// A circular arc of the centre. A robot whose wheel speeds lie on a lattice, as under an HCTL-1100, drives a radius that is a little off.
     Arc {
         /// Radius of the centre's path, metres, positive.
         radius_m: f64,

@@ -148,6 +148,11 @@ pub trait Forward: Send {
         None
     }
 
+    /// Does the effect depend on how fast the wheels turn? The closed form then takes each motion's ramps apart instead of moving at one speed.
+    fn depends_on_speed(&self) -> bool {
+        false
+    }
+
     /// How many counts make one recorded tick, when the effect coarsens the record: the dataset then states that resolution.
     fn counts_per_tick(&self) -> Option<u32> {
         None

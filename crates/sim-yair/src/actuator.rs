@@ -42,9 +42,7 @@ impl Actuator {
     /// Holds still.
     pub(crate) fn hold(&mut self, duration_s: f64) {
         match self {
-            Self::ClosedForm(drive) => {
-                *drive = ConstantSpeed { remaining_s: duration_s, rate_rad_s: Wheels::both(0.0), ..*drive }
-            }
+            Self::ClosedForm(drive) => drive.hold(duration_s),
             Self::Stepping(pair) => {
                 pair.hold_s = duration_s;
                 pair.sample_if_due();
@@ -55,7 +53,7 @@ impl Actuator {
     /// Seconds until the actuator wants a step to end; `None` when the motion is over.
     pub(crate) fn next_event_s(&self) -> Option<f64> {
         match self {
-            Self::ClosedForm(drive) => (drive.remaining_s > 0.0).then_some(drive.remaining_s),
+            Self::ClosedForm(drive) => drive.pieces.get(drive.current).map(|piece| piece.remaining_s),
             Self::Stepping(pair) => pair.next_event_s(),
         }
     }
@@ -72,9 +70,7 @@ impl Actuator {
     pub(crate) fn count(&mut self, step: &Step) {
         match self {
             Self::ClosedForm(drive) => {
-                let counts =
-                    step.encoder_rad.zip_with(drive.counts_per_rad, |rad, counts_per_rad| rad * counts_per_rad);
-                drive.counts = drive.counts.zip_with(counts, |sum, counts| sum + counts);
+                drive.counts = drive.counts.zip_with(step.encoder_rad, |sum, rad| sum + rad * drive.counts_per_rad);
             }
             Self::Stepping(pair) => pair.count(step),
         }
@@ -92,60 +88,123 @@ impl Actuator {
     }
 }
 
-/// The closed form: each wheel at constant speed from standstill to standstill.
+/// The closed form: constant speeds from standstill to standstill.
+///
+/// A motion is one piece at one speed, unless an effect depends on speed: then the trapezoid's ramps are two pieces each, at the speeds of the two-point
+/// Gauss rule, which integrates any cubic of the speed over a ramp exactly (so v², what slip costs), and the cruise is the fifth piece.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ConstantSpeed {
-    counts_per_rad: Wheels<f64>,
+    counts_per_rad: f64,
     counts: Wheels<f64>,
+    /// Acceleration of the faster wheel, counts/s², when ramps matter.
+    ramp_counts_s2: Option<f64>,
+    pieces: [Piece; MOST_PIECES],
+    /// The piece under way; `MOST_PIECES` at rest.
+    current: usize,
+}
+
+/// Constant rates for a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Piece {
     rate_rad_s: Wheels<f64>,
     remaining_s: f64,
 }
+
+const MOST_PIECES: usize = 5;
+
+/// Nodes of the two-point Gauss–Legendre rule on [0, 1]: ½ ∓ 1/(2√3).
+const GAUSS_NODES: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Rounds of the fixed point that finds the shaft's rate from the counted one; each gains the lost share's order, 1e-2 to 1e-3.
 const SEEN_ROUNDS: u32 = 12;
 
 impl ConstantSpeed {
-    pub(crate) fn new(robot: &Robot, start_counts: Wheels<f64>) -> Self {
-        let counts_per_rad = robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
+    pub(crate) fn new(robot: &Robot, start_counts: Wheels<f64>, ramps: bool) -> Self {
+        let counts_per_turn = robot.encoder.counts_per_wheel_turn();
+        let m_per_count = robot.wheel_diameter_m().map(|d_m| std::f64::consts::PI * d_m / counts_per_turn);
+        let rest = Piece { rate_rad_s: Wheels::both(0.0), remaining_s: 0.0 };
         Self {
-            counts_per_rad: Wheels::both(counts_per_rad),
+            counts_per_rad: counts_per_turn / std::f64::consts::TAU,
             counts: start_counts,
-            rate_rad_s: Wheels::both(0.0),
-            remaining_s: 0.0,
+            ramp_counts_s2: ramps.then(|| robot.acceleration_m_s2 / m_per_count.left),
+            pieces: [rest; MOST_PIECES],
+            current: MOST_PIECES,
         }
     }
 
     fn begin(&mut self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) {
-        let rad = command.travel_counts.zip_with(self.counts_per_rad, |counts, counts_per_rad| counts / counts_per_rad);
-        let duration_s = command
-            .travel_counts
-            .zip_with(command.speed_counts_s, |counts, speed| if counts == 0.0 { 0.0 } else { counts.abs() / speed });
-        let duration_s = duration_s.left.max(duration_s.right);
-        if duration_s <= 0.0 {
-            self.remaining_s = 0.0;
+        let travel = command.travel_counts;
+        let speed = command.speed_counts_s.left.max(command.speed_counts_s.right);
+        let longest = travel.left.abs().max(travel.right.abs());
+        if longest <= 0.0 {
+            self.current = MOST_PIECES;
             return;
         }
-        let counted_rad_s = rad.map(|rad| rad / duration_s);
-        self.rate_rad_s = counted_rad_s;
-        for _ in 0..SEEN_ROUNDS {
-            let share = seen(self.rate_rad_s);
-            let rate_rad_s = counted_rad_s.zip_with(share, |counted, share| counted / share);
-            if rate_rad_s == self.rate_rad_s {
-                break;
+        let mut pieces = [(0.0, 0.0); MOST_PIECES];
+        match self.ramp_counts_s2 {
+            None => pieces[MOST_PIECES - 1] = (speed, longest / speed),
+            Some(acceleration) => {
+                let peak = speed.min((longest * acceleration).sqrt());
+                let ramp_s = peak / acceleration;
+                let [slow, fast] = GAUSS_NODES;
+                pieces = [
+                    (slow * peak, 0.5 * ramp_s),
+                    (fast * peak, 0.5 * ramp_s),
+                    (peak, (longest / peak - ramp_s).max(0.0)),
+                    (fast * peak, 0.5 * ramp_s),
+                    (slow * peak, 0.5 * ramp_s),
+                ];
             }
-            self.rate_rad_s = rate_rad_s;
         }
-        self.remaining_s = duration_s;
+        self.current = 0;
+        for (piece, (speed, remaining_s)) in self.pieces.iter_mut().zip(pieces) {
+            piece.remaining_s = remaining_s;
+            if remaining_s > 0.0 {
+                let counted_rad_s = travel.map(|counts| counts / longest * speed / self.counts_per_rad);
+                piece.rate_rad_s = shaft_rate(counted_rad_s, &mut seen);
+            }
+        }
+        self.skip_finished();
+    }
+
+    fn hold(&mut self, duration_s: f64) {
+        self.current = MOST_PIECES - 1;
+        self.pieces[self.current] = Piece { rate_rad_s: Wheels::both(0.0), remaining_s: duration_s };
+        self.skip_finished();
+    }
+
+    fn skip_finished(&mut self) {
+        while self.current < MOST_PIECES && self.pieces[self.current].remaining_s <= 0.0 {
+            self.current += 1;
+        }
     }
 
     fn turn(&mut self, dt_s: f64) -> ShaftMotion {
-        self.remaining_s = if dt_s >= self.remaining_s { 0.0 } else { self.remaining_s - dt_s };
+        let mut rate_rad_s = Wheels::both(0.0);
+        if let Some(piece) = self.pieces.get_mut(self.current) {
+            rate_rad_s = piece.rate_rad_s;
+            piece.remaining_s = if dt_s >= piece.remaining_s { 0.0 } else { piece.remaining_s - dt_s };
+        }
+        self.skip_finished();
         ShaftMotion {
-            shaft_rad: self.rate_rad_s.map(|rate| rate * dt_s),
-            rate_rad_s: self.rate_rad_s,
+            shaft_rad: rate_rad_s.map(|rate| rate * dt_s),
+            rate_rad_s,
             acceleration_rad_s2: Wheels::both(0.0),
         }
     }
+}
+
+/// The rate of the shafts at which the counters see `counted_rad_s`.
+fn shaft_rate(counted_rad_s: Wheels<f64>, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> Wheels<f64> {
+    let mut rate_rad_s = counted_rad_s;
+    for _ in 0..SEEN_ROUNDS {
+        let next = counted_rad_s.zip_with(seen(rate_rad_s), |counted, share| counted / share);
+        if next == rate_rad_s {
+            break;
+        }
+        rate_rad_s = next;
+    }
+    rate_rad_s
 }
 
 /// Two servos that share no clock, and when their motion is over.

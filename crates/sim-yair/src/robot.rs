@@ -186,7 +186,10 @@ impl Platform for SimulatedRobot {
         }
         let start_counts = self.start_counts(&address);
         let actuator = match self.engine {
-            Engine::ClosedForm => Actuator::ClosedForm(ConstantSpeed::new(&self.robot, start_counts)),
+            Engine::ClosedForm => {
+                let ramps = self.effects.iter().any(|(_, effect)| effect.depends_on_speed());
+                Actuator::ClosedForm(ConstantSpeed::new(&self.robot, start_counts, ramps))
+            }
             Engine::Stepping { step_s } => {
                 Actuator::Stepping(Box::new(ServoPair::new(&self.robot, start_counts, step_s)?))
             }

@@ -49,6 +49,10 @@ impl Forward for State {
             }
         }
     }
+
+    fn depends_on_speed(&self) -> bool {
+        self.size.lost_share != 0.0
+    }
 }
 
 #[cfg(test)]

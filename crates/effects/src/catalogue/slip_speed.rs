@@ -42,6 +42,10 @@ impl Forward for State {
         let slip = step.contact_speed_m_s().map(|speed_m_s| self.size.slip_s_m * speed_m_s.abs());
         step.travel_m = step.travel_m.zip_with(slip, |travel_m, slip| travel_m * (1.0 - slip));
     }
+
+    fn depends_on_speed(&self) -> bool {
+        self.size.slip_s_m != 0.0
+    }
 }
 
 struct Term;

@@ -1,0 +1,29 @@
+# The checks of .ci/run one by one: same names, same commands.
+
+# Everything, as CI runs it
+ci:
+    .ci/run
+
+# Is the code formatted?
+fmt:
+    cargo fmt --all --check
+
+# Lints, as errors
+lint:
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# All tests, examples in the documentation included
+test:
+    cargo test --workspace
+
+# The paper's experiments, Monte Carlo
+sweep:
+    cargo run --release -- sweep scenarios/paper.toml
+
+# The library's documentation, warnings as errors
+doc:
+    env RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps
+
+# Do the benches compile?
+bench:
+    cargo bench --workspace --no-run
