@@ -47,8 +47,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     // One method asked for by name and not applicable is a failure; the JSON still says so in its place.
     let refused = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().err());
     let nothing_found = outcomes.iter().all(|(_, outcome)| outcome.is_err());
-    terminal.document(&report)?;
     if let (true, Some(refused)) = (nothing_found, refused) {
+        terminal.document(&report)?;
         return Err(refused.to_string().into());
     }
     if let Some(out) = &arguments.out {
@@ -56,6 +56,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         terminal.remark(&format!("calibration in {}", out.display()));
     }
     show(&report, terminal)?;
+    terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
 }
 

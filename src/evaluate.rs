@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     #[arg(long = "calibration", value_name = "FILE")]
     calibrations: Vec<PathBuf>,
     /// Exit with 3 when the last calibration drifts more than this, in per cent of the distance driven.
-    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
     max_drift: Option<f64>,
 }
 
@@ -69,10 +69,17 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 }
 
 fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
-    let headers = ["calibration", "max", "max", "max final", "max final", "mean final", "mean final", "drift"];
-    let units = ["", "mm", "deg", "mm", "deg", "mm", "deg", "%"];
+    let headers = [
+        "calibration",
+        "max\nmm",
+        "max\ndeg",
+        "max final\nmm",
+        "max final\ndeg",
+        "mean final\nmm",
+        "mean final\ndeg",
+        "drift\n%",
+    ];
     let mut table = table(&headers, 1);
-    table.add_row(units);
     for drift in calibrations {
         let degrees = 180.0 / std::f64::consts::PI;
         table.add_row([
@@ -90,6 +97,13 @@ fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Fa
     for drift in calibrations {
         if let Some(why) = &drift.why_null {
             terminal.say(&format!("{}: {why}", drift.name))?;
+            continue;
+        }
+        // Some runs only: what is left out of the sums must be seen.
+        let without = drift.runs.iter().filter(|run| run.why_null.is_some());
+        if let Some((run, why)) = without.clone().find_map(|run| Some((&run.run, run.why_null?))) {
+            let (name, all, without) = (&drift.name, drift.runs.len(), without.count());
+            terminal.say(&format!("{name}: {without} of {all} runs are left out; {run}: {why}"))?;
         }
     }
     Ok(())

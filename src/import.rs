@@ -36,13 +36,13 @@ fn formats() -> String {
 #[derive(Serialize)]
 struct Document {
     format: String,
-    source: PathBuf,
+    source: String,
     datasets: Vec<Imported>,
 }
 
 #[derive(Serialize)]
 struct Imported {
-    dataset: PathBuf,
+    dataset: String,
     runs: usize,
     odometry_rows: usize,
 }
@@ -51,19 +51,36 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let importer = importer(&arguments.format).ok_or("no such format")?;
     let sessions = (importer.read)(&arguments.source)?;
     let existing = if arguments.force { Existing::ReplaceDataset } else { Existing::Refuse };
-    let several = sessions.len() > 1;
+    let dirs = folders(arguments, &sessions)?;
     let mut datasets = Vec::with_capacity(sessions.len());
-    for session in &sessions {
+    for (session, dir) in sessions.iter().zip(dirs) {
         for warning in &session.warnings {
             terminal.remark(&format!("warning: {}: {warning}", session.name));
         }
-        let dir = if several { arguments.out.join(&session.name) } else { arguments.out.clone() };
         dataset::write(&session.dataset, &dir, existing)?;
         let runs = &session.dataset.runs;
         let odometry_rows = runs.iter().map(|run| run.odometry.t_s.len()).sum();
         terminal.say(&format!("{} runs, {odometry_rows} odometry rows in {}", runs.len(), dir.display()))?;
-        datasets.push(Imported { dataset: dir, runs: runs.len(), odometry_rows });
+        datasets.push(Imported { dataset: dir.display().to_string(), runs: runs.len(), odometry_rows });
     }
-    terminal.document(&Document { format: arguments.format.clone(), source: arguments.source.clone(), datasets })?;
+    terminal.document(&Document { format: arguments.format.clone(), source: arguments.source.display().to_string(), datasets })?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A folder for each session. Refuses before the first is written, so that an import is done as a whole.
+fn folders(arguments: &Arguments, sessions: &[dataset::import::Imported]) -> Result<Vec<PathBuf>, Failure> {
+    let [_, _, ..] = sessions else { return Ok(vec![arguments.out.clone()]) };
+    let dirs: Vec<PathBuf> = sessions.iter().map(|session| arguments.out.join(&session.name)).collect();
+    for (position, dir) in dirs.iter().enumerate() {
+        if dirs[..position].contains(dir) {
+            let why = "two sessions of the source have this name; nothing was written: import them one by one";
+            return Err(format!("{}: {why}", dir.display()).into());
+        }
+        let taken = dir.read_dir().map_or_else(|_| dir.exists(), |mut entries| entries.next().is_some());
+        if taken && !arguments.force {
+            let why = "already exists and is not empty; nothing was written: choose another folder, or give --force";
+            return Err(format!("{}: {why}", dir.display()).into());
+        }
+    }
+    Ok(dirs)
 }

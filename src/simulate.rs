@@ -1,5 +1,6 @@
 //! `yair simulate SCENARIO --out DIR`
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,6 +8,7 @@ use clap::Args;
 use dataset::Existing;
 use scenario::Scenario;
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use crate::terminal::{Failure, Terminal};
 
@@ -34,8 +36,8 @@ struct Document {
     scenario: String,
     seed: u64,
     trial: u64,
-    dataset: PathBuf,
-    truth: PathBuf,
+    dataset: String,
+    truth: String,
     runs: usize,
     odometry_rows: usize,
     truth_rows: usize,
@@ -47,17 +49,24 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let seed = arguments.seed.unwrap_or(scenario.seed);
     let simulation = sim_yair::simulate(&scenario, seed, arguments.trial)?;
     let existing = if arguments.force { Existing::ReplaceDataset } else { Existing::Refuse };
+    // The truth waits in a temporary file until the dataset stands: both are written or none.
+    let truth = truth_path(&arguments.out)?;
+    if truth.is_dir() || (truth.exists() && !arguments.force) {
+        let why = "already exists; nothing was written: choose another folder, or give --force to replace a file";
+        return Err(format!("{}: {why}", truth.display()).into());
+    }
+    create_parents(&truth)?;
+    let waiting = staged(&truth, &serde_json::to_vec_pretty(&simulation.truth)?)?;
     dataset::write(&simulation.dataset, &arguments.out, existing)?;
-    let truth = truth_path(&arguments.out);
-    write_whole(&truth, &serde_json::to_vec_pretty(&simulation.truth)?)?;
+    waiting.persist(&truth).map_err(|error| format!("{}: {}", truth.display(), error.error))?;
 
     let runs = &simulation.dataset.runs;
     let document = Document {
         scenario: scenario.name,
         seed,
         trial: arguments.trial,
-        dataset: arguments.out.clone(),
-        truth,
+        dataset: arguments.out.display().to_string(),
+        truth: truth.display().to_string(),
         runs: runs.len(),
         odometry_rows: runs.iter().map(|run| run.odometry.t_s.len()).sum(),
         truth_rows: runs.iter().map(|run| run.truth.len()).sum(),
@@ -69,26 +78,52 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         document.odometry_rows,
         document.truth_rows,
         document.point_rows,
-        document.dataset.display(),
-        document.truth.display()
+        document.dataset,
+        document.truth
     ))?;
     terminal.document(&document)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// `DIR.truth.json`, the dataset folder's sibling.
-fn truth_path(out: &Path) -> PathBuf {
-    let mut name = out.components().as_path().as_os_str().to_owned();
+/// `DIR.truth.json`, the dataset folder's sibling, also where DIR is `.` or ends in `..`.
+fn truth_path(out: &Path) -> Result<PathBuf, Failure> {
+    let out = if out.file_name().is_some() {
+        out.components().as_path().to_owned()
+    } else {
+        out.canonicalize().map_err(|error| format!("{}: {error}", out.display()))?
+    };
+    let mut name = out.into_os_string();
     name.push(".truth.json");
-    PathBuf::from(name)
+    Ok(PathBuf::from(name))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn create_parents(path: &Path) -> Result<(), Failure> {
+    let folder = folder_of(path);
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
 }
 
 /// Writes a file in one piece.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let failed = |error: std::io::Error| format!("{}: {error}", path.display());
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    std::io::Write::write_all(&mut file, bytes).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
+    staged(path, bytes)?.persist(path).map_err(|error| format!("{}: {}", path.display(), error.error))?;
     Ok(())
+}
+
+/// A temporary file beside `path`, with the permissions of any other file of the user, that is to become `path`.
+fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
+    let folder = folder_of(path);
+    if !folder.is_dir() {
+        return Err(format!("{}: there is no folder {}", path.display(), folder.display()).into());
+    }
+    // The temporary file's random name would tell the user nothing: only the kind of the error is shown.
+    let failed = |error: io::Error| format!("{}: {}", path.display(), error.kind());
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    Ok(file)
 }

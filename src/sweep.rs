@@ -1,6 +1,7 @@
 //! `yair sweep SCENARIO [--trials N] [--jobs J] [--out DIR]`
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -19,8 +20,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N")]
     trials: Option<u64>,
     /// Threads; 0 = one a core. The result does not depend on it.
-    #[arg(long, value_name = "J", default_value_t = 0)]
-    jobs: usize,
+    #[arg(long, value_name = "J", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=MOST_JOBS))]
+    jobs: u16,
     /// Seed of every random draw, in place of the scenario's.
     #[arg(long)]
     seed: Option<u64>,
@@ -29,12 +30,26 @@ pub(crate) struct Arguments {
     out: Option<PathBuf>,
 }
 
+/// More threads than any machine of ours has cores; a typing error beyond.
+const MOST_JOBS: i64 = 1024;
+
+/// More than a year of any scenario; a typing error beyond, whose bookkeeping alone would not fit into memory.
+const MOST_TRIALS: u64 = 100_000_000;
+
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
-    let plan = SweepPlan::new(&scenario, arguments.trials, arguments.seed)?;
+    let file = arguments.scenario.display();
+    let trials = arguments.trials.or(scenario.sweep.as_ref().map(|sweep| sweep.trials));
+    if let Some(trials) = trials.filter(|trials| *trials > MOST_TRIALS) {
+        return Err(format!("{file}: {trials} trials at each point; expected at most {MOST_TRIALS}").into());
+    }
+    let plan = SweepPlan::new(&scenario, arguments.trials, arguments.seed).map_err(|error| format!("{file}: {error}"))?;
+    if let Some(out) = &arguments.out {
+        can_be_written(out)?;
+    }
     let bar = terminal.progress(plan.total_trials(), "trials");
     let started = Instant::now();
-    let result = plan.run(arguments.jobs, &|trials| bar.inc(trials))?;
+    let result = plan.run(usize::from(arguments.jobs), &|trials| bar.inc(trials))?;
     bar.finish_and_clear();
     let elapsed_s = started.elapsed().as_secs_f64();
     if let Some(out) = &arguments.out {
@@ -44,6 +59,24 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     terminal.remark(&format!("{} trials in {elapsed_s:.1} s", plan.total_trials()));
     terminal.document(&result)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Fails before the trials are run, not after, when the results could not be written. Leaves nothing behind.
+fn can_be_written(out: &Path) -> Result<(), Failure> {
+    let failed = |error: io::Error| format!("{}: cannot write results there: {}", out.display(), error.kind());
+    if out.exists() {
+        tempfile::tempfile_in(out).map_err(failed)?;
+        return Ok(());
+    }
+    let made = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    let made: Vec<&Path> = made.collect();
+    std::fs::create_dir_all(out).map_err(failed)?;
+    let probed = tempfile::tempfile_in(out).map_err(failed);
+    for folder in made {
+        // Only what is still empty goes.
+        let _ = std::fs::remove_dir(folder);
+    }
+    probed.map(drop).map_err(Failure::from)
 }
 
 /// A parameter as the paper writes it.

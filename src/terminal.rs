@@ -1,8 +1,9 @@
 //! What a person or a script sees: results on standard output, everything else on standard error.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use dataset::Dataset;
@@ -74,11 +75,12 @@ impl Terminal {
     }
 }
 
-/// Writes a line; a reader that has gone away (`| head`) ends the program quietly and is no failure.
+/// Writes a line. A reader that has gone away (`| head`) is no failure, and stops nothing else: files are still written and the exit code still says
+/// what it has to say.
 fn writeln_to_stdout(text: &str) -> Result<(), Failure> {
     match writeln!(std::io::stdout().lock(), "{text}") {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
-        result => Ok(result?),
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.map_err(|error| format!("standard output: {error}").into()),
     }
 }
 
@@ -97,7 +99,12 @@ pub(crate) fn table(headers: &[&str], left: usize) -> Table {
 }
 
 /// Reads datasets and passes their warnings on.
-pub(crate) fn read_datasets(paths: &[std::path::PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
+pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
+    // The same runs twice would halve every variance.
+    let mut seen = BTreeSet::new();
+    if let Some(twice) = paths.iter().find(|path| path.canonicalize().is_ok_and(|real| !seen.insert(real))) {
+        return Err(format!("{}: the same dataset is given twice; give each session once", twice.display()).into());
+    }
     paths
         .iter()
         .map(|path| {

@@ -86,7 +86,8 @@ fn complaints(crates: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
             continue;
         };
         let wrong = used.iter().filter(|used| !allowed.contains(&used.as_str()));
-        complaints.extend(wrong.map(|used| format!("{user} must not depend on {used} (the arrows in ARCHITECTURE.md)")));
+        complaints
+            .extend(wrong.map(|used| format!("{user} must not depend on {used} (the arrows in ARCHITECTURE.md)")));
     }
     complaints
 }
@@ -156,7 +157,8 @@ fn the_repository_names_no_path_of_a_machine_and_no_registry() {
         for registry in registries {
             assert!(!content.contains(registry), "{}: {registry}", file.display());
         }
-        let other = content.lines().find(|line| line.starts_with("source = ") && line.contains("+") && !line.contains(index));
+        let other =
+            content.lines().find(|line| line.starts_with("source = ") && line.contains("+") && !line.contains(index));
         assert!(other.is_none() || !file.ends_with("Cargo.lock"), "{}: {other:?}", file.display());
     }
 }
@@ -176,7 +178,12 @@ fn every_scenario_file_parses_survives_writing_and_can_be_simulated() {
         }
         for case in cases {
             let ready = SimulatedRobot::new(&case, case.seed, 0);
-            assert!(ready.is_ok(), "{}: {}", file.display(), ready.err().map(|error| error.to_string()).unwrap_or_default());
+            assert!(
+                ready.is_ok(),
+                "{}: {}",
+                file.display(),
+                ready.err().map(|error| error.to_string()).unwrap_or_default()
+            );
         }
     }
 }
@@ -208,7 +215,8 @@ fn ci_steps() -> Vec<(String, String)> {
 fn the_readme_the_justfile_and_ci_run_the_same_commands() {
     let steps = ci_steps();
     let readme = blocks(&text("README.md"));
-    let commands: Vec<&String> = readme.iter().filter(|(language, _)| language == "sh").flat_map(|(_, lines)| lines).collect();
+    let commands: Vec<&String> =
+        readme.iter().filter(|(language, _)| language == "sh").flat_map(|(_, lines)| lines).collect();
     for command in &commands[..2] {
         assert!(steps.iter().any(|(_, step)| step == *command), "README's \"{command}\" is no step of .ci/run");
     }
@@ -216,8 +224,11 @@ fn the_readme_the_justfile_and_ci_run_the_same_commands() {
     for (name, command) in &steps {
         assert!(justfile.contains(&format!("\n{name}:\n    {command}\n")), "justfile lacks {name}: {command}");
     }
-    let recipes: BTreeSet<&str> =
-        justfile.lines().filter(|line| !line.starts_with([' ', '#'])).filter_map(|line| line.strip_suffix(':')).collect();
+    let recipes: BTreeSet<&str> = justfile
+        .lines()
+        .filter(|line| !line.starts_with([' ', '#']))
+        .filter_map(|line| line.strip_suffix(':'))
+        .collect();
     let expected: BTreeSet<&str> = steps.iter().map(|(name, _)| name.as_str()).chain(["ci"]).collect();
     assert_eq!(recipes, expected);
 }
@@ -226,8 +237,10 @@ fn the_readme_the_justfile_and_ci_run_the_same_commands() {
 fn the_readme_shows_the_library_example_that_is_tested() {
     let source = text("src/lib.rs");
     let tested = source.lines().skip_while(|line| *line != "//! ```").skip(1).take_while(|line| *line != "//! ```");
-    let tested: Vec<&str> =
-        tested.map(|line| line.trim_start_matches("//!").trim_start_matches(' ')).filter(|line| !line.starts_with("# ")).collect();
+    let tested: Vec<&str> = tested
+        .map(|line| line.trim_start_matches("//!").trim_start_matches(' '))
+        .filter(|line| !line.starts_with("# "))
+        .collect();
     let readme = blocks(&text("README.md"));
     let (_, shown) = readme.iter().find(|(language, _)| language == "rust").expect("README has an example");
     assert_eq!(shown, &tested);
@@ -242,7 +255,7 @@ fn real_data() -> Option<PathBuf> {
 }
 
 /// How a document names the originals of the real data, and where they are under the data's folder.
-const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom/"), ("calibration/data/", "khepera/")];
+const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom/"), ("calibration/reference-output/", "khepera/")];
 
 /// Runs one command line of a document and returns its standard output, or `None` when it needs data that are not here.
 fn run(line: &str, folder: &Path) -> Option<String> {
@@ -255,7 +268,8 @@ fn run(line: &str, folder: &Path) -> Option<String> {
             *word = root().join(&*word).to_string_lossy().into_owned();
         }
     }
-    let output = assert_cmd::Command::cargo_bin("yair").expect("built").args(words).current_dir(folder).output().expect("runs");
+    let output =
+        assert_cmd::Command::cargo_bin("yair").expect("built").args(words).current_dir(folder).output().expect("runs");
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     Some(String::from_utf8(output.stdout).expect("text"))
 }
@@ -263,7 +277,8 @@ fn run(line: &str, folder: &Path) -> Option<String> {
 /// Whether a pasted output is the real one; a pasted line that begins with … stands for any number of lines, and elapsed times are not compared.
 fn agrees(pasted: &[String], real: &str) -> Result<(), String> {
     let real: Vec<&str> = real.lines().map(str::trim_end).collect();
-    let pasted: Vec<&str> = pasted.iter().map(|line| line.trim_end()).filter(|line| !line.contains(" trials in ")).collect();
+    let pasted: Vec<&str> =
+        pasted.iter().map(|line| line.trim_end()).filter(|line| !line.contains(" trials in ")).collect();
     let mut from = 0;
     let parts: Vec<&[&str]> = pasted.split(|line| line.starts_with('…')).collect();
     for (number, part) in parts.iter().enumerate() {
@@ -299,11 +314,17 @@ fn the_documents_show_what_the_commands_print() {
         for (language, lines) in blocks(&text(document)) {
             let ours = |line: &&String| line.starts_with("yair ") || line.starts_with("cargo run --release -- ");
             match language.as_str() {
-                "sh" => printed = lines.iter().filter(ours).map(|line| run(line, folder.path())).collect::<Option<String>>(),
+                "sh" => {
+                    printed = lines.iter().filter(ours).map(|line| run(line, folder.path())).collect::<Option<String>>()
+                }
                 "text" => {
                     if let Some(printed) = printed.take().filter(|printed| !printed.is_empty()) {
                         let verdict = agrees(&lines, &printed);
-                        assert!(verdict.is_ok(), "{document}: {}\nall that was printed:\n{printed}", verdict.unwrap_err());
+                        assert!(
+                            verdict.is_ok(),
+                            "{document}: {}\nall that was printed:\n{printed}",
+                            verdict.unwrap_err()
+                        );
                         compared += 1;
                     }
                 }
@@ -312,6 +333,41 @@ fn the_documents_show_what_the_commands_print() {
         }
     }
     assert!(compared >= 2, "the README's sweep and round trip were compared");
+}
+
+/// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.
+#[test]
+fn published_optiodom_squares_stand_in_the_document_as_found() {
+    if real_data().is_none() {
+        return;
+    }
+    let document = text("docs/calibration.md");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let json = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&run(line, folder.path()).expect("there are data")).expect("JSON")
+    };
+    let mut sessions = 0;
+    for row in document.lines().filter(|line| line.starts_with("| 2306")) {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let session = cells[0];
+        json(&format!("yair import optiodom optiodom/data/diff/square/{session} --out {session} --json"));
+        let found = json(&format!("yair calibrate {session} --method umbmark --out {session}.toml --json"));
+        let drift = json(&format!("yair evaluate {session} --calibration {session}.toml --json"));
+        let parameter = |key: &str| &found["methods"][0]["parameters"][key]["value"];
+        let here = [
+            parameter("wheel_separation_m"),
+            parameter("right_wheel_diameter_m"),
+            parameter("left_wheel_diameter_m"),
+            &drift["calibrations"][0]["max_final_position_m"],
+            &drift["calibrations"][1]["max_final_position_m"],
+        ];
+        for (cell, value) in cells[1..].iter().zip(here) {
+            let (shown, _published) = cell.split_once(" / ").expect("here / published");
+            assert_eq!(shown, format!("{:.3}", 1e3 * value.as_f64().expect("a number")), "{row}");
+        }
+        sessions += 1;
+    }
+    assert_eq!(sessions, 4);
 }
 
 /// The keys that a part of a scenario accepts, by the message with which it refuses another one.
@@ -324,7 +380,9 @@ fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
 
 #[test]
 fn the_scenario_document_has_every_key_and_every_effect() {
-    use scenario::{Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, ProtocolPart, Robot, Sweep};
+    use scenario::{
+        Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, ProtocolPart, Robot, Sweep,
+    };
     let document = text("docs/scenario.md");
     let parts = [
         ("", keys::<Scenario>("")),

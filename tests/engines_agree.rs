@@ -131,7 +131,7 @@ fn an_umbmark_square_scatters_alike_in_both_engines() {
     agree(&side.repeat(4), 3000, 40_000);
 }
 
-/// The share that the term adds to the spread of UMBmark's end positions: about 5 % of the standard deviation, as the digest's authors found.
+/// The term itself: σ_θ²L²/12 across a straight.
 #[test]
 fn the_noise_inside_a_straight_is_a_twelfth_of_its_square() {
     let (length_m, base_m) = (4.0, 0.363);

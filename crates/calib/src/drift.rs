@@ -213,3 +213,92 @@ fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {
         runs,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use kinematics::Wheels;
+
+    /// A straight metre in ten rows on wheels of 1 mm a tick, whose truth is 2 % longer and stamped between the rows.
+    fn dataset(truth: Vec<TruthSample>) -> Dataset {
+        let ticks: Vec<i64> = (0..=10).map(|k| 100 * k).collect();
+        let run = Run {
+            info: RunInfo { id: "run-01".to_owned(), ..RunInfo::default() },
+            odometry: Odometry {
+                t_s: (0..=10).map(f64::from).collect(),
+                wheels: WheelLog::Ticks(Wheels::both(ticks)),
+                ..Odometry::default()
+            },
+            truth,
+            ..Run::default()
+        };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 1.0 / std::f64::consts::PI,
+                right_wheel_diameter_m: 1.0 / std::f64::consts::PI,
+                wheel_separation_m: 0.3,
+                ticks_per_rev: Some(1000.0),
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![run],
+        }
+    }
+
+    fn truth(theta_rad: Option<f64>) -> Vec<TruthSample> {
+        [0.0, 2.5, 10.0, 11.0].map(|t_s| TruthSample::new(t_s, 5.0, 1.0 + 0.102 * t_s, theta_rad)).to_vec()
+    }
+
+    #[test]
+    fn drift_is_measured_from_the_first_truth_pose_at_the_truths_instants() {
+        let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2)));
+        let drift = evaluate(&[dataset.session()], None, false);
+        let run = &drift.runs[0];
+        // 2 % of a metre at the end; the sample at 11 s is after the log's end and left out. A few roundings.
+        assert!((run.final_position_m.expect("poses") - 0.02).abs() < 1e-14);
+        assert!((run.max_position_m.expect("poses") - 0.02).abs() < 1e-14);
+        assert!((run.length_m - 1.0).abs() < 1e-14);
+        assert!((drift.drift_percent.expect("length") - 2.0).abs() < 1e-12);
+        assert!(run.max_heading_rad.expect("poses") < 1e-15);
+    }
+
+    #[test]
+    fn between_rows_the_pose_is_interpolated() {
+        let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2))[..2].to_vec());
+        let drift = evaluate(&[dataset.session()], None, false);
+        assert!((drift.runs[0].final_position_m.expect("poses") - 0.005).abs() < 1e-14);
+    }
+
+    #[test]
+    fn truth_that_begins_late_starts_the_odometry_there() {
+        let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2))[1..].to_vec());
+        let drift = evaluate(&[dataset.session()], None, false);
+        assert!((drift.runs[0].final_position_m.expect("poses") - 0.015).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_calibration_with_the_right_scale_does_not_drift_and_a_mounted_instrument_is_taken_into_account() {
+        let mut values: std::collections::BTreeMap<String, f64> =
+            [("left_m_per_tick".to_owned(), 1.02e-3), ("right_m_per_tick".to_owned(), 1.02e-3)].into();
+        values.insert("instrument_theta_rad".to_owned(), 0.2);
+        let calibration = NamedCalibration { name: "right".to_owned(), values };
+        let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2 + 0.2)));
+        let drift = evaluate(&[dataset.session()], Some(&calibration), true);
+        assert!(drift.max_position_m.expect("poses") < 1e-14);
+        assert!(drift.max_heading_rad.expect("poses") < 1e-15);
+        assert_eq!(drift.runs[0].dataset.as_deref(), Some("dataset"));
+    }
+
+    #[test]
+    fn what_the_truth_cannot_give_is_null_with_a_reason() {
+        for (dataset, reason) in [(dataset(truth(None)), "position-only"), (dataset(Vec::new()), "no absolute truth")] {
+            let drift = evaluate(&[dataset.session()], None, false);
+            assert_eq!((drift.drift_percent, drift.max_position_m), (None, None));
+            assert!(drift.why_null.expect("a reason").contains(reason));
+            assert!(drift.runs[0].why_null.expect("a reason").contains(reason));
+        }
+    }
+}

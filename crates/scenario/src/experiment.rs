@@ -391,3 +391,56 @@ impl Scenario {
         range("protocol.runs", runs as f64, runs > 0, "at least one run in all")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAPER: &str = include_str!("../../../scenarios/paper.toml");
+
+    fn error(text: &str) -> String {
+        Scenario::parse(text, "x.toml").expect_err("not a scenario").to_string()
+    }
+
+    #[test]
+    fn a_scenario_is_written_as_it_was_read() {
+        let scenario = Scenario::parse(PAPER, "paper.toml").expect("the shipped scenario");
+        let text = scenario.to_toml().expect("serialises");
+        assert_eq!(Scenario::parse(&text, "again").expect("parses"), scenario);
+    }
+
+    #[test]
+    fn paper_table_1_and_2_are_the_robots_true_geometry() {
+        let scenario = Scenario::parse(PAPER, "paper.toml").expect("the shipped scenario");
+        let geometry = scenario.true_geometry().expect("valid");
+        let counts_per_pulse = 80.0;
+        let per_pulse =
+            geometry.m_per_count(scenario.robot.encoder.counts_per_wheel_turn() / counts_per_pulse).expect("valid");
+        // The shipped E_d is 1.0322/1.0334 to the last bit of a double or two.
+        assert!((per_pulse.left * 1e3 - 1.0334).abs() < 1e-14);
+        assert!((per_pulse.right * 1e3 - 1.0322).abs() < 1e-14);
+        assert_eq!(geometry.wheel_separation_m(), 0.363);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let line_of = |needle: &str| PAPER[..PAPER.find(needle).expect("in the file")].matches('\n').count() + 1;
+        let wrong_unit = error(&PAPER.replace("wheel_separation_m =", "wheel_separation_mm ="));
+        assert!(wrong_unit.starts_with(&format!("x.toml:{}:", line_of("wheel_separation_m ="))), "{wrong_unit}");
+        assert!(wrong_unit.contains("wheel_separation_m"), "{wrong_unit}");
+        let unknown_effect = error(&PAPER.replace("kind = \"wheel_scale\"", "kind = \"wheel_size\""));
+        assert!(
+            unknown_effect.contains("wheel_size") && unknown_effect.contains("contact_patch_wheelbase"),
+            "{unknown_effect}"
+        );
+        let missing = error(&PAPER.replace("gear_ratio = 50.26548245743669", ""));
+        assert!(missing.contains("gear_ratio"), "{missing}");
+        let size = error(&PAPER.replace("scale = 1.0328", "scale = -1.0328"));
+        assert!(size.contains("wheel_scale: scale is -1.0328"), "{size}");
+        let range = error(&PAPER.replace("cruise_speed_m_s = 0.25", "cruise_speed_m_s = 0.0"));
+        assert!(range.contains("robot.cruise_speed_m_s is 0"), "{range}");
+        for message in [wrong_unit, unknown_effect, missing, size, range] {
+            assert!(!message.contains('\n'), "{message}");
+        }
+    }
+}

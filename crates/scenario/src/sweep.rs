@@ -111,3 +111,60 @@ fn set_number(table: &mut Table, key: &str, level: f64) -> Result<(), String> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paper(axes: &[(&str, &[f64])]) -> Scenario {
+        let mut scenario =
+            Scenario::parse(include_str!("../../../scenarios/paper.toml"), "paper.toml").expect("shipped");
+        let axes = axes.iter().map(|(key, levels)| ((*key).to_owned(), levels.to_vec())).collect();
+        scenario.sweep = Some(Sweep { trials: 10, methods: vec!["direct".to_owned()], axes });
+        scenario
+    }
+
+    fn points(axes: &[(&str, &[f64])]) -> Result<Vec<Point>, ScenarioError> {
+        let scenario = paper(axes);
+        scenario.sweep.as_ref().expect("set above").points(&scenario, "x.toml")
+    }
+
+    #[test]
+    fn levels_reach_floats_integers_and_lists() {
+        let points = points(&[
+            ("effect.contact_patch_wheelbase.sigma_m", &[0.0, 0.002]),
+            ("noise.wheel_sigma_m_per_sqrt_m", &[0.25]),
+            ("protocol.0.runs", &[7.0, 8.0, 9.0]),
+        ])
+        .expect("all keys exist");
+        assert_eq!(points.len(), 6);
+        let last = &points[5];
+        assert_eq!(last.levels.iter().map(|(_, level)| *level).collect::<Vec<_>>(), [0.002, 0.25, 9.0]);
+        assert_eq!(last.scenario.noise.wheel_sigma_m_per_sqrt_m, 0.25);
+        assert_eq!(last.scenario.programs().iter().filter(|program| program.id.starts_with("straight")).count(), 9);
+        let effects::Effect::ContactPatchWheelbase(patch) = &last.scenario.effects[2] else {
+            panic!("third in the file")
+        };
+        assert_eq!(patch.sigma_m, 0.002);
+    }
+
+    #[test]
+    fn without_axes_there_is_one_point_the_scenario_itself() {
+        let points = points(&[]).expect("valid");
+        assert_eq!(points.len(), 1);
+        assert_eq!(points[0].scenario, paper(&[]));
+    }
+
+    #[test]
+    fn axes_that_do_not_fit_are_refused_with_what_is_there() {
+        let error = |axes: &[(&str, &[f64])]| points(axes).expect_err("no such axis").to_string();
+        assert!(error(&[("noise.grid", &[1.0])]).contains("wheel_sigma_m_per_sqrt_m"));
+        assert!(error(&[("effect.wheelbase.ratio", &[1.0])]).contains("wheel_mismatch"));
+        assert!(error(&[("name", &[1.0])]).contains("not a number"));
+        assert!(error(&[("protocol.0.runs", &[1.5])]).contains("whole number"));
+        assert!(error(&[("protocol.9.runs", &[1.0])]).contains("straights"));
+        assert!(error(&[("seed.x", &[1.0])]).contains("single value"));
+        assert!(error(&[("noise.sensitivity_sigma", &[])]).contains("no levels"));
+        assert!(error(&[("noise.sensitivity_sigma", &[-1.0])]).contains("0 or more"));
+    }
+}

@@ -128,7 +128,7 @@ impl<'a> Drive<'a> {
     pub(crate) fn stand(&mut self) {
         self.look_if_due();
         if self.run.point_readings.last().is_none_or(|reading| self.t_s > reading.t_s + SAME_INSTANT_S) {
-            let sighting = self.sighting();
+            let sighting = self.sighting(self.t_s);
             for observer in &mut *self.observers {
                 observer.read_standing(sighting, self.setup.points, self.run);
             }
@@ -255,8 +255,9 @@ impl<'a> Drive<'a> {
         self.world_from_body.y_m += step.creep_m[1];
     }
 
-    fn sighting(&mut self) -> Sighting {
-        let mut sighting = Sighting { t_s: self.t_s, world_from_body: self.world_from_body };
+    /// What an instrument that looks at `t_s`, now, sees.
+    fn sighting(&mut self, t_s: f64) -> Sighting {
+        let mut sighting = Sighting { t_s, world_from_body: self.world_from_body };
         for (_, effect) in &mut *self.effects {
             effect.instrument(&mut sighting);
         }
@@ -265,8 +266,10 @@ impl<'a> Drive<'a> {
 
     fn look_if_due(&mut self) {
         for k in 0..self.observers.len() {
-            if self.observers[k].next_look_s() <= self.t_s + SAME_INSTANT_S {
-                let sighting = self.sighting();
+            let look_s = self.observers[k].next_look_s();
+            if look_s <= self.t_s + SAME_INSTANT_S {
+                // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
+                let sighting = self.sighting(look_s);
                 self.observers[k].look(sighting, self.run);
             }
         }

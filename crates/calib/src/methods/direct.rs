@@ -294,7 +294,7 @@ mod tests {
         // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03 % at m = 50 mm means Δθ = 1.5 mrad,
         // the turn that the paper's wheels (1.0334 and 1.0322) make over 500 pulses: 0.6/363 = 1.65 mrad.
         let marks = marks_after(Increment { distance_m: -0.5, turn_rad: 1.65e-3 }, Wheels::both(0.05));
-        let arc_m = -0.5 - 0.5 * 0.363 * 1.65e-3;
+        let arc_m: f64 = -0.5 - 0.5 * 0.363 * 1.65e-3;
         let chord_m = marks.start.left.distance_m(marks.end.left);
         let unsigned_m = chord_m / sinc(0.5 * 1.65e-3) + 0.05 * 1.65e-3;
         let error = unsigned_m / arc_m.abs() - 1.0;

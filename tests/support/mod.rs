@@ -1,0 +1,108 @@
+//! The command as a user runs it, for the tests of the whole system.
+#![allow(dead_code)] // each test uses its own part of it
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// How a command ended.
+pub struct Ended {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+/// `yair` with arguments, started in `folder`.
+pub fn run_in(folder: &Path, arguments: &[&str]) -> Ended {
+    let output = Command::new(env!("CARGO_BIN_EXE_yair"))
+        .current_dir(folder)
+        .args(arguments)
+        .timeout(std::time::Duration::from_secs(60))
+        .output()
+        .expect("yair starts");
+    let text = |bytes| String::from_utf8(bytes).expect("yair speaks UTF-8");
+    Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+/// Runs what must succeed.
+#[track_caller]
+pub fn succeed(folder: &Path, arguments: &[&str]) -> Ended {
+    let ended = run_in(folder, arguments);
+    assert_eq!(ended.code, Some(0), "{arguments:?}: {}", ended.stderr);
+    ended
+}
+
+/// Runs what must succeed with `--json --quiet`: exactly one document on standard output, nothing on standard error.
+#[track_caller]
+pub fn document(folder: &Path, arguments: &[&str]) -> Value {
+    let ended = succeed(folder, &[arguments, &["--json", "--quiet"]].concat());
+    assert_eq!(ended.stderr, "", "{arguments:?}");
+    // from_str refuses anything before and after the one document.
+    serde_json::from_str(&ended.stdout).unwrap_or_else(|error| panic!("{arguments:?}: {error}: {}", ended.stdout))
+}
+
+/// Runs what must be refused as bad input: exit 1, one line, no output. Gives the message.
+#[track_caller]
+pub fn refusal(folder: &Path, arguments: &[&str]) -> String {
+    let ended = run_in(folder, arguments);
+    let Ended { code, stdout, stderr } = ended;
+    assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
+    assert_eq!(stdout, "", "{arguments:?}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    assert_eq!(stderr.lines().count(), 1, "{arguments:?}: {stderr}");
+    // A line that a person can take in: the longest good ones list what is known.
+    assert!(stderr.len() < 600, "{arguments:?}: {stderr}");
+    stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{arguments:?}: {stderr}")).trim_end().to_owned()
+}
+
+/// Runs what must be refused as bad usage: exit 2. Gives the message.
+#[track_caller]
+pub fn usage(folder: &Path, arguments: &[&str]) -> String {
+    let ended = run_in(folder, arguments);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(2), ""), "{arguments:?}: {}", ended.stderr);
+    ended.stderr
+}
+
+/// Every path below a folder, sorted.
+pub fn everything_in(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            found.extend(everything_in(&path));
+        }
+        found.push(path);
+    }
+    found.sort();
+    found
+}
+
+/// The shipped scenario of the paper.
+pub fn paper() -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml")).expect("the shipped scenario")
+}
+
+/// A folder with `paper.toml`, and `set` simulated from it.
+pub fn workplace() -> tempfile::TempDir {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    fs::write(temp.path().join("paper.toml"), paper()).expect("written");
+    succeed(temp.path(), &["simulate", "paper.toml", "--out", "set"]);
+    temp
+}
+
+/// Real logs, or `None` with a word about it; with `YAIR_REQUIRE_DATA=1` they must be there.
+#[allow(clippy::print_stdout)] // how a skipped test is seen
+pub fn real_data(test: &str, part: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("YAIR_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let folder = root.join(part);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    let required = std::env::var("YAIR_REQUIRE_DATA").is_ok_and(|value| value == "1");
+    assert!(!required, "{test}: no real data in {} (YAIR_REQUIRE_DATA=1 is set)", folder.display());
+    println!("skipped: {test}: no real data (set YAIR_DATA)");
+    None
+}
