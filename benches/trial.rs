@@ -1,16 +1,17 @@
 //! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, and calibrated by each method.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use scenario::{Engine, ProtocolPart, Scenario};
+use dataset::Schedule;
+use scenario::{Engine, Scenario};
 
 fn paper(engine: Engine) -> Scenario {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml");
     let mut scenario = Scenario::read(&path).expect("the shipped scenario");
     scenario.engine = engine;
     scenario.protocols = vec![
-        ProtocolPart::Straights { length_m: 0.5, runs: 30 },
-        ProtocolPart::Spins { turn_rad: std::f64::consts::TAU, runs: 30 },
-        ProtocolPart::Squares { side_m: 4.0, runs_each_way: 5 },
+        Schedule::Straights { length_m: 0.5, runs: 30 },
+        Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 30 },
+        Schedule::Squares { side_m: 4.0, runs_each_way: 5 },
     ];
     scenario
 }

@@ -63,7 +63,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         terminal.say(&format!("{} runs, {odometry_rows} odometry rows in {}", runs.len(), dir.display()))?;
         datasets.push(Imported { dataset: dir.display().to_string(), runs: runs.len(), odometry_rows });
     }
-    terminal.document(&Document { format: arguments.format.clone(), source: arguments.source.display().to_string(), datasets })?;
+    terminal.document(&Document {
+        format: arguments.format.clone(),
+        source: arguments.source.display().to_string(),
+        datasets,
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 

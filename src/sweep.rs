@@ -43,7 +43,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(trials) = trials.filter(|trials| *trials > MOST_TRIALS) {
         return Err(format!("{file}: {trials} trials at each point; expected at most {MOST_TRIALS}").into());
     }
-    let plan = SweepPlan::new(&scenario, arguments.trials, arguments.seed).map_err(|error| format!("{file}: {error}"))?;
+    let plan =
+        SweepPlan::new(&scenario, arguments.trials, arguments.seed).map_err(|error| format!("{file}: {error}"))?;
     if let Some(out) = &arguments.out {
         can_be_written(out)?;
     }

@@ -3,13 +3,17 @@
 //! Rejected by what was tried: an edge from `calib` to `effects`, a crate that no table lists, a changed digit in the README's table, a command in the
 //! README that CI does not run, an effect's parameter missing in docs/scenario.md.
 
+mod support;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dataset::Schedule;
 use scenario::Scenario;
 use sim_yair::SimulatedRobot;
+use support::{real_data, succeed};
 
 /// Who may use whom, dev- and build-dependencies too. `calib` never links what could tell it the truth.
 const ARROWS: &[(&str, &[&str])] = &[
@@ -246,32 +250,21 @@ fn the_readme_shows_the_library_example_that_is_tested() {
     assert_eq!(shown, &tested);
 }
 
-/// Real robots' logs, where they are; `YAIR_REQUIRE_DATA=1` makes their absence a failure.
-fn real_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("YAIR_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let required = std::env::var("YAIR_REQUIRE_DATA").is_ok_and(|value| value == "1");
-    assert!(folder.is_dir() || !required, "no real data in {} (YAIR_REQUIRE_DATA=1 is set)", folder.display());
-    folder.is_dir().then(|| folder.canonicalize().expect("a folder"))
-}
-
-/// How a document names the originals of the real data, and where they are under the data's folder.
-const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom/"), ("calibration/reference-output/", "khepera/")];
+/// How a document names the originals of the real data, and which part of the data's folder they are.
+const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom"), ("calibration/reference-output/", "khepera")];
 
 /// Runs one command line of a document and returns its standard output, or `None` when it needs data that are not here.
 fn run(line: &str, folder: &Path) -> Option<String> {
     let (_, arguments) = line.split_once("yair ").or_else(|| line.split_once("cargo run --release -- "))?;
     let mut words: Vec<String> = arguments.split_whitespace().map(str::to_owned).collect();
     for word in &mut words {
-        if let Some((name, place)) = ORIGINALS.iter().find(|(name, _)| word.starts_with(name)) {
-            *word = real_data()?.join(word.replacen(name, place, 1)).to_string_lossy().into_owned();
+        if let Some((name, part)) = ORIGINALS.iter().find(|(name, _)| word.starts_with(name)) {
+            *word = real_data("the documents' commands", part)?.join(&word[name.len()..]).display().to_string();
         } else if word.starts_with("scenarios/") {
-            *word = root().join(&*word).to_string_lossy().into_owned();
+            *word = root().join(&*word).display().to_string();
         }
     }
-    let output =
-        assert_cmd::Command::cargo_bin("yair").expect("built").args(words).current_dir(folder).output().expect("runs");
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    Some(String::from_utf8(output.stdout).expect("text"))
+    Some(succeed(folder, &words.iter().map(String::as_str).collect::<Vec<_>>()).stdout)
 }
 
 /// Whether a pasted output is the real one; a pasted line that begins with … stands for any number of lines, and elapsed times are not compared.
@@ -338,7 +331,7 @@ fn the_documents_show_what_the_commands_print() {
 /// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.
 #[test]
 fn published_optiodom_squares_stand_in_the_document_as_found() {
-    if real_data().is_none() {
+    if real_data("published_optiodom_squares_stand_in_the_document_as_found", "optiodom").is_none() {
         return;
     }
     let document = text("docs/calibration.md");
@@ -380,9 +373,7 @@ fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
 
 #[test]
 fn the_scenario_document_has_every_key_and_every_effect() {
-    use scenario::{
-        Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, ProtocolPart, Robot, Sweep,
-    };
+    use scenario::{Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, Robot, Sweep};
     let document = text("docs/scenario.md");
     let parts = [
         ("", keys::<Scenario>("")),

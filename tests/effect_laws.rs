@@ -1,6 +1,8 @@
 //! Laws that every effect of the catalogue keeps, each with a specimen that breaks it.
 
-use dataset::{Dataset, Interval, ModelTerm, Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, WheelLog};
+use dataset::{
+    Dataset, Interval, ModelTerm, Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, WheelLog,
+};
 use effects::{
     Backlash, CATALOGUE, ContactPatchWheelbase, CounterWrap, Effect, MissedCounts, Quantization, SamplingSkew,
     SlipAcceleration, SlipSpeed, TractionLoss, WheelEccentricity, WheelMismatch, WheelScale, Wheelbase, Which,
@@ -28,7 +30,9 @@ fn specimens() -> Vec<Specimen> {
         of(|e_d| Effect::WheelMismatch(WheelMismatch { right_over_left: e_d }), 1.0, 1.01, 0.0),
         of(|ratio| Effect::Wheelbase(Wheelbase { ratio }), 1.0, 1.02, f64::NAN),
         of(
-            |sigma_m| Effect::ContactPatchWheelbase(ContactPatchWheelbase { sigma_m, slow_sigma_m: 0.0, slow_length_m: 0.0 }),
+            |sigma_m| {
+                Effect::ContactPatchWheelbase(ContactPatchWheelbase { sigma_m, slow_sigma_m: 0.0, slow_length_m: 0.0 })
+            },
             0.0,
             5e-3,
             -1e-3,
@@ -174,7 +178,8 @@ const ENGINES_AGREE: f64 = 2e-4;
 #[test]
 fn both_engines_mean_the_same_by_an_effect_or_the_closed_form_refuses_it() {
     let mut refused = Vec::new();
-    for specimen in specimens().iter().filter(|specimen| !matches!(specimen.some.id(), "counter_wrap" | "quantization")) {
+    for specimen in specimens().iter().filter(|specimen| !matches!(specimen.some.id(), "counter_wrap" | "quantization"))
+    {
         let id = specimen.some.id();
         let stepped = missed(&with(perfect(STEPPING), &specimen.some)).expect("steps");
         match missed(&with(perfect(Engine::ClosedForm), &specimen.some)) {
@@ -196,7 +201,10 @@ fn predicted(dataset: &Dataset, term: &mut dyn ModelTerm, size: f64) -> Pose {
     let mut pose = Pose::IDENTITY;
     for k in 1..run.odometry.t_s.len() {
         #[allow(clippy::cast_precision_loss)]
-        let counts = Wheels { left: (ticks.left[k] - ticks.left[k - 1]) as f64, right: (ticks.right[k] - ticks.right[k - 1]) as f64 };
+        let counts = Wheels {
+            left: (ticks.left[k] - ticks.left[k - 1]) as f64,
+            right: (ticks.right[k] - ticks.right[k - 1]) as f64,
+        };
         let travel_m = counts.zip_with(m_per_count, |counts, m_per_count| counts * m_per_count);
         let wheel_separation_m = geometry.wheel_separation_m();
         let interval = Interval { dt_s: run.odometry.t_s[k] - run.odometry.t_s[k - 1], travel_m, wheel_separation_m };

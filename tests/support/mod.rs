@@ -81,7 +81,8 @@ pub fn everything_in(folder: &Path) -> Vec<PathBuf> {
 
 /// The shipped scenario of the paper.
 pub fn paper() -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml")).expect("the shipped scenario")
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml"))
+        .expect("the shipped scenario")
 }
 
 /// A folder with `paper.toml`, and `set` simulated from it.

@@ -1,6 +1,6 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
-use dataset::{NominalRobot, Session};
+use dataset::{NominalRobot, Schedule, Session};
 use kinematics::{DriveGeometry, GeometryError, Wheels};
 use nalgebra::DMatrix;
 
@@ -174,6 +174,9 @@ pub trait Method: Sync + Send {
 
     /// One line for `--help` and tables: what it needs and what it gives.
     fn about(&self) -> &'static str;
+
+    /// What to drive for this method, as its authors did.
+    fn protocol(&self) -> Vec<Schedule>;
 
     /// Calibrates one robot from its sessions. Where sessions disagree about nominal values, the first one's are used.
     ///

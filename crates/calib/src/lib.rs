@@ -4,6 +4,7 @@
 //! the simulator nor the effects: what it is not given, it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
 mod drift;
+mod drive;
 mod estimate;
 mod report;
 mod robust;
@@ -11,6 +12,7 @@ mod robust;
 pub mod methods;
 
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
+pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Method, NotObservable, Parameter, Rejected, refuse_wrapped_counters,
 };

@@ -5,6 +5,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use serde::{Deserialize, Serialize};
+
 use crate::record::{Protocol, ProtocolSettings};
 
 /// One motion between two standstills, in nominal units.
@@ -50,7 +52,8 @@ pub struct MotionProgram {
 }
 
 /// A protocol with its numbers: how many runs of what.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Schedule {
     /// Straight runs of the paper, alternately forward and backward.
     Straights {

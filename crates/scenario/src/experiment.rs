@@ -100,7 +100,7 @@ pub struct Scenario {
     pub effects: Vec<Effect>,
     /// What is driven, in order.
     #[serde(rename = "protocol")]
-    pub protocols: Vec<ProtocolPart>,
+    pub protocols: Vec<Schedule>,
     /// What is varied and who estimates, for `yair sweep`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sweep: Option<Sweep>,
@@ -177,57 +177,6 @@ pub enum Instrument {
     },
 }
 
-/// One part of the campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum ProtocolPart {
-    /// Straight runs, alternately forward and backward.
-    Straights {
-        /// Nominal length, metres.
-        length_m: f64,
-        /// How many.
-        runs: u32,
-    },
-    /// Spins, alternately counter-clockwise and clockwise.
-    Spins {
-        /// Nominal turn, radians.
-        turn_rad: f64,
-        /// How many.
-        runs: u32,
-    },
-    /// UMBmark squares.
-    Squares {
-        /// Nominal side, metres.
-        side_m: f64,
-        /// How many in each direction.
-        runs_each_way: u32,
-    },
-    /// The paper's validation path with eight quarter turns.
-    ValidationPath {
-        /// Length, metres.
-        length_m: f64,
-        /// Distance between readings, metres.
-        measure_every_m: f64,
-        /// How many.
-        runs: u32,
-    },
-}
-
-impl ProtocolPart {
-    /// The part in the vocabulary of whoever drives it.
-    #[must_use]
-    pub const fn schedule(&self) -> Schedule {
-        match *self {
-            Self::Straights { length_m, runs } => Schedule::Straights { length_m, runs },
-            Self::Spins { turn_rad, runs } => Schedule::Spins { turn_rad, runs },
-            Self::Squares { side_m, runs_each_way } => Schedule::Squares { side_m, runs_each_way },
-            Self::ValidationPath { length_m, measure_every_m, runs } => {
-                Schedule::ValidationPath { length_m, measure_every_m, runs }
-            }
-        }
-    }
-}
-
 impl Scenario {
     /// Reads and checks a scenario file.
     ///
@@ -275,7 +224,7 @@ impl Scenario {
     /// Everything that is driven, in order.
     #[must_use]
     pub fn programs(&self) -> Vec<MotionProgram> {
-        self.protocols.iter().flat_map(|part| part.schedule().programs()).collect()
+        self.protocols.iter().flat_map(Schedule::programs).collect()
     }
 
     /// The robot's specified drive.
@@ -376,10 +325,10 @@ impl Scenario {
         }
         for part in &self.protocols {
             match *part {
-                ProtocolPart::Straights { length_m, .. } => positive("protocol.length_m", length_m)?,
-                ProtocolPart::Spins { turn_rad, .. } => positive("protocol.turn_rad", turn_rad)?,
-                ProtocolPart::Squares { side_m, .. } => positive("protocol.side_m", side_m)?,
-                ProtocolPart::ValidationPath { length_m, measure_every_m, .. } => {
+                Schedule::Straights { length_m, .. } => positive("protocol.length_m", length_m)?,
+                Schedule::Spins { turn_rad, .. } => positive("protocol.turn_rad", turn_rad)?,
+                Schedule::Squares { side_m, .. } => positive("protocol.side_m", side_m)?,
+                Schedule::ValidationPath { length_m, measure_every_m, .. } => {
                     positive("protocol.length_m", length_m)?;
                     let holds = measure_every_m > 0.0 && measure_every_m <= length_m;
                     range("protocol.measure_every_m", measure_every_m, holds, "positive and at most length_m")?;

@@ -6,6 +6,6 @@ mod experiment;
 mod robot;
 mod sweep;
 
-pub use experiment::{Engine, Instrument, Log, Noise, Placement, ProtocolPart, Scenario, ScenarioError};
+pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario, ScenarioError};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
 pub use sweep::{Axis, Point, Sweep};

@@ -176,6 +176,9 @@ fn motion_capture_looks_at_its_rate_stamps_late_and_rides_its_lever() {
         let last = run.truth.last().expect("samples");
         let turn_rad = last.theta_rad().expect("headings") - 0.5;
         // The robot stands through the pause at the end; the lever turns by what a count more or less on one wheel turns it.
-        assert!((last.x_m - 0.1 - moved.x_m).abs() < SETTLED_M && turn_rad.abs() < 2.0 * SETTLED_M / 0.363, "{engine:?}");
+        assert!(
+            (last.x_m - 0.1 - moved.x_m).abs() < SETTLED_M && turn_rad.abs() < 2.0 * SETTLED_M / 0.363,
+            "{engine:?}"
+        );
     }
 }

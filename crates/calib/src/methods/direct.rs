@@ -8,7 +8,7 @@
 //! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
-use dataset::{Protocol, RunView, Session};
+use dataset::{Protocol, RunView, Schedule, Session};
 use kinematics::{DriveGeometry, Point, Side, Wheels, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
@@ -183,6 +183,14 @@ impl Method for Direct {
 
     fn about(&self) -> &'static str {
         "the paper's: straight runs give both sensitivities, spins the wheelbase (points or poses at both ends)"
+    }
+
+    /// The paper's runs: 500 mm forward and backward, about a turn each way. It gives no number of spins; 30 are ours.
+    fn protocol(&self) -> Vec<Schedule> {
+        vec![
+            Schedule::Straights { length_m: 0.5, runs: 82 },
+            Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 30 },
+        ]
     }
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {

@@ -10,7 +10,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use dataset::{Protocol, Session};
+use dataset::{Protocol, Schedule, Session};
 use kinematics::{Pose, Rule, Wheels};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
@@ -57,6 +57,11 @@ impl Method for Umbmark {
 
     fn about(&self) -> &'static str {
         "squares driven both ways, measured at their ends: wheel ratio and wheelbase, blind to the common scale"
+    }
+
+    /// Five squares each way (Borenstein & Feng 1995) of the paper's 4 m.
+    fn protocol(&self) -> Vec<Schedule> {
+        vec![Schedule::Squares { side_m: 4.0, runs_each_way: 5 }]
     }
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
