@@ -76,7 +76,7 @@ fn faults_of_a_dataset_name_file_line_and_column() {
         "dataset.toml",
         "wheel_separation_m = 0.3",
         "wheel_separation_mm = 300",
-        ":5: key wheel_separation_mm is not in SI",
+        ":5: unknown field `wheel_separation_mm`, expected one of",
     );
     edited(
         "dataset.toml",

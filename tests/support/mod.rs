@@ -8,14 +8,14 @@ use assert_cmd::Command;
 use serde_json::Value;
 
 /// How a command ended.
-pub struct Ended {
-    pub code: Option<i32>,
-    pub stdout: String,
-    pub stderr: String,
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
 }
 
 /// `yair` with arguments, started in `folder`.
-pub fn run_in(folder: &Path, arguments: &[&str]) -> Ended {
+pub(crate) fn run_in(folder: &Path, arguments: &[&str]) -> Ended {
     let output = Command::new(env!("CARGO_BIN_EXE_yair"))
         .current_dir(folder)
         .args(arguments)
@@ -28,7 +28,7 @@ pub fn run_in(folder: &Path, arguments: &[&str]) -> Ended {
 
 /// Runs what must succeed.
 #[track_caller]
-pub fn succeed(folder: &Path, arguments: &[&str]) -> Ended {
+pub(crate) fn succeed(folder: &Path, arguments: &[&str]) -> Ended {
     let ended = run_in(folder, arguments);
     assert_eq!(ended.code, Some(0), "{arguments:?}: {}", ended.stderr);
     ended
@@ -36,7 +36,7 @@ pub fn succeed(folder: &Path, arguments: &[&str]) -> Ended {
 
 /// Runs what must succeed with `--json --quiet`: exactly one document on standard output, nothing on standard error.
 #[track_caller]
-pub fn document(folder: &Path, arguments: &[&str]) -> Value {
+pub(crate) fn document(folder: &Path, arguments: &[&str]) -> Value {
     let ended = succeed(folder, &[arguments, &["--json", "--quiet"]].concat());
     assert_eq!(ended.stderr, "", "{arguments:?}");
     // from_str refuses anything before and after the one document.
@@ -45,7 +45,7 @@ pub fn document(folder: &Path, arguments: &[&str]) -> Value {
 
 /// Runs what must be refused as bad input: exit 1, one line, no output. Gives the message.
 #[track_caller]
-pub fn refusal(folder: &Path, arguments: &[&str]) -> String {
+pub(crate) fn refusal(folder: &Path, arguments: &[&str]) -> String {
     let ended = run_in(folder, arguments);
     let Ended { code, stdout, stderr } = ended;
     assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
@@ -59,14 +59,14 @@ pub fn refusal(folder: &Path, arguments: &[&str]) -> String {
 
 /// Runs what must be refused as bad usage: exit 2. Gives the message.
 #[track_caller]
-pub fn usage(folder: &Path, arguments: &[&str]) -> String {
+pub(crate) fn usage(folder: &Path, arguments: &[&str]) -> String {
     let ended = run_in(folder, arguments);
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(2), ""), "{arguments:?}: {}", ended.stderr);
     ended.stderr
 }
 
 /// Every path below a folder, sorted.
-pub fn everything_in(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn everything_in(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -80,13 +80,13 @@ pub fn everything_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The shipped scenario of the paper.
-pub fn paper() -> String {
+pub(crate) fn paper() -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml"))
         .expect("the shipped scenario")
 }
 
 /// A folder with `paper.toml`, and `set` simulated from it.
-pub fn workplace() -> tempfile::TempDir {
+pub(crate) fn workplace() -> tempfile::TempDir {
     let temp = tempfile::tempdir().expect("a temporary folder");
     fs::write(temp.path().join("paper.toml"), paper()).expect("written");
     succeed(temp.path(), &["simulate", "paper.toml", "--out", "set"]);
@@ -95,7 +95,7 @@ pub fn workplace() -> tempfile::TempDir {
 
 /// Real logs, or `None` with a word about it; with `YAIR_REQUIRE_DATA=1` they must be there.
 #[allow(clippy::print_stdout)] // how a skipped test is seen
-pub fn real_data(test: &str, part: &str) -> Option<PathBuf> {
+pub(crate) fn real_data(test: &str, part: &str) -> Option<PathBuf> {
     let root = std::env::var_os("YAIR_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     let folder = root.join(part);
