@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use calib::{CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::Session;
+use dataset::{NominalRobot, Session};
 
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let outcomes: Vec<_> = chosen.iter().map(|method| (method.name(), method.calibrate(&sessions))).collect();
     let report = CalibrationReport {
         dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
-        methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome)).collect(),
+        methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome, sessions[0].robot)).collect(),
     };
     // One method asked for by name and not applicable is a failure; the JSON still says so in its place.
     let refused = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().err());
@@ -55,20 +55,22 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         write_whole(out, report.to_toml()?.as_bytes())?;
         terminal.remark(&format!("calibration in {}", out.display()));
     }
-    show(&report, terminal)?;
+    show(&report, sessions[0].robot, terminal)?;
     terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn show(report: &CalibrationReport, terminal: &Terminal) -> Result<(), Failure> {
-    let mut table = table(&["method", "parameter", "value", "sigma", "unit"], 2);
+fn show(report: &CalibrationReport, robot: &NominalRobot, terminal: &Terminal) -> Result<(), Failure> {
+    let mut table = table(&["method", "parameter", "nominal", "value", "sigma", "unit"], 2);
     for method in &report.methods {
         for (key, value) in &method.parameters {
+            let decimals = decimals(value.sigma.map(|sigma| 1e3 * sigma));
             table.add_row([
                 method.method.clone(),
                 key.clone(),
-                cell(Some(value.value), 1e3, 6),
-                cell(value.sigma, 1e3, 6),
+                cell(nominal(robot, key), 1e3, decimals),
+                cell(Some(value.value), 1e3, decimals),
+                cell(value.sigma, 1e3, decimals),
                 "mm".to_owned(),
             ]);
         }
@@ -88,9 +90,31 @@ fn show(report: &CalibrationReport, terminal: &Terminal) -> Result<(), Failure> 
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
         }
+        for warning in &method.warnings {
+            terminal.remark(&format!("warning: {name}: {warning}"));
+        }
         for blind in &method.not_observable {
             terminal.say(&format!("  cannot tell {}: {}", blind.parameter, blind.why))?;
         }
     }
     Ok(())
+}
+
+/// What the robot believes of a parameter.
+fn nominal(robot: &NominalRobot, key: &str) -> Option<f64> {
+    let per_tick = |diameter_m: f64| Some(std::f64::consts::PI * diameter_m / robot.ticks_per_rev?);
+    match key {
+        "left_wheel_diameter_m" => Some(robot.left_wheel_diameter_m),
+        "right_wheel_diameter_m" => Some(robot.right_wheel_diameter_m),
+        "wheel_separation_m" => Some(robot.wheel_separation_m),
+        "left_m_per_tick" => per_tick(robot.left_wheel_diameter_m),
+        "right_m_per_tick" => per_tick(robot.right_wheel_diameter_m),
+        _ => None,
+    }
+}
+
+/// Decimals that show two digits of sigma, six where there is none.
+fn decimals(sigma: Option<f64>) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    sigma.filter(|sigma| *sigma > 0.0).map_or(6, |sigma| (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize)
 }

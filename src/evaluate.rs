@@ -71,12 +71,12 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
     let headers = [
         "calibration",
-        "max\nmm",
-        "max\ndeg",
-        "max final\nmm",
-        "max final\ndeg",
-        "mean final\nmm",
-        "mean final\ndeg",
+        "max pos.\nmm",
+        "max head.\ndeg",
+        "final pos.\nmax mm",
+        "final head.\nmax deg",
+        "final pos.\nmean mm",
+        "final head.\nmean deg",
         "drift\n%",
     ];
     let mut table = table(&headers, 1);

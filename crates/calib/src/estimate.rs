@@ -117,6 +117,25 @@ impl Calibration {
         Some(Estimate { parameter, value: value * factor, sigma })
     }
 
+    /// Remarks on values that are far from nominal: calibration corrects per cents, and a factor is a fault of another kind.
+    #[must_use]
+    pub fn hard_to_believe(&self, robot: &NominalRobot) -> Vec<String> {
+        let nominal = [
+            (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
+            (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
+            (Parameter::WheelSeparation, robot.wheel_separation_m),
+        ];
+        let remark = |(parameter, nominal): (Parameter, f64)| {
+            let factor = self.estimate(parameter)?.value / nominal;
+            // Skid steering doubles the effective separation at most (users report 1.5 to 2 times); wheels are known to a few per cent.
+            let most = if parameter == Parameter::WheelSeparation { 2.2 } else { 1.3 };
+            let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
+            let message = || format!("{} is {factor:.3} times its nominal value: {cause}", parameter.key());
+            (factor > most || factor < 1.0 / most).then(message)
+        };
+        nominal.into_iter().filter_map(remark).collect()
+    }
+
     /// Every value that the method has.
     pub fn estimates(&self) -> impl Iterator<Item = Estimate> + '_ {
         Parameter::ESTIMATED.into_iter().filter_map(|parameter| self.estimate(parameter))

@@ -1,6 +1,7 @@
 //! Calibrations as documents: the JSON of `yair calibrate` and the TOML file that `yair evaluate --calibration` takes, which have the same names.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use dataset::NominalRobot;
@@ -91,6 +92,9 @@ pub struct MethodReport {
     /// Whether the method came to an answer.
     #[serde(default)]
     pub converged: bool,
+    /// Values that are hard to believe, and what to look at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// A value with its standard deviation. A bare number is read as a value without one.
@@ -141,9 +145,9 @@ pub struct ReportedRejection {
 }
 
 impl MethodReport {
-    /// The document's form of a method's outcome.
+    /// The document's form of a method's outcome on a robot that believes itself `nominal`.
     #[must_use]
-    pub fn new(method: &str, outcome: &Result<Calibration, CalibError>) -> Self {
+    pub fn new(method: &str, outcome: &Result<Calibration, CalibError>, nominal: &NominalRobot) -> Self {
         let empty = Self {
             method: method.to_owned(),
             error: None,
@@ -152,6 +156,7 @@ impl MethodReport {
             runs_used: 0,
             runs_rejected: Vec::new(),
             converged: false,
+            warnings: Vec::new(),
         };
         let calibration = match outcome {
             Ok(calibration) => calibration,
@@ -182,13 +187,14 @@ impl MethodReport {
                 .map(|rejected| ReportedRejection { run: rejected.run.clone(), why: rejected.why.clone() })
                 .collect(),
             converged: calibration.converged,
+            warnings: calibration.hard_to_believe(nominal),
             ..empty
         }
     }
 }
 
 /// Calibration files are small; anything larger is another file.
-const LARGEST_FILE_BYTES: u64 = 1 << 24;
+const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
 impl CalibrationReport {
     /// The calibration file's text.
@@ -209,11 +215,13 @@ impl CalibrationReport {
     pub fn read(path: &Path) -> Result<Self, ReportError> {
         let io = |source| ReportError::Io { path: path.to_owned(), source };
         let place = path.display().to_string();
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > LARGEST_FILE_BYTES {
-            return Err(ReportError::NotACalibration { place, message: format!("{size} bytes are too many") });
+        let mut text = String::new();
+        let file = std::fs::File::open(path).map_err(io)?;
+        file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > LARGEST_FILE_BYTES {
+            let message = format!("it has more than {LARGEST_FILE_BYTES} bytes");
+            return Err(ReportError::NotACalibration { place, message });
         }
-        let text = std::fs::read_to_string(path).map_err(io)?;
         let report: Self = toml::from_str(&text).map_err(|error| {
             let line = error.span().map(|span| text[..span.start].matches('\n').count() + 1);
             let place = line.map_or_else(|| place.clone(), |line| format!("{place}:{line}"));
@@ -324,6 +332,7 @@ mod tests {
                 runs_used: 6,
                 runs_rejected: vec![ReportedRejection { run: "run-01".to_owned(), why: "far".to_owned() }],
                 converged: true,
+                warnings: Vec::new(),
             }],
         }
     }

@@ -91,6 +91,15 @@ pub enum Schedule {
 const VALIDATION_LEGS: usize = 9;
 
 impl Schedule {
+    /// How many runs it drives.
+    #[must_use]
+    pub fn runs(&self) -> u64 {
+        match *self {
+            Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => runs.into(),
+            Self::Squares { runs_each_way, .. } => 2 * u64::from(runs_each_way),
+        }
+    }
+
     /// The programs, with ids that sort in driving order.
     #[must_use]
     pub fn programs(&self) -> Vec<MotionProgram> {

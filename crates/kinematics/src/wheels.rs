@@ -95,6 +95,6 @@ mod tests {
         assert_eq!(wheels[Side::Right], 2);
         assert_eq!(wheels.map(|n| n * 10), Wheels { left: 10, right: 20 });
         assert_eq!(wheels.zip_with(Wheels { left: 5, right: 7 }, |a, b| b - a), Wheels { left: 4, right: 5 });
-        assert_eq!(Wheels::from_sides(|side| side.name()), Wheels { left: "left", right: "right" });
+        assert_eq!(Wheels::from_sides(Side::name), Wheels { left: "left", right: "right" });
     }
 }

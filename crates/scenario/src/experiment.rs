@@ -1,5 +1,6 @@
 //! A scenario: reading, checking and writing it.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use dataset::{MotionProgram, Schedule};
@@ -72,6 +73,9 @@ pub enum ScenarioError {
 
 /// Scenarios are written by hand; anything larger is another file.
 const LARGEST_FILE_BYTES: u64 = 1 << 20;
+
+/// Most runs of one scenario, over all protocols: each is kept in memory.
+const MOST_RUNS: u64 = 100_000;
 
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -185,12 +189,15 @@ impl Scenario {
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let io = |source| ScenarioError::Io { path: path.to_owned(), source };
         let place = path.display().to_string();
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > LARGEST_FILE_BYTES {
-            let message = format!("{size} bytes is too large for a scenario (at most {LARGEST_FILE_BYTES})");
+        // Read no more than the limit, whatever size a device or a pipe states.
+        let mut text = String::new();
+        let file = std::fs::File::open(path).map_err(io)?;
+        file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > LARGEST_FILE_BYTES {
+            let message = format!("too large for a scenario (at most {LARGEST_FILE_BYTES} bytes)");
             return Err(ScenarioError::Toml { place, message });
         }
-        Self::parse(&std::fs::read_to_string(path).map_err(io)?, &place)
+        Self::parse(&text, &place)
     }
 
     /// Parses and checks a scenario; `place` (the file) is named in errors.
@@ -252,13 +259,22 @@ impl Scenario {
         let positive = |key: &str, value: f64| range(key, value, value.is_finite() && value > 0.0, "positive");
         let not_negative = |key: &str, value: f64| range(key, value, value.is_finite() && value >= 0.0, "0 or more");
         let finite = |key: &str, value: f64| range(key, value, value.is_finite(), "finite");
+        // Bounds of robots that drive on floors, wide enough for any of them: they keep a slip of the pen from running for days.
+        let length = |key: &str, value: f64| range(key, value, (1e-3..=1e4).contains(&value), "from 0.001 to 10000 m");
+        let speed = |key: &str, value: f64| range(key, value, (1e-3..=1e2).contains(&value), "from 0.001 to 100");
+        let interval =
+            |key: &str, value: f64| range(key, value, (1e-5..=1e3).contains(&value), "from 0.00001 to 1000 s");
 
         self.nominal_geometry().map_err(|source| ScenarioError::Geometry { place: place.to_owned(), source })?;
         let robot = &self.robot;
-        positive("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
-        positive("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
-        positive("robot.encoder.lines_per_rev", robot.encoder.lines_per_rev)?;
-        positive("robot.encoder.gear_ratio", robot.encoder.gear_ratio)?;
+        speed("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
+        speed("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
+        let (lines, gear) = (robot.encoder.lines_per_rev, robot.encoder.gear_ratio);
+        range("robot.encoder.lines_per_rev", lines, (1.0..=1e6).contains(&lines), "from 1 to 1000000")?;
+        range("robot.encoder.gear_ratio", gear, (1e-3..=1e6).contains(&gear), "from 0.001 to 1000000")?;
+        length("robot.left_wheel_diameter_m", robot.left_wheel_diameter_m)?;
+        length("robot.right_wheel_diameter_m", robot.right_wheel_diameter_m)?;
+        length("robot.wheel_separation_m", robot.wheel_separation_m)?;
         let width_error = robot.encoder.state_width_error;
         range("robot.encoder.state_width_error", width_error, (0.0..1.0).contains(&width_error), "in [0, 1)")?;
         not_negative("robot.controller.right_phase_s", robot.controller.right_phase_s)?;
@@ -273,15 +289,21 @@ impl Scenario {
             finite("robot.point.x_m", mark.x_m)?;
             finite("robot.point.y_m", mark.y_m)?;
         }
+        let points = &robot.points;
+        let twice = points.iter().enumerate().find(|(k, mark)| points[..*k].iter().any(|other| other.id == mark.id));
+        if let Some((_, mark)) = twice {
+            let message = format!("two [[robot.point]] have the id \"{}\"; ids must differ", mark.id);
+            return Err(ScenarioError::Toml { place: place.to_owned(), message });
+        }
         if let Engine::Stepping { step_s } = self.engine {
-            range("engine.step_s", step_s, step_s > 0.0 && step_s <= 1e-3, "positive and at most 0.001")?;
+            range("engine.step_s", step_s, (1e-6..=1e-3).contains(&step_s), "from 0.000001 to 0.001 s")?;
         }
         not_negative("noise.wheel_sigma_m_per_sqrt_m", self.noise.wheel_sigma_m_per_sqrt_m)?;
         not_negative("noise.sensitivity_sigma", self.noise.sensitivity_sigma)?;
         not_negative("placement.half_width_m", self.placement.half_width_m)?;
         not_negative("placement.half_width_rad", self.placement.half_width_rad)?;
         if let Some(log) = self.log {
-            positive("log.interval_s", log.interval_s)?;
+            interval("log.interval_s", log.interval_s)?;
         }
         #[allow(clippy::cast_precision_loss)]
         let instruments = self.instruments.len() as f64;
@@ -310,7 +332,7 @@ impl Scenario {
                     lever_y_m,
                     lever_theta_rad,
                 } => {
-                    positive("instrument.rate_hz", rate_hz)?;
+                    interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
                     not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
                     not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
                     not_negative("instrument.latency_s", latency_s)?;
@@ -325,19 +347,21 @@ impl Scenario {
         }
         for part in &self.protocols {
             match *part {
-                Schedule::Straights { length_m, .. } => positive("protocol.length_m", length_m)?,
-                Schedule::Spins { turn_rad, .. } => positive("protocol.turn_rad", turn_rad)?,
-                Schedule::Squares { side_m, .. } => positive("protocol.side_m", side_m)?,
+                Schedule::Straights { length_m, .. } => length("protocol.length_m", length_m)?,
+                Schedule::Spins { turn_rad, .. } => {
+                    range("protocol.turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+                }
+                Schedule::Squares { side_m, .. } => length("protocol.side_m", side_m)?,
                 Schedule::ValidationPath { length_m, measure_every_m, .. } => {
-                    positive("protocol.length_m", length_m)?;
-                    let holds = measure_every_m > 0.0 && measure_every_m <= length_m;
-                    range("protocol.measure_every_m", measure_every_m, holds, "positive and at most length_m")?;
+                    length("protocol.length_m", length_m)?;
+                    let holds = measure_every_m >= 1e-3 && measure_every_m <= length_m;
+                    range("protocol.measure_every_m", measure_every_m, holds, "from 0.001 m to length_m")?;
                 }
             }
         }
-        let runs = self.programs().len();
+        let runs: u64 = self.protocols.iter().map(Schedule::runs).sum();
         #[allow(clippy::cast_precision_loss)]
-        range("protocol.runs", runs as f64, runs > 0, "at least one run in all")
+        range("protocol.runs", runs as f64, (1..=MOST_RUNS).contains(&runs), "from 1 to 100000 in all")
     }
 }
 

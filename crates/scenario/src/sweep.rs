@@ -21,6 +21,9 @@ pub struct Sweep {
     pub axes: BTreeMap<String, Vec<f64>>,
 }
 
+/// Most points of a grid: each is a scenario in memory.
+const MOST_POINTS: f64 = 10_000.0;
+
 /// One axis with the level that a point takes on it.
 pub type Axis = (String, f64);
 
@@ -46,11 +49,24 @@ impl Sweep {
         if self.methods.is_empty() {
             return Err(toml_error("sweep.methods is empty; name at least one method".to_owned()));
         }
+        for (k, method) in self.methods.iter().enumerate() {
+            if self.methods[..k].contains(method) {
+                return Err(toml_error(format!("sweep.methods names \"{method}\" twice")));
+            }
+        }
+        let points: f64 =
+            self.axes.values().map(|levels| f64::from(u32::try_from(levels.len()).unwrap_or(u32::MAX))).product();
+        if points > MOST_POINTS {
+            return Err(toml_error(format!("sweep.axes cross into {points} points; at most {MOST_POINTS} are driven")));
+        }
         let base = Table::try_from(scenario).map_err(|error| toml_error(error.to_string()))?;
         let mut tables = vec![(Vec::new(), base)];
         for (key, levels) in &self.axes {
             let axis_error =
                 |problem: String| ScenarioError::Axis { place: place.to_owned(), key: key.clone(), problem };
+            if matches!(key.split('.').next(), Some("seed" | "sweep")) {
+                return Err(axis_error("the seed and the sweep itself are the same at every point".to_owned()));
+            }
             if levels.is_empty() {
                 return Err(axis_error("it has no levels".to_owned()));
             }
@@ -163,7 +179,12 @@ mod tests {
         assert!(error(&[("name", &[1.0])]).contains("not a number"));
         assert!(error(&[("protocol.0.runs", &[1.5])]).contains("whole number"));
         assert!(error(&[("protocol.9.runs", &[1.0])]).contains("straights"));
-        assert!(error(&[("seed.x", &[1.0])]).contains("single value"));
+        assert!(error(&[("engine.kind.x", &[1.0])]).contains("single value"));
+        assert!(error(&[("seed", &[1.0])]).contains("same at every point"));
+        assert!(error(&[("sweep.trials", &[9.0])]).contains("same at every point"));
+        let many = [1.0; 200];
+        let axes: [(&str, &[f64]); 2] = [("noise.sensitivity_sigma", &many), ("placement.half_width_m", &many)];
+        assert!(error(&axes).contains("40000 points"));
         assert!(error(&[("noise.sensitivity_sigma", &[])]).contains("no levels"));
         assert!(error(&[("noise.sensitivity_sigma", &[-1.0])]).contains("0 or more"));
     }
