@@ -51,7 +51,9 @@ pub trait PhysicalEffect {
     }
 
     /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
-    fn forward(&self) -> Option<Box<dyn Forward>>;
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        None
+    }
 
     /// The hypothesis face: how recorded data would show the effect, or `None` when no term is written for it yet.
     fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {

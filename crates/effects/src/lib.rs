@@ -4,7 +4,7 @@
 //! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
 //! The *hypothesis* face ([`dataset::ModelTerm`]) is how recorded data would show it: it sees recorded quantities only.
 //!
-//! Adding an effect is one new file in `catalogue/` and its line in [`contents!`] below: scenario parsing, the catalogue and the laws follow.
+//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow.
 
 mod effect;
 mod forward;

@@ -9,7 +9,6 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::Forward;
 
 /// Ratio of the diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,10 +30,6 @@ impl PhysicalEffect for WheelMismatch {
         let diameter_m =
             Wheels { left: diameter_m.left * 2.0 / (ratio + 1.0), right: diameter_m.right * 2.0 / (1.0 / ratio + 1.0) };
         DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
-    }
-
-    fn forward(&self) -> Option<Box<dyn Forward>> {
-        None
     }
 
     fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {

@@ -9,7 +9,6 @@ use kinematics::{DriveGeometry, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::Forward;
 
 /// Common factor of both diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,10 +27,6 @@ impl PhysicalEffect for WheelScale {
     fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
         let diameter_m = geometry.wheel_diameter_m().map(|diameter_m| self.scale * diameter_m);
         DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
-    }
-
-    fn forward(&self) -> Option<Box<dyn Forward>> {
-        None
     }
 
     fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {

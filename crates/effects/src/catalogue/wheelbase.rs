@@ -9,7 +9,6 @@ use kinematics::{DriveGeometry, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::Forward;
 
 /// Ratio of the wheelbases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,10 +25,6 @@ impl PhysicalEffect for Wheelbase {
 
     fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
         DriveGeometry::new(geometry.wheel_diameter_m(), self.ratio * geometry.wheel_separation_m()).unwrap_or(geometry)
-    }
-
-    fn forward(&self) -> Option<Box<dyn Forward>> {
-        None
     }
 
     fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
