@@ -99,8 +99,8 @@ fn complaints(crates: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
 #[test]
 fn the_arrows_between_crates_hold() {
     let crates = crates();
-    assert_eq!(crates.len(), ARROWS.len(), "crates and table: {:?}", crates.keys());
     assert_eq!(complaints(&crates), Vec::<String>::new());
+    assert_eq!(crates.len(), ARROWS.len(), "crates and table: {:?}", crates.keys());
     // What is allowed directly is allowed through others: no arrow can be walked round.
     for (user, allowed) in ARROWS {
         for (_, further) in ARROWS.iter().filter(|(name, _)| allowed.contains(name)) {

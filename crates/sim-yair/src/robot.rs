@@ -1,7 +1,7 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
 use dataset::{MarkedPoint, MotionProgram, NominalRobot, Platform, Run, RunInfo, TruthNoise, WheelLog};
-use effects::{Address, Forward, StreamName};
+use effects::{Address, EffectError, Forward, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use scenario::{Engine, Instrument, Scenario};
 
@@ -25,6 +25,9 @@ pub enum SimulationError {
     /// The geometry is not physical.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
+    /// An effect's size is not physical.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
     /// The controllers cannot do what is asked of them.
     #[error(transparent)]
     Servo(#[from] ServoError),
@@ -76,6 +79,7 @@ impl SimulatedRobot {
         more: Vec<(&'static str, Box<dyn Forward>)>,
     ) -> Result<Self, SimulationError> {
         let mut listed = scenario.effects.clone();
+        listed.iter().try_for_each(|effect| effect.physical().check())?;
         effects::sort_by_stage(&mut listed);
         let listed = listed.iter().filter_map(|effect| Some((effect.id(), effect.physical().forward()?)));
         let mut effects: Vec<(StreamName, Box<dyn Forward>)> = Vec::new();
