@@ -6,7 +6,7 @@ use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use scenario::{Engine, Instrument, Scenario};
 
 use crate::actuator::{Actuator, ConstantSpeed, ServoPair};
-use crate::drive::{Drive, DriveSetup};
+use crate::drive::{ActiveEffect, Drive, DriveSetup};
 use crate::instrument::Observer;
 use crate::servo::ServoError;
 
@@ -51,7 +51,7 @@ pub struct SimulatedRobot {
     placement: scenario::Placement,
     log_interval_s: Option<f64>,
     instruments: Vec<Instrument>,
-    effects: Vec<(StreamName, Box<dyn Forward>)>,
+    effects: Vec<ActiveEffect>,
     seed: u64,
     trial: u64,
     next_run: u64,
@@ -82,7 +82,8 @@ impl SimulatedRobot {
         listed.iter().try_for_each(|effect| effect.physical().check())?;
         effects::sort_by_stage(&mut listed);
         let listed = listed.iter().filter_map(|effect| Some((effect.id(), effect.physical().forward()?)));
-        let mut effects: Vec<(StreamName, Box<dyn Forward>)> = Vec::new();
+        let mut effects: Vec<ActiveEffect> = Vec::new();
+        let mut ids: Vec<&str> = Vec::new();
         for (id, effect) in listed.chain(more) {
             if scenario.engine == Engine::ClosedForm
                 && let Some(why) = effect.needs_stepping()
@@ -90,9 +91,9 @@ impl SimulatedRobot {
                 return Err(SimulationError::NeedsStepping { id, why });
             }
             // Named by id and by how often the id has come before: adding an effect disturbs no other's draws.
-            let name = StreamName::new(id);
-            let before = effects.iter().filter(|(other, _)| (0..8).any(|n| *other == name.nth(n))).count();
-            effects.push((name.nth(before as u64), effect));
+            let before = ids.iter().filter(|other| **other == id).count();
+            effects.push((StreamName::new(id).nth(before as u64), effect));
+            ids.push(id);
         }
         let mut nominal = scenario.robot.nominal();
         let counts_per_tick: u32 = effects.iter().filter_map(|(_, effect)| effect.counts_per_tick()).product();
