@@ -3,6 +3,7 @@
 mod calibrate;
 mod evaluate;
 mod import;
+mod reproduce;
 mod simulate;
 mod sweep;
 mod terminal;
@@ -34,6 +35,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     Evaluate(evaluate::Arguments),
     Sweep(sweep::Arguments),
+    Reproduce(reproduce::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
+        Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),
     };
     outcome.unwrap_or_else(|failure| {
         terminal.failure(&failure.to_string());

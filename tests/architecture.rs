@@ -23,8 +23,9 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("scenario", &["kinematics", "dataset", "effects"]),
     ("sim-yair", &["kinematics", "dataset", "effects", "scenario"]),
     ("calib", &["kinematics", "dataset"]),
-    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib"]),
-    ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "bench"]),
+    ("report", &[]),
+    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "report"]),
+    ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "bench", "report"]),
 ];
 
 /// Names that say nothing of what is inside.

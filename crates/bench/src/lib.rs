@@ -5,6 +5,7 @@
 //! fixed chunks and merged in order: the result is the same to the bit whatever the number of threads.
 
 mod moments;
+pub mod paper;
 mod sweep;
 mod table;
 mod trial;

@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn sensitivity_is_the_circumference_over_the_counts_of_a_turn() {
-        // 160 mm wheels and 1 mm a pulse mean 502.65 pulses a turn (digest, point 7).
+        // 160 mm wheels and 1 mm a pulse mean 502.65 pulses a turn (docs/paper.md, pulses of a turn).
         let m_per_count = yair().m_per_count(502.654_824_574_366_9).expect("valid");
         assert!((m_per_count.left - 1e-3).abs() < 1e-17);
         // ... and 500 pulses a turn give 1.0053 mm.

@@ -4,7 +4,7 @@
 //! which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
 //! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses instead of marks, the wheel contacts serve as marks.
 //! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that the outlier rule leaves, wheel by wheel.
-//! Two departures from the print, both in the digest: chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed
+//! Two departures from the print, both derived in docs/paper.md: chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed
 //! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn paper_eq_6_unsigned_is_off_backward_by_the_digests_amount() {
+    fn paper_eq_6_unsigned_is_off_backward() {
         // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03 % at m = 50 mm means Δθ = 1.5 mrad,
         // the turn that the paper's wheels (1.0334 and 1.0322) make over 500 pulses: 0.6/363 = 1.65 mrad.
         let marks = marks_after(Increment { distance_m: -0.5, turn_rad: 1.65e-3 }, Wheels::both(0.05));

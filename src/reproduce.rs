@@ -1,0 +1,45 @@
+//! `yair reproduce [--out DIR]`
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use bench::paper;
+use clap::Args;
+
+use crate::simulate::write_whole;
+use crate::terminal::{Failure, Terminal};
+
+/// The paper's tables from simulation, beside the published values, and where the paper contradicts itself.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// How often each experiment is repeated.
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    trials: u64,
+    /// Seed of every random draw, in place of the shipped scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Write the page (paper.md) and its figures (SVG and PNG) into this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let bar = terminal.progress(paper::total_trials(arguments.trials), "experiments");
+    let started = Instant::now();
+    let reproduction = paper::reproduce(arguments.trials, arguments.seed, &|trials| bar.inc(trials))?;
+    bar.finish_and_clear();
+    let elapsed_s = started.elapsed().as_secs_f64();
+    let page = reproduction.page();
+    if let Some(out) = &arguments.out {
+        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+        write_whole(&out.join("paper.md"), page.as_bytes())?;
+        for (stem, _, figure) in reproduction.pictures() {
+            figure.write(out, stem)?;
+        }
+    }
+    terminal.say(page.trim_end())?;
+    terminal.remark(&format!("{} experiments in {elapsed_s:.1} s", paper::total_trials(arguments.trials)));
+    terminal.document(&reproduction)?;
+    Ok(ExitCode::SUCCESS)
+}
