@@ -360,3 +360,19 @@ fn a_reader_that_goes_away_changes_neither_files_nor_exit_codes() {
     }
     assert!(Path::new(&at.path().join("swept/sweep.csv")).is_file());
 }
+
+#[test]
+fn reproduce_writes_the_page_and_its_pictures() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    let found = document(at, &["reproduce", "--trials", "20", "--seed", "5", "--out", "paper"]);
+    has_keys(&found, &["seed", "trials", "table_1", "table_2", "audit", "causes", "figure_4", "figure_6", "figure_7"]);
+    assert_eq!((&found["seed"], &found["trials"]), (&Value::from(5), &Value::from(20)));
+    let names: Vec<_> =
+        everything_in(&at.join("paper")).iter().map(|path| path.file_name().expect("named").to_owned()).collect();
+    for name in ["paper.md", "paper-figure-4.svg", "paper-figure-6.png", "paper-figure-7.svg", "paper-figure-7.png"] {
+        assert!(names.contains(&name.into()), "{name} in {names:?}");
+    }
+    assert_eq!(names.len(), 7);
+    assert!(refusal(at, &["reproduce", "--trials", "1"]).contains("at least 2"));
+}
