@@ -55,12 +55,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         write_whole(out, report.to_toml()?.as_bytes())?;
         terminal.remark(&format!("calibration in {}", out.display()));
     }
-    show(&report, sessions[0].robot, terminal)?;
+    show(&report, &sessions, terminal)?;
     terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn show(report: &CalibrationReport, robot: &NominalRobot, terminal: &Terminal) -> Result<(), Failure> {
+fn show(report: &CalibrationReport, sessions: &[Session<'_>], terminal: &Terminal) -> Result<(), Failure> {
+    let robot = sessions[0].robot;
+    let runs: usize = sessions.iter().map(|session| session.runs.len()).sum();
     let mut table = table(&["method", "parameter", "nominal", "value", "sigma", "unit"], 2);
     for method in &report.methods {
         for (key, value) in &method.parameters {
@@ -82,11 +84,8 @@ fn show(report: &CalibrationReport, robot: &NominalRobot, terminal: &Terminal) -
             terminal.say(&error.clone())?;
             continue;
         }
-        terminal.say(&format!(
-            "{name}: {} runs used, {} values rejected",
-            method.runs_used,
-            method.runs_rejected.len()
-        ))?;
+        let rejected = method.runs_rejected.len();
+        terminal.say(&format!("{name}: {} of {runs} runs used, {rejected} values rejected", method.runs_used))?;
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
         }

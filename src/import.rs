@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::Existing;
 use dataset::import::{IMPORTERS, importer};
 use serde::Serialize;
 
+use crate::simulate::write_dataset;
 use crate::terminal::{Failure, Terminal};
 
 /// Other people's logs into datasets.
@@ -50,14 +50,13 @@ struct Imported {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let importer = importer(&arguments.format).ok_or("no such format")?;
     let sessions = (importer.read)(&arguments.source)?;
-    let existing = if arguments.force { Existing::ReplaceDataset } else { Existing::Refuse };
     let dirs = folders(arguments, &sessions)?;
     let mut datasets = Vec::with_capacity(sessions.len());
     for (session, dir) in sessions.iter().zip(dirs) {
         for warning in &session.warnings {
             terminal.remark(&format!("warning: {}: {warning}", session.name));
         }
-        dataset::write(&session.dataset, &dir, existing)?;
+        write_dataset(&session.dataset, &dir, arguments.force)?;
         let runs = &session.dataset.runs;
         let odometry_rows = runs.iter().map(|run| run.odometry.t_s.len()).sum();
         terminal.say(&format!("{} runs, {odometry_rows} odometry rows in {}", runs.len(), dir.display()))?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use dataset::Existing;
+use dataset::{Dataset, DatasetError, Existing};
 use scenario::Scenario;
 use serde::Serialize;
 use tempfile::NamedTempFile;
@@ -48,7 +48,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let scenario = Scenario::read(&arguments.scenario)?;
     let seed = arguments.seed.unwrap_or(scenario.seed);
     let simulation = sim_yair::simulate(&scenario, seed, arguments.trial)?;
-    let existing = if arguments.force { Existing::ReplaceDataset } else { Existing::Refuse };
     // The truth waits in a temporary file until the dataset stands: both are written or none.
     let truth = truth_path(&arguments.out)?;
     if truth.is_dir() || (truth.exists() && !arguments.force) {
@@ -57,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     create_parents(&truth)?;
     let waiting = staged(&truth, &serde_json::to_vec_pretty(&simulation.truth)?)?;
-    dataset::write(&simulation.dataset, &arguments.out, existing)?;
+    write_dataset(&simulation.dataset, &arguments.out, arguments.force)?;
     waiting.persist(&truth).map_err(|error| format!("{}: {}", truth.display(), error.error))?;
 
     let runs = &simulation.dataset.runs;
@@ -83,6 +82,15 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     ))?;
     terminal.document(&document)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a dataset; where one stands in the way, says how it is replaced.
+pub(crate) fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
+    let existing = if force { Existing::ReplaceDataset } else { Existing::Refuse };
+    dataset::write(dataset, dir, existing).map_err(|error| match error {
+        DatasetError::AlreadyExists { .. } if !force => format!("{error}; --force replaces a dataset").into(),
+        other => other.into(),
+    })
 }
 
 /// `DIR.truth.json`, the dataset folder's sibling, also where DIR is `.` or ends in `..`.

@@ -50,14 +50,14 @@ fn csv_bytes(result: &SweepResult) -> Result<Vec<u8>, Box<dyn std::error::Error>
         "failures",
     ];
     writer.write_record(axes.iter().copied().chain(columns))?;
-    let or_empty = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    let or_empty = |value: Option<f64>| value.map_or_else(String::new, number);
     for point in &result.points {
         for estimator in &point.estimators {
-            let levels = point.levels.values().map(ToString::to_string);
+            let levels = point.levels.values().map(|level| number(*level));
             let values = [
                 estimator.method.clone(),
                 estimator.parameter.clone(),
-                estimator.truth.to_string(),
+                number(estimator.truth),
                 or_empty(estimator.bias),
                 or_empty(estimator.bias_mcse),
                 or_empty(estimator.variance),
@@ -71,4 +71,9 @@ fn csv_bytes(result: &SweepResult) -> Result<Vec<u8>, Box<dyn std::error::Error>
         }
     }
     Ok(writer.into_inner()?)
+}
+
+/// The shortest text that reads back to the same bits; small numbers with an exponent.
+fn number(value: f64) -> String {
+    format!("{value:?}")
 }

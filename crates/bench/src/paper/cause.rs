@@ -182,6 +182,9 @@ pub enum CauseError {
     Calibration(#[from] CalibError),
 }
 
+/// A turn on the spot of less travel a wheel is a corner: a quarter turn takes 285 mm, a whole one 1140 mm, at 80 counts a millimetre.
+const CORNER_BELOW_COUNTS: f64 = 80.0 * 570.0;
+
 /// The extension at work. Sizes are small against the travels they change.
 struct Acting {
     extension: Extension,
@@ -197,8 +200,7 @@ impl Forward for Acting {
 
     fn command(&mut self, command: &mut Command) {
         let turning = command.travel_counts.left * command.travel_counts.right < 0.0;
-        // A quarter turn is under a third of a turn of this robot's wheels' 1140 mm; a full spin is over it. Counts are 80 a millimetre.
-        self.corner = turning && command.travel_counts.right.abs() < 80.0 * 400.0;
+        self.corner = turning && command.travel_counts.right.abs() < CORNER_BELOW_COUNTS;
     }
 
     fn floor(&mut self, step: &mut Step) {
