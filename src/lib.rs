@@ -2,7 +2,7 @@
 //!
 //! The rooms are crates of their own, named here as a user meets them:
 //! [`kinematics`] (poses, drive, dead reckoning), [`dataset`] (measured runs, their files and importers, protocols), [`effects`] (what makes odometry
-//! deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods) and [`bench`](mod@bench) (Monte Carlo).
+//! deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods) [`bench`](mod@bench) (Monte Carlo) and [`report`] (pictures).
 //!
 //! ```
 //! let text = include_str!("../scenarios/paper.toml");
@@ -20,5 +20,6 @@ pub use calib;
 pub use dataset;
 pub use effects;
 pub use kinematics;
+pub use report;
 pub use scenario;
 pub use sim_yair;

@@ -1,6 +1,6 @@
 //! `yair simulate SCENARIO --out DIR`
 
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -128,10 +128,5 @@ fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
     }
     // The temporary file's random name would tell the user nothing: only the kind of the error is shown.
     let failed = |error: io::Error| format!("{}: {}", path.display(), error.kind());
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    Ok(file)
+    Ok(report::stage(path, bytes).map_err(failed)?)
 }

@@ -16,19 +16,8 @@ pub fn write_results(result: &SweepResult, dir: &Path) -> Result<(), BenchError>
     let csv = csv_bytes(result).map_err(|error| failed(dir, error.to_string()))?;
     for (name, bytes) in [("sweep.json", json), ("sweep.csv", csv)] {
         let path = dir.join(name);
-        write_whole(dir, &path, &bytes).map_err(|error| failed(&path, error.to_string()))?;
+        report::write_whole(&path, &bytes).map_err(|error| failed(&path, error.to_string()))?;
     }
-    Ok(())
-}
-
-fn write_whole(dir: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut builder = tempfile::Builder::new();
-    // As readable as any other file of the user; temporary files are private.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir)?;
-    std::io::Write::write_all(&mut file, bytes)?;
-    file.persist(path)?;
     Ok(())
 }
 

@@ -1,11 +1,11 @@
 //! A figure: its description, and its two forms, SVG and PNG.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use resvg::{tiny_skia, usvg};
 
 use crate::error::ReportError;
+use crate::file::write_whole;
 use crate::font::Font;
 use crate::layout::Layout;
 use crate::panel::Panel;
@@ -116,7 +116,7 @@ impl Figure {
         std::fs::create_dir_all(dir).map_err(|error| at(dir, error))?;
         let paths = [dir.join(format!("{stem}.svg")), dir.join(format!("{stem}.png"))];
         for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
-            write_whole(dir, path, bytes).map_err(|error| at(path, error))?;
+            write_whole(path, bytes).map_err(|error| at(path, error))?;
         }
         Ok(paths)
     }
@@ -144,15 +144,4 @@ impl Figure {
         }
         Ok(())
     }
-}
-
-fn write_whole(dir: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut builder = tempfile::Builder::new();
-    // As readable as any other file of the user; temporary files are private.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir)?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
 }
