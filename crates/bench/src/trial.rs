@@ -17,8 +17,19 @@ impl Trial {
     /// # Errors
     /// [`SimulationError`] when the scenario cannot be simulated.
     pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, SimulationError> {
+        Self::with_programs(scenario, seed, scenario.programs())
+    }
+
+    /// Prepares a scenario's robot for programs of the caller's instead of the scenario's own.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_programs(
+        scenario: &Scenario,
+        seed: u64,
+        programs: Vec<MotionProgram>,
+    ) -> Result<Self, SimulationError> {
         let robot = SimulatedRobot::new(scenario, seed, 0)?;
-        let programs = scenario.programs();
         let dataset = Dataset {
             provenance: dataset::Provenance::default(),
             robot: robot.robot(),

@@ -6,18 +6,19 @@
 //! density, which is read at the published values.
 
 use calib::methods::direct::{Direct, RunValue};
-use dataset::{Dataset, Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Provenance, Run};
+use dataset::{Motion, MotionProgram, Protocol, ProtocolSettings};
 use effects::Effect;
 use kinematics::{Side, Wheels};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
-use sim_yair::{SimulatedRobot, SimulationError};
+use sim_yair::SimulationError;
 
 use super::published::TABLE_1;
 use super::shape::{ROWS, Shape};
 use super::{COUNTS_PER_PULSE, MM_PER_M};
+use crate::Trial;
 
 /// Where the scatter of table 1 comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -119,35 +120,22 @@ fn scenario(base: &Scenario, hypothesis: Hypothesis, reading_sigma_m: f64, sensi
 
 /// One experiment: as many runs as the paper kept, wheel by wheel, after the outlier rule.
 struct Experiment {
-    robot: SimulatedRobot,
-    programs: Vec<MotionProgram>,
-    dataset: Dataset,
+    trial: Trial,
     mm_per_pulse: f64,
 }
 
 impl Experiment {
     fn new(scenario: &Scenario) -> Result<Self, SimulationError> {
-        let robot = SimulatedRobot::new(scenario, scenario.seed, 0)?;
         let programs = programs(TABLE_1.left.count.max(TABLE_1.right.count));
-        let dataset = Dataset {
-            provenance: Provenance::default(),
-            robot: robot.robot(),
-            truth_noise: robot.truth_noise(),
-            points: robot.points().to_vec(),
-            runs: vec![Run::default(); programs.len()],
-        };
+        let trial = Trial::with_programs(scenario, scenario.seed, programs)?;
         let counts_per_turn = scenario.robot.encoder.counts_per_wheel_turn();
         let mm_per_pulse = MM_PER_M * std::f64::consts::TAU * COUNTS_PER_PULSE / counts_per_turn;
-        Ok(Self { robot, programs, dataset, mm_per_pulse })
+        Ok(Self { trial, mm_per_pulse })
     }
 
     /// Sensitivities of a trial, mm/pulse.
     fn sensitivities(&mut self, trial: u64) -> Result<Wheels<Vec<f64>>, SimulationError> {
-        self.robot.restart(trial);
-        for (program, run) in self.programs.iter().zip(&mut self.dataset.runs) {
-            self.robot.drive_into(program, run)?;
-        }
-        let session = [self.dataset.session()];
+        let session = [self.trial.drive(trial)?];
         // Marks stand beside the axle in every scenario of the paper: the method's only refusal cannot come.
         let values = Direct::straight_values(&session).unwrap_or_default();
         let kept = |values: &[RunValue<'_>], count: usize| {

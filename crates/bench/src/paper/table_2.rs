@@ -11,9 +11,9 @@ use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::SimulationError;
 
+use super::MM_PER_M;
 use super::published::{Column, Printed, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_1::quantile;
-use super::{COUNTS_PER_PULSE, MM_PER_M};
 use crate::Trial;
 
 /// One cell of table 2 beside its simulation. Sensitivities in mm/pulse, lengths in mm.
@@ -82,7 +82,6 @@ pub fn table_2(
     let mut scenario = base.clone();
     scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     scenario.instruments = vec![Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }];
-    let pulses_per_tick = scenario.robot.nominal().ticks_per_rev.unwrap_or(1.0) / COUNTS_PER_PULSE;
     let found: Result<Vec<Vec<Found>>, SimulationError> = (0..trials.div_ceil(TRIALS_PER_TASK))
         .into_par_iter()
         .map(|task| {
@@ -90,7 +89,7 @@ pub fn table_2(
             let from = task * TRIALS_PER_TASK;
             let mut found = Vec::new();
             for number in from..(from + TRIALS_PER_TASK).min(trials) {
-                let ticks_per_rev = trial.ticks_per_rev().unwrap_or(pulses_per_tick);
+                let ticks_per_rev = trial.ticks_per_rev().unwrap_or(f64::NAN);
                 let session = [trial.drive(number)?];
                 let methods: [&dyn Method; 2] = [&Direct::DEFAULT, &Umbmark::DEFAULT];
                 let [Ok(direct), Ok(umbmark)] = methods.map(|method| method.calibrate(&session)) else { continue };
