@@ -87,7 +87,8 @@ fn without_noise_inside(motions: &[Motion], trials: u64) -> Vec<Pose> {
     let nominal = scenario(Engine::ClosedForm).nominal_geometry().expect("valid");
     (0..trials)
         .map(|trial| {
-            let mut stream = effects::Address { seed: 77, trial, run: 0 }.stream(effects::StreamName::new("specimen"));
+            let mut stream =
+                effects::Address { seed: 77, point: 0, trial, run: 0 }.stream(effects::StreamName::new("specimen"));
             let (mut world, mut reckoned) = (Pose::IDENTITY, Pose::IDENTITY);
             for motion in motions {
                 let increment = match *motion {

@@ -90,7 +90,7 @@ mod tests {
     use effects::{Address, StreamName};
 
     fn sample(seed: u64, n: usize) -> Vec<f64> {
-        let mut stream = Address { seed, trial: 0, run: 0 }.stream(StreamName::new("moments"));
+        let mut stream = Address { seed, point: 0, trial: 0, run: 0 }.stream(StreamName::new("moments"));
         (0..n).map(|_| 3.0 + stream.normal() + 0.3 * stream.normal().powi(2)).collect()
     }
 

@@ -1,7 +1,7 @@
-//! Addressed randomness: a draw is a function of seed, trial, run and the stream's name, never of what was drawn elsewhere.
+//! Addressed randomness: a draw is a function of seed, point, trial, run and the stream's name, never of what was drawn elsewhere.
 //!
 //! So a new stream disturbs no other, a skipped trial neither, and one thread or sixteen give the same bits. Each address seeds its own xoshiro256++
-//! (Blackman & Vigna 2019) through an injective mix of the address's four words, so two addresses never share a state.
+//! (Blackman & Vigna 2019) through an injective mix of the address's words, so two addresses never share a state.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -36,18 +36,21 @@ impl StreamName {
 pub struct Address {
     /// Seed of the whole experiment.
     pub seed: u64,
+    /// Point of the sweep's design; 0 outside of sweeps.
+    pub point: u32,
     /// Trial of the campaign.
     pub trial: u64,
     /// Run within the trial.
-    pub run: u64,
+    pub run: u32,
 }
 
 impl Address {
     /// The stream of a name at this address, at its beginning.
     #[must_use]
     pub fn stream(&self, name: StreamName) -> Stream {
-        // A bijection of the four words, each mixed with the ones before it and then with the ones after it.
-        let mut words = [self.seed, self.trial, self.run, name.0];
+        // A bijection of the four words, each mixed with the ones before it and then with the ones after it. Point and run share one.
+        let place = u64::from(self.point) << 32 | u64::from(self.run);
+        let mut words = [self.seed, self.trial, place, name.0];
         words[0] = mix(words[0]);
         for k in 1..4 {
             words[k] = mix(words[k] ^ words[k - 1]);
@@ -98,7 +101,7 @@ impl Stream {
 mod tests {
     use super::*;
 
-    const ADDRESS: Address = Address { seed: 1, trial: 2, run: 3 };
+    const ADDRESS: Address = Address { seed: 1, point: 0, trial: 2, run: 3 };
 
     fn first(address: Address, name: &str) -> u64 {
         address.stream(StreamName::new(name)).uniform().to_bits()
@@ -123,8 +126,10 @@ mod tests {
             first(Address { seed: 2, ..ADDRESS }, "wheel"),
             first(Address { trial: 1, ..ADDRESS }, "wheel"),
             first(Address { run: 2, ..ADDRESS }, "wheel"),
-            first(Address { seed: 2, trial: 1, run: 3 }, "wheel"),
-            first(Address { seed: 1, trial: 3, run: 2 }, "wheel"),
+            first(Address { point: 1, ..ADDRESS }, "wheel"),
+            first(Address { point: 3, run: 0, ..ADDRESS }, "wheel"),
+            first(Address { seed: 2, trial: 1, ..ADDRESS }, "wheel"),
+            first(Address { trial: 3, run: 2, ..ADDRESS }, "wheel"),
         ];
         for (k, draw) in draws.iter().enumerate() {
             assert!(!draws[..k].contains(draw), "{k}");

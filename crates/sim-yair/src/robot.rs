@@ -52,9 +52,8 @@ pub struct SimulatedRobot {
     log_interval_s: Option<f64>,
     instruments: Vec<Instrument>,
     effects: Vec<ActiveEffect>,
-    seed: u64,
-    trial: u64,
-    next_run: u64,
+    /// Where the next run's draws are.
+    address: Address,
     observers: Vec<Observer>,
     last_ends: (Pose, Pose),
 }
@@ -111,9 +110,7 @@ impl SimulatedRobot {
             log_interval_s: scenario.log.map(|log| log.interval_s),
             instruments: scenario.instruments.clone(),
             effects,
-            seed,
-            trial,
-            next_run: 0,
+            address: Address { seed, point: 0, trial, run: 0 },
             observers: Vec::new(),
             last_ends: (Pose::IDENTITY, Pose::IDENTITY),
         };
@@ -122,10 +119,16 @@ impl SimulatedRobot {
         Ok(robot)
     }
 
+    /// The same robot at another point of a sweep's design: other draws, for points that are compared to be independent.
+    #[must_use]
+    pub fn at_point(mut self, point: u32) -> Self {
+        self.address.point = point;
+        self
+    }
+
     /// Goes to the first run of another trial.
     pub fn restart(&mut self, trial: u64) {
-        self.trial = trial;
-        self.next_run = 0;
+        self.address = Address { trial, run: 0, ..self.address };
     }
 
     /// The drive about which everything scatters.
@@ -184,8 +187,8 @@ impl Platform for SimulatedRobot {
     }
 
     fn drive_into(&mut self, program: &MotionProgram, run: &mut Run) -> Result<(), SimulationError> {
-        let address = Address { seed: self.seed, trial: self.trial, run: self.next_run };
-        self.next_run += 1;
+        let address = self.address;
+        self.address.run += 1;
         for (name, effect) in &mut self.effects {
             effect.start_run(address.stream(*name));
         }

@@ -87,7 +87,7 @@ mod tests {
     fn paper_eq_11_the_wheelbase_is_normal_from_motion_to_motion() {
         let size = ContactPatchWheelbase { sigma_m: 1e-3, slow_sigma_m: 0.0, slow_length_m: 0.0 };
         let mut state = size.forward().expect("acts in steps");
-        state.start_run(Address { seed: 5, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        state.start_run(Address { seed: 5, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         let (n, mut sum, mut squares) = (20_000, 0.0, 0.0);
         for _ in 0..n {
             state.start_motion();
@@ -110,7 +110,7 @@ mod tests {
             let mut state = size.forward().expect("acts in steps");
             let (runs, mut squares, mut products) = (4000_u32, 0.0, 0.0);
             for run in 0..runs {
-                state.start_run(Address { seed: 6, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")));
+                state.start_run(Address { seed: 6, point: 0, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")));
                 let excess = |state: &mut Box<dyn Forward>, travel_m: f64| {
                     let mut step = specimen_step();
                     step.travel_m = kinematics::Wheels::both(travel_m);
