@@ -3,9 +3,11 @@
 mod calibrate;
 mod evaluate;
 mod import;
+mod merge;
 mod reproduce;
 mod simulate;
 mod sweep;
+mod sweep_table;
 mod terminal;
 
 use std::process::ExitCode;
@@ -35,6 +37,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     Evaluate(evaluate::Arguments),
     Sweep(sweep::Arguments),
+    Merge(merge::Arguments),
     Reproduce(reproduce::Arguments),
 }
 
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
+        Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),
     };
     outcome.unwrap_or_else(|failure| {

@@ -1,154 +1,222 @@
-//! `yair sweep SCENARIO [--trials N] [--jobs J] [--out DIR]`
+//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N] [--resume] [--rows] [--out DIR] [--check BASELINE [--update]]`
 
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use bench::{EstimatorResult, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, Ended, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
+use serde::Serialize;
 
+use crate::sweep_table;
 use crate::terminal::{Failure, Terminal, table};
 
-/// Monte-Carlo: bias, standard deviation and RMSE of every method over the levels of a scenario.
+/// Monte-Carlo: bias, spread, coverage and efficiency of every method over a scenario's design.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Scenario file (TOML) with a [sweep] section; see scenarios/.
     scenario: PathBuf,
-    /// Trials at every point, in place of the scenario's.
-    #[arg(long, value_name = "N")]
+    /// Trials at every point, in place of the scenario's; with --precision, at most so many.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..=MOST_TRIALS))]
     trials: Option<u64>,
+    /// Run every point until all its Monte-Carlo errors are below this: 1% or 0.01.
+    #[arg(long, value_name = "P", value_parser = precision)]
+    precision: Option<f64>,
     /// Threads; 0 = one a core. The result does not depend on it.
     #[arg(long, value_name = "J", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=MOST_JOBS))]
     jobs: u16,
     /// Seed of every random draw, in place of the scenario's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Write sweep.json and sweep.csv into this folder.
+    /// Run part I of N only; `yair merge` puts the parts together.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    shard: Option<Shard>,
+    /// Go on with the interrupted sweep in the folder of --out.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Keep every trial's estimates: trials.parquet in the folder of --out.
+    #[arg(long, requires = "out")]
+    rows: bool,
+    /// Write sweep.json, sweep.csv and a picture into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Compare with a stored sweep; exit 3 when any number has moved.
+    #[arg(long, value_name = "BASELINE", conflicts_with = "shard")]
+    check: Option<PathBuf>,
+    /// Write the baseline of --check anew and show what moved.
+    #[arg(long, requires = "check")]
+    update: bool,
 }
 
 /// More threads than any machine of ours has cores; a typing error beyond.
 const MOST_JOBS: i64 = 1024;
 
-/// More than a year of any scenario; a typing error beyond, whose bookkeeping alone would not fit into memory.
+/// More than a year of any scenario; a typing error beyond.
 const MOST_TRIALS: u64 = 100_000_000;
+
+/// Exit code when accuracy has moved, as of `yair evaluate --max-drift`.
+const MOVED: u8 = 3;
+
+/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
+const INTERRUPTED: u8 = 130;
+
+/// A sweep's document with what a check adds.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    result: &'a SweepResult,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<&'a AccuracyCheck>,
+}
+
+fn precision(text: &str) -> Result<f64, String> {
+    let (number, scale) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let value = number.trim().parse::<f64>().ok().map(|number| number * scale);
+    // Below a hundredth of a per cent every point would need a thousand million trials.
+    value
+        .filter(|value| (1e-4..=0.5).contains(value))
+        .ok_or_else(|| "expected 0.01% to 50%, as in 1% or 0.01".to_owned())
+}
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let file = arguments.scenario.display();
-    let trials = arguments.trials.or(scenario.sweep.as_ref().map(|sweep| sweep.trials));
-    if let Some(trials) = trials.filter(|trials| *trials > MOST_TRIALS) {
-        return Err(format!("{file}: {trials} trials at each point; expected at most {MOST_TRIALS}").into());
-    }
-    let plan =
-        SweepPlan::new(&scenario, arguments.trials, arguments.seed).map_err(|error| format!("{file}: {error}"))?;
+    let options = SweepOptions { trials: arguments.trials, seed: arguments.seed, precision: arguments.precision };
+    let plan = SweepPlan::new(&scenario, options).map_err(|error| format!("{file}: {error}"))?;
+    // Whatever can go wrong at the end is looked at before the trials.
+    let baseline = match &arguments.check {
+        Some(path) if !arguments.update || path.exists() => Some(bench::read_baseline(path)?),
+        _ => None,
+    };
     if let Some(out) = &arguments.out {
-        can_be_written(out)?;
+        bench::can_be_written(out)?;
     }
-    let bar = terminal.progress(plan.total_trials(), "trials");
+    let stop = Arc::new(AtomicBool::new(false));
+    if arguments.out.is_some() {
+        // A second Ctrl-C ends at once.
+        let flag = Arc::clone(&stop);
+        let _ = ctrlc::set_handler(move || {
+            if flag.swap(true, Ordering::Relaxed) {
+                std::process::exit(INTERRUPTED.into());
+            }
+        });
+    }
+    let bar = terminal.progress(0, "trials");
     let started = Instant::now();
-    let result = plan.run(usize::from(arguments.jobs), &|trials| bar.inc(trials))?;
+    let ended = plan.campaign(&Campaign {
+        jobs: arguments.jobs.into(),
+        folder: arguments.out.as_deref(),
+        resume: arguments.resume,
+        shard: arguments.shard.unwrap_or(Shard::WHOLE),
+        rows: arguments.rows,
+        stop: &stop,
+        progress: &|progress| {
+            bar.set_length(progress.planned);
+            bar.set_position(progress.done);
+        },
+    })?;
     bar.finish_and_clear();
     let elapsed_s = started.elapsed().as_secs_f64();
-    if let Some(out) = &arguments.out {
-        bench::write_results(&result, out)?;
-    }
-    show(&result, terminal)?;
-    terminal.remark(&format!("{} trials in {elapsed_s:.1} s", plan.total_trials()));
-    terminal.document(&result)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Fails before the trials are run, not after, when the results could not be written. Leaves nothing behind.
-fn can_be_written(out: &Path) -> Result<(), Failure> {
-    let failed = |error: io::Error| format!("{}: cannot write results there: {}", out.display(), error.kind());
-    if out.exists() {
-        tempfile::tempfile_in(out).map_err(failed)?;
-        return Ok(());
-    }
-    let made = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
-    let made: Vec<&Path> = made.collect();
-    std::fs::create_dir_all(out).map_err(failed)?;
-    let probed = tempfile::tempfile_in(out).map_err(failed);
-    for folder in made {
-        // Only what is still empty goes.
-        let _ = std::fs::remove_dir(folder);
-    }
-    probed.map(drop).map_err(Failure::from)
-}
-
-/// A parameter as the paper writes it.
-fn symbol(parameter: &str) -> &str {
-    match parameter {
-        "left_m_per_tick" => "C_L",
-        "right_m_per_tick" => "C_R",
-        "wheel_separation_m" => "B",
-        other => other,
-    }
-}
-
-fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Failure> {
-    terminal.say(&format!(
-        "{}: seed {}, {} trials at each of {} points; errors in per cent of the true value, each ± its Monte-Carlo standard error",
-        result.scenario,
-        result.seed,
-        result.trials,
-        result.points.len()
-    ))?;
-    let axes: Vec<&str> =
-        result.points.first().map_or(Vec::new(), |point| point.levels.keys().map(String::as_str).collect());
-    for (number, axis) in axes.iter().enumerate() {
-        terminal.say(&format!("  axis {}: {axis}", number + 1))?;
-    }
-    let numbers: Vec<String> = (1..=axes.len()).map(|number| format!("axis {number}")).collect();
-    let headers: Vec<&str> =
-        numbers.iter().map(String::as_str).chain(["method", "", "bias %", "std %", "RMSE %", "cover"]).collect();
-    let mut table = table(&headers, axes.len() + 2);
-    let mut blind = false;
-    for point in &result.points {
-        // A level or a method is printed where it begins, so that the eye finds the blocks.
-        let mut levels: Vec<String> = point.levels.values().map(ToString::to_string).collect();
-        let mut method = "";
-        for estimator in &point.estimators {
-            let percent = |pair: Option<(f64, f64)>| {
-                pair.map_or_else(
-                    || "–".to_owned(),
-                    |(value, error)| percent(value / estimator.truth, error / estimator.truth),
-                )
+    let out = arguments.out.as_deref();
+    match ended {
+        Ended::Stopped(progress) => {
+            terminal.remark(&format!(
+                "stopped after {} of {} trials; the same command with --resume goes on",
+                progress.done, progress.planned
+            ));
+            Ok(ExitCode::from(INTERRUPTED))
+        }
+        Ended::Shard => {
+            let (shard, out) = (arguments.shard.unwrap_or(Shard::WHOLE), out.unwrap_or(Path::new(".")));
+            terminal.remark(&format!(
+                "shard {shard} stands in {} after {elapsed_s:.1} s; yair merge puts the shards together",
+                out.display()
+            ));
+            Ok(ExitCode::SUCCESS)
+        }
+        Ended::Whole(result) => {
+            if let Some(out) = out {
+                bench::write_results(&plan, &result, arguments.rows, out)?;
+            }
+            sweep_table::show(&result, terminal)?;
+            let trials: u64 = result.points.iter().map(|point| point.trials).sum();
+            terminal.remark(&format!("{trials} trials in {elapsed_s:.1} s"));
+            let check = match (&arguments.check, baseline) {
+                (Some(path), Some(baseline)) => Some(bench::compare(&result, &baseline, &path.display().to_string())),
+                _ => None,
             };
-            let mark = if estimator.common_scale_observable { "" } else { "*" };
-            blind |= !estimator.common_scale_observable;
-            let name = if estimator.method == method { "" } else { &estimator.method };
-            method = &estimator.method;
-            table.add_row(levels.iter().cloned().chain([
-                name.to_owned(),
-                format!("{}{mark}", symbol(&estimator.parameter)),
-                percent(estimator.bias.zip(estimator.bias_mcse)),
-                percent(estimator.std()),
-                percent(estimator.rmse.zip(estimator.rmse_mcse)),
-                coverage(estimator),
-            ]));
-            levels.iter_mut().for_each(String::clear);
+            conclude(arguments, terminal, &result, check)
         }
     }
-    terminal.say(&table.to_string())?;
-    if blind {
-        terminal.say("* cannot see the scale common to both wheels: its bias is the scale that was not measured")?;
+}
+
+/// Says what the comparison with the baseline gave, and writes the baseline anew where that is asked for.
+fn conclude(
+    arguments: &Arguments,
+    terminal: &Terminal,
+    result: &SweepResult,
+    check: Option<Result<AccuracyCheck, bench::BenchError>>,
+) -> Result<ExitCode, Failure> {
+    // A baseline for other points can be replaced, not compared with.
+    let check = match check {
+        Some(Err(error)) if arguments.update => {
+            terminal.remark(&error.to_string());
+            None
+        }
+        check => check.transpose()?,
+    };
+    terminal.document(&Document { result, check: check.as_ref() })?;
+    if let Some(check) = &check {
+        show_check(check, arguments.update, terminal)?;
+    }
+    if let Some(path) = arguments.check.as_ref().filter(|_| arguments.update) {
+        let mut bytes = serde_json::to_vec_pretty(result)?;
+        bytes.push(b'\n');
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        }
+        report::write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        terminal.remark(&format!("baseline {} is written", path.display()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let moved = check.is_some_and(|check| !check.moved.is_empty());
+    Ok(if moved { ExitCode::from(MOVED) } else { ExitCode::SUCCESS })
+}
+
+/// Most lines that a person reads of what changed.
+const MOST_SHOWN: usize = 20;
+
+fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.say(&format!(
+        "accuracy: {} numbers compared, {} moved beyond |z| = {:.2} (one false alarm in {:.0} comparisons); largest |z| = {:.2}",
+        check.compared,
+        check.moved.len(),
+        check.z_limit,
+        1.0 / check.false_alarm_budget,
+        check.largest_z
+    ))?;
+    let shown = if update { &check.changed } else { &check.moved };
+    if shown.is_empty() {
+        return Ok(());
+    }
+    let mut rows = table(&["point", "method", "", "number", "was", "is", "z"], 4);
+    for number in shown.iter().take(MOST_SHOWN) {
+        rows.add_row([
+            number.point.clone(),
+            number.method.clone(),
+            sweep_table::symbol(&number.parameter).to_owned(),
+            number.statistic.to_owned(),
+            format!("{:.4e}", number.was),
+            format!("{:.4e}", number.is),
+            format!("{:.1}", number.z),
+        ]);
+    }
+    terminal.say(&rows.to_string())?;
+    if shown.len() > MOST_SHOWN {
+        terminal.say(&format!("and {} more", shown.len() - MOST_SHOWN))?;
     }
     Ok(())
-}
-
-/// `value ± error` in per cent, to the error's first digit: no digit is printed that the trials do not carry.
-fn percent(value: f64, error: f64) -> String {
-    let error = 100.0 * error;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let decimals = if error > 0.0 { (-error.log10().floor()).clamp(0.0, 7.0) as usize } else { 4 };
-    format!("{:.decimals$} ± {error:.decimals$}", 100.0 * value)
-}
-
-fn coverage(estimator: &EstimatorResult) -> String {
-    estimator.coverage.map_or_else(|| "–".to_owned(), |coverage| format!("{:.1}%", 100.0 * coverage))
 }

@@ -5,7 +5,7 @@ use dataset::{
 };
 use effects::{
     Backlash, CATALOGUE, ContactPatchWheelbase, CounterWrap, Effect, MissedCounts, Quantization, SamplingSkew,
-    SlipAcceleration, SlipSpeed, TractionLoss, WheelEccentricity, WheelMismatch, WheelScale, Wheelbase, Which,
+    SlipAcceleration, SlipSpeed, TractionLoss, TruthOutliers, WheelEccentricity, WheelMismatch, WheelScale, Wheelbase, Which,
 };
 use kinematics::{Increment, Pose, Rule, Wheels};
 use scenario::{Engine, Instrument, Log, Scenario};
@@ -79,6 +79,12 @@ fn specimens() -> Vec<Specimen> {
             32.0,
             16.0,
             7.0,
+        ),
+        of(
+            |probability| Effect::TruthOutliers(TruthOutliers { probability, jump_m: 0.05, jump_rad: 0.1 }),
+            0.0,
+            1.0,
+            1.5,
         ),
     ]
 }

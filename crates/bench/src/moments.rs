@@ -1,7 +1,9 @@
 //! Running moments to the fourth, mergeable (Pébay 2008): what a Monte-Carlo error of a bias, a variance and an RMSE needs, in constant memory.
 
+use serde::{Deserialize, Serialize};
+
 /// Count, mean and central moments of a sample of errors.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Moments {
     count: f64,
     mean: f64,

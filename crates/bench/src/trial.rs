@@ -40,6 +40,13 @@ impl Trial {
         Ok(Self { robot, programs, dataset })
     }
 
+    /// The same trial at another point of a sweep's design: other draws.
+    #[must_use]
+    pub fn at_point(mut self, point: u32) -> Self {
+        self.robot = self.robot.at_point(point);
+        self
+    }
+
     /// Drives trial number `trial` and shows what was measured.
     ///
     /// # Errors

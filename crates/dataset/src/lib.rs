@@ -5,6 +5,7 @@
 //! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
 //! simulator here, a real robot elsewhere.
 
+mod cost;
 mod counter;
 mod error;
 pub mod import;
@@ -18,6 +19,7 @@ mod term;
 mod warning;
 mod write;
 
+pub use cost::{Cost, Pace};
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
 pub use platform::{Platform, record_session};

@@ -100,6 +100,18 @@ impl Schedule {
         }
     }
 
+    /// The same with so many runs in each direction; twice as many of a validation path, which has one.
+    #[must_use]
+    pub fn with_pairs(mut self, pairs: u32) -> Self {
+        match &mut self {
+            Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => {
+                *runs = pairs.saturating_mul(2);
+            }
+            Self::Squares { runs_each_way, .. } => *runs_each_way = pairs,
+        }
+        self
+    }
+
     /// The programs, with ids that sort in driving order.
     #[must_use]
     pub fn programs(&self) -> Vec<MotionProgram> {
@@ -197,6 +209,21 @@ mod tests {
         let spins = Schedule::Spins { turn_rad: TAU, runs: 2 }.programs();
         assert_eq!(spins[0].settings.turn_rad, Some(TAU));
         assert_eq!(spins[1].settings.turn_rad, Some(-TAU));
+    }
+
+    #[test]
+    fn pairs_of_runs_are_driven_alike_in_both_directions() {
+        let length_m = 0.5;
+        for schedule in [
+            Schedule::Straights { length_m, runs: 7 },
+            Schedule::Spins { turn_rad: TAU, runs: 7 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 7 },
+        ] {
+            let programs = schedule.with_pairs(3).programs();
+            assert_eq!((programs.len(), schedule.with_pairs(3).runs()), (6, 6));
+            let one_way = programs.iter().filter(|program| program.motions == programs[0].motions).count();
+            assert_eq!(one_way, 3, "{schedule:?}");
+        }
     }
 
     #[test]

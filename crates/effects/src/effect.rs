@@ -50,6 +50,15 @@ pub trait PhysicalEffect {
         geometry
     }
 
+    /// Standard deviation of the wheel separation from motion to motion, metres; what a bound on calibration takes a motion's scatter from. `Err` says why
+    /// the scatter is none that is drawn once a motion.
+    ///
+    /// # Errors
+    /// The reason, for people.
+    fn wheel_separation_sigma_m(&self) -> Result<f64, &'static str> {
+        Ok(0.0)
+    }
+
     /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
     fn forward(&self) -> Option<Box<dyn Forward>> {
         None

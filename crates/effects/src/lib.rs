@@ -93,6 +93,7 @@ contents! {
     sampling_skew::SamplingSkew,
     quantization::Quantization,
     counter_wrap::CounterWrap,
+    truth_outliers::TruthOutliers,
 }
 
 /// Puts effects into the order in which they act, so that a scenario's order does not matter.

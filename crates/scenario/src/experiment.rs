@@ -3,11 +3,12 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use dataset::{MotionProgram, Schedule};
+use dataset::Schedule;
 use effects::{Effect, EffectError};
 use kinematics::{DriveGeometry, GeometryError};
 use serde::{Deserialize, Serialize};
 
+use crate::budget::{Budget, NoFit};
 use crate::robot::Robot;
 use crate::sweep::Sweep;
 
@@ -59,12 +60,22 @@ pub enum ScenarioError {
         /// The range.
         must_be: &'static str,
     },
-    /// A sweep's axis names a key that the scenario does not have, or one that is not a number.
-    #[error("{place}: sweep axis \"{key}\": {problem}")]
+    /// Protocols that cannot be driven within the budget.
+    #[error("{place}: {key} does not fit into the budget: {source}")]
+    NoFit {
+        /// The file.
+        place: String,
+        /// Dotted key of the protocols.
+        key: String,
+        /// Why.
+        source: NoFit,
+    },
+    /// A sweep's axis or case names a key that the scenario does not have, or one that is not a number.
+    #[error("{place}: {key}: {problem}")]
     Axis {
         /// The file.
         place: String,
-        /// Dotted key.
+        /// Which axis or case, with its dotted key.
         key: String,
         /// What is wrong with it.
         problem: String,
@@ -75,7 +86,10 @@ pub enum ScenarioError {
 const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
 /// Most runs of one scenario, over all protocols: each is kept in memory.
-const MOST_RUNS: u64 = 100_000;
+pub(crate) const MOST_RUNS: u64 = 100_000;
+
+/// Bounds of robots that drive on floors and of their rooms, wide enough for any of them: they keep a slip of the pen from running for days.
+pub(crate) const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,6 +107,9 @@ pub struct Scenario {
     pub noise: Noise,
     /// Where runs start.
     pub placement: Placement,
+    /// What a calibration may take: protocols are fitted to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
     /// How often the robot writes down its counters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log: Option<Log>,
@@ -213,6 +230,8 @@ impl Scenario {
             ScenarioError::Toml { place, message: error.message().trim().replace('\n', "; ") }
         })?;
         scenario.check(place)?;
+        let no_fit = |source| ScenarioError::NoFit { place: place.to_owned(), key: "protocol".to_owned(), source };
+        scenario.fitted(&scenario.protocols).map_err(no_fit)?;
         if let Some(sweep) = &scenario.sweep {
             sweep.points(&scenario, place)?;
         }
@@ -226,12 +245,6 @@ impl Scenario {
     pub fn to_toml(&self) -> Result<String, ScenarioError> {
         toml::to_string(self)
             .map_err(|error| ScenarioError::Toml { place: self.name.clone(), message: error.to_string() })
-    }
-
-    /// Everything that is driven, in order.
-    #[must_use]
-    pub fn programs(&self) -> Vec<MotionProgram> {
-        self.protocols.iter().flat_map(Schedule::programs).collect()
     }
 
     /// The robot's specified drive.
@@ -259,8 +272,7 @@ impl Scenario {
         let positive = |key: &str, value: f64| range(key, value, value.is_finite() && value > 0.0, "positive");
         let not_negative = |key: &str, value: f64| range(key, value, value.is_finite() && value >= 0.0, "0 or more");
         let finite = |key: &str, value: f64| range(key, value, value.is_finite(), "finite");
-        // Bounds of robots that drive on floors, wide enough for any of them: they keep a slip of the pen from running for days.
-        let length = |key: &str, value: f64| range(key, value, (1e-3..=1e4).contains(&value), "from 0.001 to 10000 m");
+        let length = |key: &str, value: f64| range(key, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
         let speed = |key: &str, value: f64| range(key, value, (1e-3..=1e2).contains(&value), "from 0.001 to 100");
         let interval =
             |key: &str, value: f64| range(key, value, (1e-5..=1e3).contains(&value), "from 0.00001 to 1000 s");
@@ -345,24 +357,55 @@ impl Scenario {
         for effect in &self.effects {
             effect.physical().check().map_err(|source| ScenarioError::Effect { place: place.to_owned(), source })?;
         }
-        for part in &self.protocols {
-            match *part {
-                Schedule::Straights { length_m, .. } => length("protocol.length_m", length_m)?,
-                Schedule::Spins { turn_rad, .. } => {
-                    range("protocol.turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
-                }
-                Schedule::Squares { side_m, .. } => length("protocol.side_m", side_m)?,
-                Schedule::ValidationPath { length_m, measure_every_m, .. } => {
-                    length("protocol.length_m", length_m)?;
-                    let holds = measure_every_m >= 1e-3 && measure_every_m <= length_m;
-                    range("protocol.measure_every_m", measure_every_m, holds, "from 0.001 m to length_m")?;
-                }
+        if let Some(budget) = &self.budget {
+            budget.check(place)?;
+        }
+        self.check_protocols(place, "protocol", &self.protocols)?;
+        let Some(sweep) = &self.sweep else { return Ok(()) };
+        for (method, protocols) in &sweep.protocols {
+            self.check_protocols(place, &format!("sweep.protocols.{method}"), protocols)?;
+        }
+        if !sweep.validation.is_empty() {
+            check_schedules(place, "sweep.validation", &sweep.validation)?;
+        }
+        Ok(())
+    }
+
+    fn check_protocols(&self, place: &str, key: &str, protocols: &[Schedule]) -> Result<(), ScenarioError> {
+        check_schedules(place, key, protocols)?;
+        let path = protocols.iter().any(|part| matches!(part, Schedule::ValidationPath { .. }));
+        if self.budget.is_some() && path {
+            let (place, key) = (place.to_owned(), key.to_owned());
+            return Err(ScenarioError::NoFit { place, key, source: NoFit::ValidationPath });
+        }
+        Ok(())
+    }
+}
+
+/// Whether schedules, the ones at `key`, can be driven at all.
+fn check_schedules(place: &str, key: &str, schedules: &[Schedule]) -> Result<(), ScenarioError> {
+    let range = |last: &str, value: f64, holds: bool, must_be: &'static str| {
+        let key = format!("{key}.{last}");
+        if holds { Ok(()) } else { Err(ScenarioError::OutOfRange { place: place.to_owned(), key, value, must_be }) }
+    };
+    let length = |last: &str, value: f64| range(last, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
+    for part in schedules {
+        match *part {
+            Schedule::Straights { length_m, .. } => length("length_m", length_m)?,
+            Schedule::Spins { turn_rad, .. } => {
+                range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+            }
+            Schedule::Squares { side_m, .. } => length("side_m", side_m)?,
+            Schedule::ValidationPath { length_m, measure_every_m, .. } => {
+                length("length_m", length_m)?;
+                let holds = measure_every_m >= 1e-3 && measure_every_m <= length_m;
+                range("measure_every_m", measure_every_m, holds, "from 0.001 m to length_m")?;
             }
         }
-        let runs: u64 = self.protocols.iter().map(Schedule::runs).sum();
-        #[allow(clippy::cast_precision_loss)]
-        range("protocol.runs", runs as f64, (1..=MOST_RUNS).contains(&runs), "from 1 to 100000 in all")
     }
+    let runs: u64 = schedules.iter().map(Schedule::runs).sum();
+    #[allow(clippy::cast_precision_loss)]
+    range("runs", runs as f64, (1..=MOST_RUNS).contains(&runs), "from 1 to 100000 in all")
 }
 
 #[cfg(test)]

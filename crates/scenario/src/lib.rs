@@ -1,11 +1,15 @@
-//! The words of an experiment as data: robot, noise, effects with sizes, instruments, protocols and sweep. TOML in and out, no behaviour.
+//! The words of an experiment as data: robot, noise, effects with sizes, instruments, protocols, budget and sweep. TOML in and out, no behaviour.
 //!
 //! A scenario is all that a simulated number depends on besides seed and trial. Unknown keys are errors, and no physical quantity has a default.
 
+mod axis;
+mod budget;
 mod experiment;
 mod robot;
 mod sweep;
 
+pub use axis::{Level, Levels, Range, Scale};
+pub use budget::{Budget, NoFit};
 pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario, ScenarioError};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
-pub use sweep::{Axis, Point, Sweep};
+pub use sweep::{Axis, CASE_AXIS, Case, Point, Sobol, Sweep};

@@ -1,10 +1,12 @@
-//! A sweep: axes over any numeric key of the scenario, crossed into points, and who estimates.
+//! A sweep: cases and axes over any numeric key of the scenario, crossed into points, and who estimates from which protocols.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use dataset::Schedule;
 use serde::{Deserialize, Serialize};
-use toml::{Table, Value};
+use toml::Table;
 
+use crate::axis::{self, Level, Levels};
 use crate::experiment::{Scenario, ScenarioError};
 
 /// What a sweep varies.
@@ -15,128 +17,235 @@ pub struct Sweep {
     pub trials: u64,
     /// Calibration methods that each trial is given to.
     pub methods: Vec<String>,
-    /// Dotted keys of the scenario, each with its levels. A list is indexed by number (`protocol.0.runs`) or by its element's kind
-    /// (`effect.wheelbase.ratio`).
+    /// Dotted keys of the scenario, each with its levels; several keys apart by commas take the same level together. A list is indexed by number
+    /// (`protocol.0.runs`) or by its element's kind or id (`effect.wheelbase.ratio`).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub axes: BTreeMap<String, Vec<f64>>,
+    pub axes: BTreeMap<String, Levels>,
+    /// Sobol points in the axes' ranges instead of a grid of their lists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sobol: Option<Sobol>,
+    /// Named sets of values; every case is crossed with all points of the axes.
+    #[serde(default, rename = "case", skip_serializing_if = "Vec::is_empty")]
+    pub cases: Vec<Case>,
+    /// What a method drives instead of the scenario's own protocols, by the method's name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocols: BTreeMap<String, Vec<Schedule>>,
+    /// What is driven on paper after a calibration, to turn errors of parameters into drift. No budget bounds it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub validation: Vec<Schedule>,
 }
 
-/// Most points of a grid: each is a scenario in memory.
-const MOST_POINTS: f64 = 10_000.0;
+/// Sobol points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sobol {
+    /// How many; a power of two fills the ranges most evenly.
+    pub points: u32,
+}
+
+/// A named set of values: a robot, a room.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// A name for people and tables.
+    pub name: String,
+    /// Dotted keys of the scenario, as for the axes, each with its value.
+    #[serde(default)]
+    pub set: BTreeMap<String, f64>,
+}
+
+/// The axis on which a point's case is named.
+pub const CASE_AXIS: &str = "case";
+
+/// Most points of a sweep: each is a scenario in memory.
+const MOST_POINTS: u32 = 10_000;
+
+/// Dimensions for which the Sobol sequence has direction numbers.
+const MOST_SOBOL_AXES: usize = 256;
 
 /// One axis with the level that a point takes on it.
-pub type Axis = (String, f64);
+pub type Axis = (String, Level);
 
 /// One point of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// The level on each axis, in the order of the axes.
+    /// The case where there are cases, and the level on each axis in the order of the axes.
     pub levels: Vec<Axis>,
     /// The scenario with these levels.
     pub scenario: Scenario,
 }
 
 impl Sweep {
-    /// The full grid over the axes, the last axis varying fastest; one point when there is none.
+    /// All points: every case with every point of the axes, which are the full grid of their lists, the last axis varying fastest, or Sobol points in
+    /// their ranges. One point where nothing is varied.
     ///
     /// # Errors
     /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's scenario invalid.
     pub fn points(&self, scenario: &Scenario, place: &str) -> Result<Vec<Point>, ScenarioError> {
-        let toml_error = |message: String| ScenarioError::Toml { place: place.to_owned(), message };
+        let text_error = |message: String| ScenarioError::Toml { place: place.to_owned(), message };
+        self.check().map_err(text_error)?;
+        let mut base = Table::try_from(scenario).map_err(|error| text_error(error.to_string()))?;
+        let designs = self.designs(scenario.seed, &mut base, place)?;
+
+        let mut points = Vec::with_capacity(self.cases.len().max(1) * designs.len());
+        let no_case = [None];
+        let some_cases: Vec<_> = self.cases.iter().map(Some).collect();
+        for case in if some_cases.is_empty() { &no_case[..] } else { &some_cases[..] } {
+            let mut table = base.clone();
+            let mut levels = Vec::with_capacity(1 + self.axes.len());
+            if let Some(case) = case {
+                for (key, value) in &case.set {
+                    axis::set(&mut table, key, *value).map_err(|problem| case.error(place, key, problem))?;
+                }
+                levels.push((CASE_AXIS.to_owned(), Level::Name(case.name.clone())));
+            }
+            for design in &designs {
+                let (mut table, mut levels) = (table.clone(), levels.clone());
+                for (key, level) in self.axes.keys().zip(design) {
+                    axis::set(&mut table, key, *level).map_err(|problem| axis_error(place, key, problem))?;
+                    levels.push((key.clone(), Level::Number(*level)));
+                }
+                let scenario: Scenario =
+                    table.try_into().map_err(|error: toml::de::Error| text_error(error.message().to_owned()))?;
+                scenario.check(place)?;
+                points.push(Point { levels, scenario });
+            }
+        }
+        Ok(points)
+    }
+
+    /// What can be said without the scenario.
+    fn check(&self) -> Result<(), String> {
         if self.trials < 2 {
-            return Err(toml_error(format!("sweep.trials is {}; a spread needs at least 2", self.trials)));
+            return Err(format!("sweep.trials is {}; a spread needs at least 2", self.trials));
         }
         if self.methods.is_empty() {
-            return Err(toml_error("sweep.methods is empty; name at least one method".to_owned()));
+            return Err("sweep.methods is empty; name at least one method".to_owned());
         }
-        for (k, method) in self.methods.iter().enumerate() {
-            if self.methods[..k].contains(method) {
-                return Err(toml_error(format!("sweep.methods names \"{method}\" twice")));
+        if let Some(name) = twice(&self.methods) {
+            return Err(format!("sweep.methods names \"{name}\" twice"));
+        }
+        if let Some(name) = self.protocols.keys().find(|name| !self.methods.contains(name)) {
+            let methods = self.methods.join(", ");
+            return Err(format!("sweep.protocols.{name}: no such method in sweep.methods, which has: {methods}"));
+        }
+        let names: Vec<String> = self.cases.iter().map(|case| case.name.clone()).collect();
+        if names.iter().any(String::is_empty) {
+            return Err("a [[sweep.case]] has an empty name".to_owned());
+        }
+        if let Some(name) = twice(&names) {
+            return Err(format!("two [[sweep.case]] have the name \"{name}\"; names must differ"));
+        }
+        if let Some(sobol) = self.sobol {
+            if sobol.points == 0 {
+                return Err("sweep.sobol.points is 0; ask for at least 1".to_owned());
+            }
+            if self.axes.is_empty() || self.axes.len() > MOST_SOBOL_AXES {
+                let axes = self.axes.len();
+                return Err(format!("sweep.sobol needs 1 to {MOST_SOBOL_AXES} ranges in sweep.axes, which has {axes}"));
             }
         }
-        let points: f64 =
-            self.axes.values().map(|levels| f64::from(u32::try_from(levels.len()).unwrap_or(u32::MAX))).product();
-        if points > MOST_POINTS {
-            return Err(toml_error(format!("sweep.axes cross into {points} points; at most {MOST_POINTS} are driven")));
+        let levels = |levels: &Levels| match levels {
+            Levels::List(list) if self.sobol.is_none() => list.len(),
+            _ => 1,
+        };
+        let count = |n: usize| f64::from(u32::try_from(n).unwrap_or(u32::MAX));
+        let grid: f64 = self.axes.values().map(|axis| count(levels(axis))).product();
+        let points = grid * self.sobol.map_or(1.0, |sobol| f64::from(sobol.points)) * count(self.cases.len().max(1));
+        if points > f64::from(MOST_POINTS) {
+            return Err(format!("the sweep crosses into {points} points; at most {MOST_POINTS} are driven"));
         }
-        let base = Table::try_from(scenario).map_err(|error| toml_error(error.to_string()))?;
-        let mut tables = vec![(Vec::new(), base)];
-        for (key, levels) in &self.axes {
-            let axis_error =
-                |problem: String| ScenarioError::Axis { place: place.to_owned(), key: key.clone(), problem };
-            if matches!(key.split('.').next(), Some("seed" | "sweep")) {
-                return Err(axis_error("the seed and the sweep itself are the same at every point".to_owned()));
-            }
-            if levels.is_empty() {
-                return Err(axis_error("it has no levels".to_owned()));
-            }
-            let mut crossed = Vec::with_capacity(tables.len() * levels.len());
-            for (point, table) in tables {
-                for &level in levels {
-                    let (mut point, mut table) = (point.clone(), table.clone());
-                    set_number(&mut table, key, level).map_err(axis_error)?;
-                    point.push((key.clone(), level));
-                    crossed.push((point, table));
+        Ok(())
+    }
+
+    /// Levels of all axes, point by point.
+    fn designs(&self, seed: u64, base: &mut Table, place: &str) -> Result<Vec<Vec<f64>>, ScenarioError> {
+        let mut taken = BTreeSet::new();
+        let mut designs = vec![Vec::new(); self.sobol.map_or(1, |sobol| sobol.points as usize)];
+        for ((key, levels), number) in self.axes.iter().zip(0..) {
+            let error = |problem: String| axis_error(place, key, problem);
+            let (places, whole) = axis::places(base, key).map_err(error)?;
+            for place in places {
+                if !taken.insert(place.clone()) {
+                    return Err(error(format!("{place} is set twice, by this axis or by another")));
                 }
             }
-            tables = crossed;
+            match (levels, self.sobol) {
+                (Levels::List(list), None) => {
+                    if list.is_empty() {
+                        return Err(error("it has no levels".to_owned()));
+                    }
+                    let crossed = |design: &Vec<f64>| {
+                        let design = design.clone();
+                        list.iter().map(move |level| design.iter().chain([level]).copied().collect())
+                    };
+                    designs = designs.iter().flat_map(crossed).collect();
+                }
+                (Levels::Range(range), Some(_)) => {
+                    range.check(whole).map_err(error)?;
+                    for (design, point) in designs.iter_mut().zip(0..) {
+                        design.push(range.level(axis::sobol_share(seed, point, number), whole));
+                    }
+                }
+                (Levels::List(_), Some(_)) => {
+                    let range = "with [sweep.sobol] give a range, such as { from = 0.0, to = 0.002 }";
+                    return Err(error(format!("a list of levels makes a grid; {range}")));
+                }
+                (Levels::Range(_), None) => {
+                    let list = "without [sweep.sobol] give a list of levels, such as [0.0, 0.002]";
+                    return Err(error(format!("a range is where Sobol points fall; {list}")));
+                }
+            }
         }
-        tables
-            .into_iter()
-            .map(|(levels, table)| {
-                let scenario: Scenario =
-                    table.try_into().map_err(|error: toml::de::Error| toml_error(error.message().to_owned()))?;
-                scenario.check(place)?;
-                Ok(Point { levels, scenario })
-            })
-            .collect()
+        for case in &self.cases {
+            let mut taken = taken.clone();
+            for key in case.set.keys() {
+                let (places, _) = axis::places(base, key).map_err(|problem| case.error(place, key, problem))?;
+                if let Some(twice) = places.into_iter().find(|place| !taken.insert(place.clone())) {
+                    return Err(case.error(place, key, format!("{twice} is set twice, by this case or by an axis")));
+                }
+            }
+        }
+        Ok(designs)
     }
 }
 
-/// Puts `level` at the dotted key, keeping integers integers.
-fn set_number(table: &mut Table, key: &str, level: f64) -> Result<(), String> {
-    let mut words = key.split('.');
-    let first = words.next().unwrap_or_default();
-    let known = |table: &Table| table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-    let unknown = format!("no \"{first}\" in the scenario; it has: {}", known(table));
-    let mut value = table.get_mut(first).ok_or(unknown)?;
-    for word in words {
-        value = match value {
-            Value::Table(table) => {
-                let unknown = format!("no \"{word}\" there; known keys: {}", known(table));
-                table.get_mut(word).ok_or(unknown)?
-            }
-            Value::Array(items) => {
-                let kinds: Vec<_> = items
-                    .iter()
-                    .map(|item| item.get("kind").and_then(Value::as_str).unwrap_or("?").to_owned())
-                    .collect();
-                let position = word.parse().ok().or_else(|| kinds.iter().position(|kind| kind == word));
-                let unknown = format!("no \"{word}\" in that list; it has: {}", kinds.join(", "));
-                position.and_then(|position: usize| items.get_mut(position)).ok_or(unknown)?
-            }
-            _ => return Err(format!("\"{word}\" asks for a part of a single value")),
-        };
+impl Case {
+    fn error(&self, place: &str, key: &str, problem: String) -> ScenarioError {
+        let key = format!("sweep case \"{}\": \"{key}\"", self.name);
+        ScenarioError::Axis { place: place.to_owned(), key, problem }
     }
-    match value {
-        Value::Float(number) => *number = level,
-        #[allow(clippy::cast_possible_truncation)]
-        Value::Integer(number) if level.fract() == 0.0 && level.abs() < 1e15 => *number = level as i64,
-        Value::Integer(_) => return Err(format!("{level} is not a whole number, as this key asks")),
-        _ => return Err("it is not a number".to_owned()),
-    }
-    Ok(())
+}
+
+fn axis_error(place: &str, key: &str, problem: String) -> ScenarioError {
+    ScenarioError::Axis { place: place.to_owned(), key: format!("sweep axis \"{key}\""), problem }
+}
+
+fn twice(names: &[String]) -> Option<&String> {
+    names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)).map(|(_, name)| name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn empty() -> Sweep {
+        Sweep {
+            trials: 10,
+            methods: vec!["direct".to_owned()],
+            axes: BTreeMap::new(),
+            sobol: None,
+            cases: Vec::new(),
+            protocols: BTreeMap::new(),
+            validation: Vec::new(),
+        }
+    }
+
     fn paper(axes: &[(&str, &[f64])]) -> Scenario {
         let mut scenario =
             Scenario::parse(include_str!("../../../scenarios/paper.toml"), "paper.toml").expect("shipped");
-        let axes = axes.iter().map(|(key, levels)| ((*key).to_owned(), levels.to_vec())).collect();
-        scenario.sweep = Some(Sweep { trials: 10, methods: vec!["direct".to_owned()], axes });
+        let axes = axes.iter().map(|(key, levels)| ((*key).to_owned(), Levels::List(levels.to_vec()))).collect();
+        scenario.sweep = Some(Sweep { axes, ..empty() });
         scenario
     }
 
@@ -155,7 +264,8 @@ mod tests {
         .expect("all keys exist");
         assert_eq!(points.len(), 6);
         let last = &points[5];
-        assert_eq!(last.levels.iter().map(|(_, level)| *level).collect::<Vec<_>>(), [0.002, 0.25, 9.0]);
+        let levels: Vec<_> = last.levels.iter().map(|(_, level)| level.clone()).collect();
+        assert_eq!(levels, [0.002, 0.25, 9.0].map(Level::Number));
         assert_eq!(last.scenario.noise.wheel_sigma_m_per_sqrt_m, 0.25);
         assert_eq!(last.scenario.programs().iter().filter(|program| program.id.starts_with("straight")).count(), 9);
         let effects::Effect::ContactPatchWheelbase(patch) = &last.scenario.effects[2] else {
@@ -187,5 +297,205 @@ mod tests {
         assert!(error(&axes).contains("40000 points"));
         assert!(error(&[("noise.sensitivity_sigma", &[])]).contains("no levels"));
         assert!(error(&[("noise.sensitivity_sigma", &[-1.0])]).contains("0 or more"));
+    }
+
+    /// Paper's robot with another sweep.
+    fn parse(sweep: &str) -> Result<Scenario, ScenarioError> {
+        let text = include_str!("../../../scenarios/paper.toml");
+        let (head, _) = text.split_once("[sweep]").expect("the paper sweeps");
+        Scenario::parse(&format!("{head}[sweep]\ntrials = 2\nmethods = [\"direct\"]\n{sweep}"), "x.toml")
+    }
+
+    fn points_of(sweep: &str) -> Vec<Point> {
+        let scenario = parse(sweep).expect("valid");
+        let written = scenario.to_toml().expect("has a TOML form");
+        assert_eq!(Scenario::parse(&written, "written").expect("valid"), scenario);
+        scenario.sweep.as_ref().expect("given").points(&scenario, "x.toml").expect("valid")
+    }
+
+    fn refusal(sweep: &str) -> String {
+        let refusal = parse(sweep).expect_err("refused").to_string();
+        assert!(refusal.starts_with("x.toml") && !refusal.contains('\n'), "{refusal}");
+        refusal
+    }
+
+    fn number(point: &Point, axis: &str) -> f64 {
+        match point.levels.iter().find(|(key, _)| key == axis) {
+            Some((_, Level::Number(level))) => *level,
+            other => panic!("{axis} has no number: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn tied_keys_take_the_same_level() {
+        let points = points_of(
+            "[sweep.axes]\n\"robot.left_wheel_diameter_m, robot.right_wheel_diameter_m\" = [0.1, 0.2]\n\"robot.point.left.y_m\" = [0.3]",
+        );
+        assert_eq!(points.len(), 2);
+        for (point, level) in points.iter().zip([0.1, 0.2]) {
+            let robot = &point.scenario.robot;
+            assert_eq!((robot.left_wheel_diameter_m, robot.right_wheel_diameter_m), (level, level));
+            assert_eq!(robot.points[0].y_m, 0.3);
+            assert_eq!(point.levels.len(), 2);
+        }
+    }
+
+    const CASES: &str = r#"
+        [[sweep.case]]
+        name = "as built"
+        [[sweep.case]]
+        name = "wide, 30 runs"
+        [sweep.case.set]
+        "robot.wheel_separation_m" = 0.5
+        "protocol.straights.runs, protocol.spins.runs" = 30
+        [sweep.axes]
+        "noise.wheel_sigma_m_per_sqrt_m" = [0.0, 0.001]
+    "#;
+
+    #[test]
+    fn cases_are_crossed_with_the_axes_and_come_first() {
+        let points = points_of(CASES);
+        let names = points.iter().map(|point| point.levels[0].clone()).collect::<Vec<_>>();
+        let case = |name: &str| (CASE_AXIS.to_owned(), Level::Name(name.to_owned()));
+        let (built, wide) = (case("as built"), case("wide, 30 runs"));
+        assert_eq!(names, [built.clone(), built, wide.clone(), wide]);
+        let values = |point: &Point| {
+            let scenario = &point.scenario;
+            (scenario.robot.wheel_separation_m, scenario.noise.wheel_sigma_m_per_sqrt_m, scenario.programs().len())
+        };
+        assert_eq!(
+            points.iter().map(values).collect::<Vec<_>>(),
+            [(0.363, 0.0, 122), (0.363, 0.001, 122), (0.5, 0.0, 70), (0.5, 0.001, 70)]
+        );
+    }
+
+    #[test]
+    fn cases_that_say_nothing_sound_are_refused() {
+        let with = |from: &str, to: &str| {
+            assert!(CASES.contains(from));
+            refusal(&CASES.replace(from, to))
+        };
+        assert!(with("as built", "wide, 30 runs").contains("names must differ"));
+        assert!(with("as built", "").contains("empty name"));
+        let unknown = with("robot.wheel_separation_m", "robot.wheel_separation_mm");
+        assert!(unknown.contains("sweep case \"wide, 30 runs\": \"robot.wheel_separation_mm\": no "), "{unknown}");
+        assert!(with("= 30\n", "= 30.5\n").contains("30.5 is not a whole number"));
+        assert!(with("robot.wheel_separation_m", "noise.wheel_sigma_m_per_sqrt_m").contains("set twice"));
+        assert!(with("protocol.straights.runs, ", "protocol.1.runs, ").contains("protocol.1.runs is set twice"));
+        assert!(with("robot.wheel_separation_m\" = 0.5", "robot.wheel_separation_m\" = -1.0").contains("-1"));
+        assert!(with("[sweep.case.set]", "[sweep.case.sets]").contains("`set`"));
+        let twice = "[sweep.axes]\n\"effect.0.scale\" = [1.0]\n\"effect.wheel_scale.scale\" = [1.1]";
+        assert!(refusal(twice).contains("effect.0.scale is set twice"));
+    }
+
+    const SOBOL: &str = r#"
+        [sweep.sobol]
+        points = 64
+        [sweep.axes]
+        "effect.contact_patch_wheelbase.sigma_m" = { from = 0.0, to = 0.002 }
+        "noise.wheel_sigma_m_per_sqrt_m" = { from = 1e-4, to = 1e-2, scale = "log" }
+        "protocol.spins.runs" = { from = 21, to = 36 }
+    "#;
+
+    /// Share of each axis of [`SOBOL`] below a level, in its own scale.
+    fn shares(points: &[Point]) -> Vec<[f64; 3]> {
+        points
+            .iter()
+            .map(|point| {
+                let noise = number(point, "noise.wheel_sigma_m_per_sqrt_m");
+                [
+                    number(point, "effect.contact_patch_wheelbase.sigma_m") / 0.002,
+                    (noise / 1e-4).ln() / 100_f64.ln(),
+                    (number(point, "protocol.spins.runs") - 20.5) / 16.0,
+                ]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn sobol_points_fill_every_axis_and_every_pair_of_axes_evenly() {
+        let points = points_of(SOBOL);
+        assert_eq!(points.len(), 64);
+        let shares = shares(&points);
+        for axis in 0..3 {
+            // 64 cells of one axis (16 whole numbers for the last) hold one point each (four each). Random points leave no cell empty once in 3e26.
+            let cells = if axis == 2 { 16 } else { 64 };
+            for cell in 0..cells {
+                let within = |share: &&[f64; 3]| (share[axis] * f64::from(cells)).floor() == f64::from(cell);
+                let held = shares.iter().filter(within).count();
+                assert_eq!(held, 64 / cells as usize, "axis {axis}, cell {cell}");
+            }
+            // Every quarter of every pair of axes holds a quarter of the points: rejects axes that share a dimension, whose points lie on a diagonal.
+            for other in 0..axis {
+                let held = shares.iter().filter(|share| share[axis] < 0.5 && share[other] < 0.5).count();
+                assert_eq!(held, 16, "axes {other} and {axis}");
+            }
+        }
+    }
+
+    #[test]
+    fn sobol_points_are_the_seeds_and_their_scenarios_hold_the_levels_as_printed() {
+        let points = points_of(SOBOL);
+        assert_eq!(points, points_of(SOBOL));
+        for point in &points {
+            let typed = |axis: &str| number(point, axis).to_string().parse::<f64>().expect("a number");
+            let runs = point.scenario.programs().iter().filter(|program| program.id.starts_with("spin")).count();
+            assert_eq!(f64::from(u32::try_from(runs).expect("few")), typed("protocol.spins.runs"));
+            assert_eq!(point.scenario.noise.wheel_sigma_m_per_sqrt_m, typed("noise.wheel_sigma_m_per_sqrt_m"));
+        }
+        let mut other = parse(SOBOL).expect("valid");
+        for seed in [other.seed + 1, other.seed + (1 << 32)] {
+            other.seed = seed;
+            let others = other.sweep.as_ref().expect("given").points(&other, "x.toml").expect("valid");
+            assert!(points.iter().zip(&others).all(|(a, b)| a.levels != b.levels), "both words of the seed count");
+        }
+    }
+
+    #[test]
+    fn every_case_is_driven_at_the_same_sobol_points() {
+        let points = points_of(
+            &SOBOL
+                .replace("[sweep.sobol]", "[[sweep.case]]\nname = \"a\"\n[[sweep.case]]\nname = \"b\"\n[sweep.sobol]"),
+        );
+        assert_eq!(points.len(), 128);
+        for (a, b) in points[..64].iter().zip(&points[64..]) {
+            assert_eq!(a.levels[1..], b.levels[1..]);
+            assert_ne!(a.levels[0], b.levels[0]);
+        }
+    }
+
+    #[test]
+    fn lists_make_grids_and_ranges_hold_sobol_points() {
+        let with = |from: &str, to: &str| {
+            assert!(SOBOL.contains(from));
+            refusal(&SOBOL.replace(from, to))
+        };
+        assert!(with("{ from = 0.0, to = 0.002 }", "[0.0, 0.002]").contains("with [sweep.sobol] give a range"));
+        assert!(with("[sweep.sobol]\n        points = 64", "").contains("without [sweep.sobol] give a list"));
+        assert!(with("from = 21, to = 36", "from = 20.5, to = 36").contains("20.5 is not a whole number"));
+        assert!(with("from = 1e-4", "from = 0.0").contains("above 0"));
+        assert!(with("points = 64", "points = 0").contains("at least 1"));
+        assert!(with("points = 64", "points = 10001").contains("10001 points; at most 10000"));
+        assert!(with("points = 64", "points = 64\nskip = 1").contains("`points`"));
+        assert!(refusal("[sweep.sobol]\npoints = 4").contains("needs 1 to 256 ranges"));
+    }
+
+    #[test]
+    fn protocols_and_validation_are_checked_where_they_stand() {
+        let own = |method: &str, protocol: &str| format!("[sweep.protocols]\n{method} = [{protocol}]");
+        let squares = "{ kind = \"squares\", side_m = 1.0, runs_each_way = 1 }";
+        let scenario = parse(&own("direct", squares)).expect("valid");
+        assert_eq!(scenario.programs_for("direct").expect("no budget").len(), 2);
+        assert!(
+            refusal(&own("umbmark", squares))
+                .contains("sweep.protocols.umbmark: no such method in sweep.methods, which has: direct")
+        );
+        assert!(refusal(&own("direct", &squares.replace("1.0", "0.0"))).contains("sweep.protocols.direct.side_m is 0"));
+        assert!(refusal(&own("direct", "")).contains("sweep.protocols.direct.runs is 0"));
+        assert!(refusal(&own("direct", &squares.replace("side_m", "side"))).contains("`side_m`"));
+        let path = "[[sweep.validation]]\nkind = \"validation_path\"\nlength_m = 40.0\nmeasure_every_m = 0.5\nruns = 1";
+        let validation = parse(path).expect("valid").sweep.expect("given").validation;
+        assert_eq!(validation, [Schedule::ValidationPath { length_m: 40.0, measure_every_m: 0.5, runs: 1 }]);
+        assert!(refusal(&path.replace("40.0", "0.1")).contains("sweep.validation.measure_every_m is 0.5"));
     }
 }

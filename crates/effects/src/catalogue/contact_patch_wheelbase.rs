@@ -25,6 +25,9 @@ pub struct ContactPatchWheelbase {
     pub slow_length_m: f64,
 }
 
+/// Why a whole motion at once does not have the slow part.
+const SLOW_PART_VARIES: &str = "its slow part varies within a motion";
+
 impl PhysicalEffect for ContactPatchWheelbase {
     fn check(&self) -> Result<(), EffectError> {
         let id = "contact_patch_wheelbase";
@@ -35,6 +38,10 @@ impl PhysicalEffect for ContactPatchWheelbase {
         sigma("slow_sigma_m", self.slow_sigma_m)?;
         let holds = self.slow_sigma_m == 0.0 || self.slow_length_m > 0.0;
         EffectError::unless(holds, id, "slow_length_m", self.slow_length_m, "positive when slow_sigma_m is not 0")
+    }
+
+    fn wheel_separation_sigma_m(&self) -> Result<f64, &'static str> {
+        if self.slow_sigma_m > 0.0 { Err(SLOW_PART_VARIES) } else { Ok(self.sigma_m) }
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
@@ -73,7 +80,7 @@ impl Forward for State {
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
-        (self.size.slow_sigma_m > 0.0).then_some("its slow part varies within a motion")
+        (self.size.slow_sigma_m > 0.0).then_some(SLOW_PART_VARIES)
     }
 }
 
@@ -100,7 +107,10 @@ mod tests {
         let n = f64::from(n);
         // Five standard errors of a mean and of a variance.
         assert!((sum / n).abs() < 5.0 * 1e-3 / n.sqrt());
-        assert!((squares / n / 1e-6 - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
+        let stated_m = size.wheel_separation_sigma_m().expect("no slow part");
+        assert!((squares / n / (stated_m * stated_m) - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
+        let slow = ContactPatchWheelbase { slow_sigma_m: 1e-4, slow_length_m: 0.2, ..size };
+        assert_eq!(slow.wheel_separation_sigma_m(), Err(SLOW_PART_VARIES));
     }
 
     #[test]

@@ -1,0 +1,23 @@
+//! Sweeps: a design of points, trials at each of them on all cores, and what every method made of them.
+
+mod accuracy;
+mod campaign;
+mod dyadic;
+mod merge;
+mod page;
+mod plan;
+mod quantile;
+mod result;
+mod rows;
+mod state;
+mod table;
+mod tally;
+mod validation;
+
+pub use accuracy::{AccuracyCheck, Comparison, FALSE_ALARM_BUDGET, compare, read_baseline};
+pub use campaign::{Campaign, Ended, Progress};
+pub use merge::{Merged, merge};
+pub use plan::{SweepOptions, SweepPlan, TRACKED};
+pub use result::{Coverage, DriftResult, EstimatorResult, MethodCost, PointResult, Quantile, SweepResult};
+pub use state::Shard;
+pub use table::{can_be_written, write_merged, write_results};

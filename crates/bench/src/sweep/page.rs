@@ -1,0 +1,256 @@
+//! One page a sweep: bias, spread, efficiency and coverage of every method against each axis.
+//!
+//! Against an axis of a grid the other axes stand at the middle of their levels, and the caption says where; of a sampled design every point is drawn.
+
+use std::collections::BTreeSet;
+
+use report::{Axis, Figure, Marks, Panel, Range, Scale, Series};
+use scenario::Level;
+
+use super::plan::TRACKED;
+use super::result::{EstimatorResult, PointResult, SweepResult};
+
+/// Values that differ by more than this factor share no linear axis.
+const LINEAR_FACTOR: f64 = 30.0;
+
+/// A number of a method at a point with its standard error, in the unit that is drawn. What is not of a parameter ignores it.
+type Number = fn(&PointResult, method: &str, parameter: &str) -> Option<(f64, f64)>;
+
+/// What is drawn: its name, its unit, and the number.
+struct Quantity {
+    name: &'static str,
+    unit: &'static str,
+    number: Number,
+    /// Where it would be without fault, and what that is called.
+    ideal: Option<(f64, &'static str)>,
+    /// A share from 0 to 1.
+    share: bool,
+}
+
+const QUANTITIES: [Quantity; 4] = [
+    Quantity { name: "bias", unit: "%", number: bias, ideal: Some((0.0, "no bias")), share: false },
+    Quantity { name: "standard deviation", unit: "%", number: std, ideal: None, share: false },
+    Quantity { name: "RMSE² / bound", unit: "", number: ratio, ideal: Some((1.0, "bound")), share: false },
+    Quantity { name: "coverage", unit: "", number: coverage, ideal: Some((0.95, "95 %")), share: true },
+];
+
+/// What a method's calibration is worth and what it costs, where the scenario states a validation path.
+const WORTH: [Quantity; 3] = [
+    Quantity { name: "RMS drift", unit: "%", number: drift, ideal: None, share: false },
+    Quantity { name: "time for calibration", unit: "min", number: minutes, ideal: None, share: false },
+    Quantity { name: "way for calibration", unit: "m", number: metres, ideal: None, share: false },
+];
+
+fn estimator<'p>(point: &'p PointResult, method: &str, parameter: &str) -> Option<&'p EstimatorResult> {
+    point.estimators.iter().find(|estimator| estimator.method == method && estimator.parameter == parameter)
+}
+
+fn bias(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
+    let estimator = estimator(point, method, parameter)?;
+    Some(percent(estimator.bias.zip(estimator.bias_mcse)?, estimator.truth))
+}
+
+fn std(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
+    let estimator = estimator(point, method, parameter)?;
+    Some(percent(estimator.std()?, estimator.truth))
+}
+
+fn ratio(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
+    let estimator = estimator(point, method, parameter)?;
+    estimator.cramer_rao_ratio.zip(estimator.cramer_rao_ratio_mcse)
+}
+
+fn coverage(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
+    estimator(point, method, parameter)?.coverage_95.map(|coverage| (coverage.share, coverage.mcse))
+}
+
+fn drift(point: &PointResult, method: &str, _: &str) -> Option<(f64, f64)> {
+    let drift = point.drift.iter().find(|drift| drift.method == method)?;
+    drift.rms_percent.zip(drift.rms_percent_mcse)
+}
+
+fn minutes(point: &PointResult, method: &str, _: &str) -> Option<(f64, f64)> {
+    Some((point.costs.iter().find(|cost| cost.method == method)?.minutes, 0.0))
+}
+
+fn metres(point: &PointResult, method: &str, _: &str) -> Option<(f64, f64)> {
+    Some((point.costs.iter().find(|cost| cost.method == method)?.metres, 0.0))
+}
+
+fn percent((value, error): (f64, f64), truth: f64) -> (f64, f64) {
+    (100.0 * value / truth, 100.0 * error / truth)
+}
+
+/// The page of a sweep; `None` when there is no axis with two levels.
+pub(super) fn page(result: &SweepResult) -> Option<Figure> {
+    let mut caption = format!("Scenario {}, seed {}", result.scenario, result.seed);
+    match result.precision {
+        Some(precision) => caption.push_str(&format!(", Monte-Carlo errors of at most {} %.", 100.0 * precision)),
+        None => caption.push_str(&format!(", {} trials a point.", result.trials)),
+    }
+    caption.push_str(" Errors in per cent of the true value, with their Monte-Carlo standard errors.");
+    let mut panels = Vec::new();
+    for axis in axes(result) {
+        if axis.levels.len() < 2 {
+            continue;
+        }
+        caption.push_str(&axis.caption(result));
+        if result.points.iter().any(|point| !point.drift.is_empty()) {
+            panels
+                .extend(WORTH.iter().map(|quantity| axis.panel(result, quantity, "", quantity.name == WORTH[0].name)));
+        }
+        for quantity in &QUANTITIES {
+            for (column, parameter) in TRACKED.into_iter().enumerate() {
+                let named = column == 0 && quantity.name == QUANTITIES[0].name;
+                panels.push(axis.panel(result, quantity, parameter.key(), named));
+            }
+        }
+    }
+    if panels.is_empty() {
+        return None;
+    }
+    let figure =
+        Figure::new(&format!("Calibration accuracy: {}", result.scenario)).caption(&caption).columns(TRACKED.len());
+    Some(panels.into_iter().fold(figure, Figure::panel))
+}
+
+/// A point to draw: level, value, standard error.
+type Drawn = (f64, f64, f64);
+
+/// One axis of the design.
+struct DesignAxis {
+    key: String,
+    /// Its levels in ascending order, cases in the order of the design.
+    levels: Vec<Level>,
+    /// The points drawn against it, by number, in the order of the levels.
+    points: Vec<usize>,
+    /// Where the other axes stand; empty when all points are drawn.
+    others: Vec<(String, Level)>,
+}
+
+/// The axes of a design, each with the points to be drawn against it.
+fn axes(result: &SweepResult) -> Vec<DesignAxis> {
+    let Some(first) = result.points.first() else { return Vec::new() };
+    let levels: Vec<(String, Vec<Level>)> =
+        first.levels.keys().map(|key| (key.clone(), levels_of(key, &result.points))).collect();
+    // A sampled design has as many levels on each axis as points.
+    let sampled = levels.iter().all(|(_, levels)| levels.len() == result.points.len()) && levels.len() > 1;
+    levels
+        .iter()
+        .map(|(key, own)| {
+            let middle = |levels: &[Level]| levels.get(levels.len() / 2).cloned();
+            let others: Vec<(String, Level)> = levels
+                .iter()
+                .filter(|(other, _)| other != key && !sampled)
+                .filter_map(|(other, levels)| Some((other.clone(), middle(levels)?)))
+                .collect();
+            let shown =
+                |point: &PointResult| others.iter().all(|(other, level)| point.levels.get(other) == Some(level));
+            let mut points: Vec<usize> = (0..result.points.len()).filter(|k| shown(&result.points[*k])).collect();
+            points.sort_by_key(|k| own.iter().position(|level| result.points[*k].levels.get(key) == Some(level)));
+            DesignAxis { key: key.clone(), levels: own.clone(), points, others }
+        })
+        .collect()
+}
+
+/// The distinct levels on an axis: numbers ascending, names as they come.
+fn levels_of(key: &str, points: &[PointResult]) -> Vec<Level> {
+    let mut levels: Vec<Level> = Vec::new();
+    for level in points.iter().filter_map(|point| point.levels.get(key)) {
+        if !levels.contains(level) {
+            levels.push(level.clone());
+        }
+    }
+    let number = |level: &Level| if let Level::Number(number) = level { *number } else { 0.0 };
+    levels.sort_by(|a, b| number(a).total_cmp(&number(b)));
+    levels
+}
+
+impl DesignAxis {
+    /// Where a point is drawn: at its number, or at the place of its case.
+    #[allow(clippy::cast_precision_loss)] // cases are few
+    fn x(&self, point: &PointResult) -> Option<f64> {
+        match point.levels.get(&self.key)? {
+            Level::Number(number) => Some(*number),
+            name => self.levels.iter().position(|level| level == name).map(|place| place as f64 + 1.0),
+        }
+    }
+
+    fn caption(&self, result: &SweepResult) -> String {
+        let mut text = String::new();
+        if self.levels.iter().any(|level| matches!(level, Level::Name(_))) {
+            let names = self.levels.iter().enumerate().map(|(place, level)| format!("{} = {level}", place + 1));
+            text.push_str(&format!(" {}: {}.", self.key, names.collect::<Vec<_>>().join(", ")));
+        }
+        let rest: Vec<String> = self.others.iter().map(|(key, level)| format!("{key} = {level}")).collect();
+        if !rest.is_empty() && self.points.len() < result.points.len() {
+            text.push_str(&format!(" Against {}: {}.", self.key, rest.join(", ")));
+        }
+        text
+    }
+
+    fn panel(&self, result: &SweepResult, quantity: &Quantity, parameter: &str, named: bool) -> Panel {
+        let methods: BTreeSet<&str> =
+            result.points.iter().flat_map(|point| &point.estimators).map(|estimator| &estimator.method[..]).collect();
+        let of_method = |method: &str| -> Vec<Drawn> {
+            let found = self.points.iter().filter_map(|k| {
+                let point = &result.points[*k];
+                let (value, error) = (quantity.number)(point, method, parameter)?;
+                Some((self.x(point)?, value, error))
+            });
+            found.collect()
+        };
+        let all: Vec<(&str, Vec<Drawn>)> = methods.iter().map(|method| (*method, of_method(method))).collect();
+        let sizes: Vec<f64> = all.iter().flat_map(|(_, points)| points).map(|(_, value, _)| value.abs()).collect();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        let smallest = sizes.iter().copied().filter(|size| *size > 0.0).fold(f64::INFINITY, f64::min);
+        let log = !quantity.share && largest > LINEAR_FACTOR * smallest;
+        let signed =
+            sizes.iter().zip(all.iter().flat_map(|(_, points)| points)).any(|(size, (_, value, _))| size != value);
+        let name = if log && signed { format!("|{}|", quantity.name) } else { quantity.name.to_owned() };
+        let mut y = if quantity.unit.is_empty() { Axis::dimensionless(&name) } else { Axis::new(&name, quantity.unit) };
+        if quantity.share {
+            y = y.range(Range::Fixed { low: 0.0, high: 1.05 });
+        } else if log {
+            y = y.scale(Scale::Log);
+        } else {
+            y = y.include(0.0);
+        }
+        let short = self.key.rsplit('.').next().unwrap_or(&self.key);
+        let mut panel = Panel::new(symbol(parameter), Axis::dimensionless(short), y);
+        for (method, points) in &all {
+            let kept = points.iter().filter(|(_, value, _)| !log || *value != 0.0);
+            let drawn: Vec<(f64, f64)> =
+                kept.clone().map(|(x, value, _)| (*x, if log { value.abs() } else { *value })).collect();
+            if drawn.is_empty() {
+                continue;
+            }
+            let connected =
+                drawn.len() > 1 && drawn.windows(2).all(|pair| pair[0].0 < pair[1].0) && !self.others_vary(result);
+            if connected {
+                panel = panel.series(Series::line(method, drawn.clone()));
+            }
+            let y_error = Some(kept.map(|(_, _, error)| *error).collect());
+            panel = panel.series(Series::new(method, Marks::Points { points: drawn, y_error }));
+        }
+        if let Some((ideal, text)) = quantity.ideal.filter(|(ideal, _)| !log || *ideal > 0.0) {
+            panel = panel.series(Series::new(text, Marks::HorizontalLine { y: ideal }));
+        }
+        if named { panel } else { panel.without_legend() }
+    }
+
+    /// Do the points drawn differ in other axes too?
+    fn others_vary(&self, result: &SweepResult) -> bool {
+        self.others.is_empty() && result.points.first().is_some_and(|point| point.levels.len() > 1)
+    }
+}
+
+/// A parameter as the paper writes it.
+fn symbol(parameter: &str) -> &str {
+    match parameter {
+        "left_m_per_tick" => "C_L",
+        "right_m_per_tick" => "C_R",
+        "wheel_separation_m" => "B",
+        other => other,
+    }
+}

@@ -1,0 +1,150 @@
+//! The result of a sweep, as `yair sweep --json` prints it and as files hold it.
+
+use std::collections::BTreeMap;
+
+use scenario::Level;
+use serde::{Deserialize, Serialize};
+
+/// A sweep's result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SweepResult {
+    /// The scenario's name.
+    pub scenario: String,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Trials at each point; with a precision, at most.
+    pub trials: u64,
+    /// Largest Monte-Carlo error that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub precision: Option<f64>,
+    /// Point by point, in the order of the design.
+    pub points: Vec<PointResult>,
+}
+
+/// One point of the design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointResult {
+    /// Level on each axis.
+    pub levels: BTreeMap<String, Level>,
+    /// Trials driven.
+    pub trials: u64,
+    /// Is every Monte-Carlo error at most [`SweepResult::precision`]?
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub precise: Option<bool>,
+    /// What each method's protocol costs.
+    pub costs: Vec<MethodCost>,
+    /// Each method's account of each parameter.
+    pub estimators: Vec<EstimatorResult>,
+    /// Odometry under each method's calibration on the validation path; empty when the scenario states none.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub drift: Vec<DriftResult>,
+}
+
+/// What a method's protocol costs a person and a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MethodCost {
+    /// The method.
+    pub method: String,
+    /// Runs driven.
+    pub runs: u64,
+    /// Driving and handling.
+    pub minutes: f64,
+    /// Mean travel of the wheels.
+    pub metres: f64,
+}
+
+/// A share of trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// The share.
+    pub share: f64,
+    /// Its Monte-Carlo standard error.
+    pub mcse: f64,
+    /// Lower 95 % bound (Clopper & Pearson 1934).
+    pub low: Option<f64>,
+    /// Upper 95 % bound.
+    pub high: Option<f64>,
+}
+
+/// An error that a share of the trials stays below.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Quantile {
+    /// The share.
+    pub share: f64,
+    /// The error.
+    pub error: f64,
+    /// Its Monte-Carlo standard error (Woodruff 1952).
+    pub mcse: f64,
+}
+
+/// How one method did on one parameter. `null` where no trial succeeded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimatorResult {
+    /// The method.
+    pub method: String,
+    /// The parameter's key.
+    pub parameter: String,
+    /// Its true value.
+    pub truth: f64,
+    /// Mean error.
+    pub bias: Option<f64>,
+    /// Monte-Carlo standard error of the bias.
+    pub bias_mcse: Option<f64>,
+    /// Variance of the error.
+    pub variance: Option<f64>,
+    /// Monte-Carlo standard error of the variance.
+    pub variance_mcse: Option<f64>,
+    /// Root of the mean squared error.
+    pub rmse: Option<f64>,
+    /// Monte-Carlo standard error of the RMSE.
+    pub rmse_mcse: Option<f64>,
+    /// The errors that 5 %, half and 95 % of the trials stay below.
+    pub quantiles: Vec<Quantile>,
+    /// Share of the 95 % intervals (±1.96 sigma) that hold the truth.
+    pub coverage: Option<f64>,
+    /// The same with its errors.
+    pub coverage_95: Option<Coverage>,
+    /// Share of the one-sigma intervals that hold the truth; 68.27 % when sigma is right.
+    pub coverage_68: Option<Coverage>,
+    /// Trials in which the method gave no value.
+    pub failures: u64,
+    /// Why the method could not be used at this point at all.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub not_applicable: Option<String>,
+    /// False when the method cannot see the scale common to both wheels: its bias is then that scale's.
+    pub common_scale_observable: bool,
+    /// Square root of the Cramér–Rao bound: no unbiased method's standard deviation is smaller on this protocol. Where the common scale is not observable it is
+    /// the bound for who is told the mean diameter.
+    pub cramer_rao_sigma: Option<f64>,
+    /// RMSE² over the Cramér–Rao bound.
+    pub cramer_rao_ratio: Option<f64>,
+    /// Monte-Carlo standard error of that ratio.
+    pub cramer_rao_ratio_mcse: Option<f64>,
+    /// Why there is no ratio.
+    pub cramer_rao_why_null: Option<String>,
+}
+
+impl EstimatorResult {
+    /// Standard deviation of the error with its Monte-Carlo standard error.
+    #[must_use]
+    pub fn std(&self) -> Option<(f64, f64)> {
+        let (variance, mcse) = (self.variance?, self.variance_mcse?);
+        let std = variance.sqrt();
+        Some((std, if std > 0.0 { mcse / (2.0 * std) } else { 0.0 }))
+    }
+}
+
+/// How far odometry drifts on the validation path when it believes a method's calibration; its counts are perfect, so all drift is the calibration's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DriftResult {
+    /// The method.
+    pub method: String,
+    /// Mean over trials, per cent of the path's length.
+    pub mean_percent: Option<f64>,
+    /// Its Monte-Carlo standard error.
+    pub mean_percent_mcse: Option<f64>,
+    /// Root of the mean square.
+    pub rms_percent: Option<f64>,
+    /// Its Monte-Carlo standard error.
+    pub rms_percent_mcse: Option<f64>,
+}

@@ -1,0 +1,152 @@
+//! The gate on calibration accuracy: honest seeds pass, and each way in which an estimator was damaged on purpose is caught.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use bench::{AccuracyCheck, Moments, SweepOptions, SweepPlan, SweepResult};
+use calib::methods::direct::Direct;
+use calib::{CalibError, Calibration, MedianMad, Method};
+use dataset::{Schedule, Session};
+use kinematics::{DriveGeometry, Wheels};
+use scenario::Scenario;
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn scenario() -> Scenario {
+    Scenario::read(&root().join("scenarios/ci.toml")).expect("the shipped scenario")
+}
+
+static BASELINE: LazyLock<SweepResult> = LazyLock::new(|| {
+    bench::read_baseline(&root().join("baselines/accuracy.json"))
+        .expect("yair sweep scenarios/ci.toml --check baselines/accuracy.json --update")
+});
+
+/// Seeds that nothing was tuned on.
+const FRESH: u64 = 900_001;
+
+fn sweep(seed: u64, damage: Option<&'static dyn Method>) -> SweepResult {
+    let scenario = scenario();
+    let names = &scenario.sweep.as_ref().expect("ci.toml sweeps").methods;
+    let chosen = |name: &String| match damage {
+        Some(damaged) if damaged.name() == name => damaged,
+        _ => calib::method(name).expect("a method"),
+    };
+    let methods = names.iter().map(chosen).collect();
+    let options = SweepOptions { seed: Some(seed), ..SweepOptions::default() };
+    SweepPlan::with_methods(&scenario, options, methods).expect("a sweep").run(0, &|_| ()).expect("runs")
+}
+
+fn check(result: &SweepResult) -> AccuracyCheck {
+    bench::compare(result, &BASELINE, "baselines/accuracy.json").expect("the same design")
+}
+
+/// A method whose results are damaged.
+struct Damaged {
+    of: &'static dyn Method,
+    damage: fn(&mut Calibration),
+}
+
+impl Method for Damaged {
+    fn name(&self) -> &'static str {
+        self.of.name()
+    }
+
+    fn about(&self) -> &'static str {
+        self.of.about()
+    }
+
+    fn protocol(&self) -> Vec<Schedule> {
+        self.of.protocol()
+    }
+
+    fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
+        let mut calibration = self.of.calibrate(sessions)?;
+        (self.damage)(&mut calibration);
+        Ok(calibration)
+    }
+}
+
+fn with_geometry(calibration: &mut Calibration, of: impl Fn(Wheels<f64>, f64) -> (Wheels<f64>, f64)) {
+    let geometry = &calibration.geometry;
+    let (diameter_m, separation_m) = of(geometry.wheel_diameter_m(), geometry.wheel_separation_m());
+    calibration.geometry = DriveGeometry::new(diameter_m, separation_m).expect("as good a drive");
+}
+
+static DIRECT: Direct = Direct::DEFAULT;
+static UMBMARK: calib::methods::umbmark::Umbmark = calib::methods::umbmark::Umbmark::DEFAULT;
+
+#[test]
+fn ten_honest_seeds_pass_and_their_numbers_scatter_as_their_errors_say() {
+    let mut spread = Moments::default();
+    for seed in FRESH..FRESH + 10 {
+        let check = check(&sweep(seed, None));
+        assert_eq!(check.moved, [], "seed {seed}");
+        check.changed.iter().for_each(|number| spread.push(number.z));
+    }
+    // The scale of z is what the budget rests on: with errors half as large as they are it would be 2. Some 700 numbers, of which those of one trial hang
+    // together and all share one baseline: about 70 independent ones, whose spread has an error of 1/√140 = 8 %.
+    let (variance, _) = spread.variance().expect("many");
+    assert!((0.7..1.3).contains(&variance.sqrt()), "{}", variance.sqrt());
+}
+
+#[test]
+fn every_damage_is_caught() {
+    // UMBmark's β with the other sign (or its x axis to the other side): the wheels change places.
+    static FLIPPED: Damaged = Damaged {
+        of: &UMBMARK,
+        damage: |calibration| {
+            with_geometry(calibration, |diameter_m, separation_m| {
+                (Wheels { left: diameter_m.right, right: diameter_m.left }, separation_m)
+            });
+        },
+    };
+    // 0.1 % of the wheelbase, a third of its scatter from spin to spin.
+    static WIDER: Damaged = Damaged {
+        of: &DIRECT,
+        damage: |calibration| with_geometry(calibration, |diameter_m, separation_m| (diameter_m, 1.001 * separation_m)),
+    };
+    static UNDERSTATED: Damaged = Damaged {
+        of: &DIRECT,
+        damage: |calibration| {
+            if let Some(covariance) = &mut calibration.covariance {
+                *covariance *= 0.8 * 0.8;
+            }
+        },
+    };
+    static KEEPS_OUTLIERS: Direct = Direct { outliers: MedianMad { cut: f64::INFINITY } };
+    let damages: [(&str, &'static dyn Method, &str); 4] = [
+        ("a sign flipped", &FLIPPED, "bias"),
+        ("B with 0.1 % bias", &WIDER, "bias"),
+        ("sigma understated by 20 %", &UNDERSTATED, "coverage"),
+        ("rejection switched off", &KEEPS_OUTLIERS, "variance"),
+    ];
+    for (name, damaged, statistic) in damages {
+        for seed in FRESH..FRESH + 2 {
+            let check = check(&sweep(seed, Some(damaged)));
+            let caught = check.moved.iter().find(|number| number.statistic == statistic);
+            let caught = caught.unwrap_or_else(|| panic!("{name} is not caught: {:.1}", check.largest_z));
+            assert_eq!(caught.method, damaged.name(), "{name}");
+            // And only there: the other method stands.
+            assert!(check.moved.iter().all(|number| number.method == damaged.name()), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_baseline_of_another_design_is_refused_and_a_file_that_is_none_too() {
+    let mut other = BASELINE.clone();
+    other.points.pop();
+    let result = BASELINE.clone();
+    let message =
+        |baseline: &SweepResult| bench::compare(&result, baseline, "b.json").expect_err("differs").to_string();
+    assert!(message(&other).contains("--update"), "{}", message(&other));
+    let mut renamed = BASELINE.clone();
+    renamed.points[0].estimators[0].method = "another".to_owned();
+    assert!(message(&renamed).contains("other levels, methods or parameters"), "{}", message(&renamed));
+    assert!(bench::read_baseline(Path::new("no such file")).is_err());
+    assert!(
+        bench::read_baseline(&root().join("Cargo.toml")).expect_err("no JSON").to_string().contains("not a baseline")
+    );
+}
