@@ -20,6 +20,10 @@ test:
 sweep:
     cargo run --release -- sweep scenarios/paper.toml
 
+# Is every calibration method as accurate as it was?
+accuracy:
+    cargo run --release -- sweep scenarios/ci.toml --check baselines/accuracy.json
+
 # The library's documentation, warnings as errors
 doc:
     env RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps

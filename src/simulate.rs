@@ -1,4 +1,4 @@
-//! `yair simulate SCENARIO --out DIR`
+//! `yair simulate SCENARIO [--trial N] [--point P] [--method M] --out DIR`
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,8 +6,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 use dataset::{Dataset, DatasetError, Existing};
+use effects::Address;
 use scenario::Scenario;
 use serde::Serialize;
+use sim_yair::Simulation;
 use tempfile::NamedTempFile;
 
 use crate::terminal::{Failure, Terminal};
@@ -26,6 +28,12 @@ pub(crate) struct Arguments {
     /// Which trial of the seed to run.
     #[arg(long, default_value_t = 0)]
     trial: u64,
+    /// Which point of the sweep's design to take, counted from 1; without it the scenario as it stands.
+    #[arg(long, value_name = "P")]
+    point: Option<u32>,
+    /// Drive what this method drives, where the sweep gives it protocols of its own.
+    #[arg(long, value_name = "M")]
+    method: Option<String>,
     /// Replace a dataset that is already there.
     #[arg(long)]
     force: bool,
@@ -35,6 +43,8 @@ pub(crate) struct Arguments {
 struct Document {
     scenario: String,
     seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    point: Option<u32>,
     trial: u64,
     dataset: String,
     truth: String,
@@ -47,7 +57,7 @@ struct Document {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let seed = arguments.seed.unwrap_or(scenario.seed);
-    let simulation = sim_yair::simulate(&scenario, seed, arguments.trial)?;
+    let simulation = simulate(arguments, &scenario, seed)?;
     // The truth waits in a temporary file until the dataset stands: both are written or none.
     let truth = truth_path(&arguments.out)?;
     if truth.is_dir() || (truth.exists() && !arguments.force) {
@@ -63,6 +73,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let document = Document {
         scenario: scenario.name,
         seed,
+        point: arguments.point,
         trial: arguments.trial,
         dataset: arguments.out.display().to_string(),
         truth: truth.display().to_string(),
@@ -82,6 +93,35 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     ))?;
     terminal.document(&document)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The trial that is asked for: of the scenario as it stands, or of a point of its sweep.
+fn simulate(arguments: &Arguments, scenario: &Scenario, seed: u64) -> Result<Simulation, Failure> {
+    let file = arguments.scenario.display();
+    let (mut point, mut at) = (0, None);
+    if let Some(number) = arguments.point {
+        let sweep = scenario.sweep.as_ref().ok_or_else(|| format!("{file}: no [sweep], and so no points"))?;
+        // Sampled designs depend on the seed.
+        let seeded = Scenario { seed, ..scenario.clone() };
+        let mut points = sweep.points(&seeded, &file.to_string())?;
+        let count = points.len();
+        let index = (number as usize).checked_sub(1).filter(|index| *index < count);
+        let index = index.ok_or_else(|| format!("{file}: there is no point {number}; the design has 1 to {count}"))?;
+        (point, at) = (number - 1, Some(points.swap_remove(index).scenario));
+    }
+    let scenario = at.as_ref().unwrap_or(scenario);
+    let programs = match &arguments.method {
+        Some(method) => {
+            if calib::method(method).is_none() {
+                let known: Vec<_> = calib::METHODS.iter().map(|method| method.name()).collect();
+                return Err(format!("unknown method \"{method}\"; known: {}", known.join(", ")).into());
+            }
+            scenario.programs_for(method).map_err(|no_fit| format!("{file}: {method} cannot be used: {no_fit}"))?
+        }
+        None => scenario.programs(),
+    };
+    let first_run = Address { seed, point, trial: arguments.trial, run: 0 };
+    Ok(sim_yair::simulate_programs(scenario, &programs, first_run)?)
 }
 
 /// Writes a dataset; where one stands in the way, says how it is replaced.

@@ -74,13 +74,12 @@ fn show_drift(result: &SweepResult, axes: &Axes, terminal: &Terminal) -> Result<
     let mut rows = table(&headers.iter().map(String::as_str).collect::<Vec<_>>(), axes.keys.len() + 1);
     for point in &result.points {
         let mut levels = axes.cells(point);
-        let mean = |k: usize| point.drift[k].rms_percent.unwrap_or(f64::INFINITY);
-        let best = (0..point.drift.len()).min_by(|a, b| mean(*a).total_cmp(&mean(*b)));
+        let best = clearly_best(point);
         for (k, drift) in point.drift.iter().enumerate() {
             let cost = point.costs.iter().find(|cost| cost.method == drift.method);
             let of_cost = |number: Option<String>| number.unwrap_or_else(|| "–".to_owned());
             let or_dash = |pair: Option<(f64, f64)>| pair.map_or_else(|| "–".to_owned(), |(v, e)| concise(v, e));
-            let mark = if best == Some(k) && point.drift.len() > 1 { " <" } else { "" };
+            let mark = if best == Some(k) { " <" } else { "" };
             rows.add_row(levels.iter().cloned().chain([
                 format!("{}{mark}", drift.method),
                 of_cost(cost.map(|cost| cost.runs.to_string())),
@@ -93,7 +92,21 @@ fn show_drift(result: &SweepResult, axes: &Axes, terminal: &Terminal) -> Result<
         }
     }
     terminal.say(&rows.to_string())?;
-    terminal.say("< drifts least")
+    terminal.say("< drifts less than any other by more than two standard errors of the difference")
+}
+
+/// The method whose RMS drift is below every other's by more than two standard errors.
+fn clearly_best(point: &PointResult) -> Option<usize> {
+    let rms: Vec<Option<(f64, f64)>> =
+        point.drift.iter().map(|drift| drift.rms_percent.zip(drift.rms_percent_mcse)).collect();
+    (0..rms.len()).find(|k| {
+        let below = |other: &Option<(f64, f64)>| match (rms[*k], other) {
+            (Some((value, error)), Some((other, other_error))) => value + 2.0 * error.hypot(*other_error) < *other,
+            (value, None) => value.is_some(),
+            (None, _) => false,
+        };
+        rms.len() > 1 && rms.iter().enumerate().all(|(other, drift)| other == *k || below(drift))
+    })
 }
 
 fn cells(method: &str, estimator: &EstimatorResult) -> [String; 7] {

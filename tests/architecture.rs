@@ -261,7 +261,7 @@ fn run(line: &str, folder: &Path) -> Option<String> {
     for word in &mut words {
         if let Some((name, part)) = ORIGINALS.iter().find(|(name, _)| word.starts_with(name)) {
             *word = real_data("the documents' commands", part)?.join(&word[name.len()..]).display().to_string();
-        } else if word.starts_with("scenarios/") {
+        } else if word.starts_with("scenarios/") || word.starts_with("baselines/") {
             *word = root().join(&*word).display().to_string();
         }
     }
@@ -298,11 +298,12 @@ fn a_pasted_output_with_another_digit_does_not_agree() {
     }
 }
 
-/// Every `sh` block that is followed by a `text` block: its `yair` commands print that text.
+/// Every `sh` block that is followed by a `text` block: its `yair` commands print that text. And every picture `docs/bench-NAME.svg` is the one that the sweep
+/// of NAME draws.
 #[test]
 fn the_documents_show_what_the_commands_print() {
     let mut compared = 0;
-    for document in ["README.md", "docs/calibration.md"] {
+    for document in ["README.md", "docs/calibration.md", "docs/bench.md"] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut printed = None;
         for (language, lines) in blocks(&text(document)) {
@@ -323,8 +324,15 @@ fn the_documents_show_what_the_commands_print() {
                 _ => {}
             }
         }
+        for picture in files("docs").into_iter().filter(|file| file.extension().is_some_and(|of| of == "svg")) {
+            let stem = picture.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let Some(name) = stem.strip_prefix("bench-").filter(|_| document == "docs/bench.md") else { continue };
+            let drawn = fs::read(folder.path().join(name).join("sweep.svg")).expect("the document draws it");
+            assert!(drawn == fs::read(&picture).expect("read"), "{stem}.svg is not what {document}'s command draws");
+            compared += 1;
+        }
     }
-    assert!(compared >= 2, "the README's sweep and round trip were compared");
+    assert!(compared >= 7, "the README's sweep and round trip, the bench's tables and pictures were compared");
 }
 
 /// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.
@@ -372,7 +380,10 @@ fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
 
 #[test]
 fn the_scenario_document_has_every_key_and_every_effect() {
-    use scenario::{Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, Robot, Sweep};
+    use scenario::{
+        Budget, Case, Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, Range, Robot, Sobol,
+        Sweep,
+    };
     let document = text("docs/scenario.md");
     let parts = [
         ("", keys::<Scenario>("")),
@@ -392,6 +403,10 @@ fn the_scenario_document_has_every_key_and_every_effect() {
         ("squares", keys::<Schedule>("squares")),
         ("validation_path", keys::<Schedule>("validation_path")),
         ("sweep", keys::<Sweep>("")),
+        ("sweep.sobol", keys::<Sobol>("")),
+        ("sweep.case", keys::<Case>("")),
+        ("an axis' range", keys::<Range>("")),
+        ("budget", keys::<Budget>("")),
     ];
     for (part, keys) in parts {
         assert!(!keys.is_empty(), "{part}");

@@ -216,8 +216,9 @@ fn a_sweep_that_cannot_be_run_is_refused_before_it_runs() {
     assert!(calib::METHODS.iter().all(|method| message.contains(method.name())), "{message}");
     fs::write(at.join("s.toml"), paper().split("[sweep]").next().expect("a head")).expect("written");
     begins(&refused(at, &["sweep", "s.toml"]), "s.toml: ");
-    begins(&refused(at, &["sweep", "paper.toml", "--trials", "1"]), "paper.toml: 1 trials");
-    contains(&refused(at, &["sweep", "paper.toml", "--trials", "18446744073709551615"]), "18446744073709551615 trials");
+    for trials in ["1", "18446744073709551615"] {
+        contains(&usage(at, &["sweep", "paper.toml", "--trials", trials]), "2..=100000000");
+    }
     // Where results cannot go is said before hours of trials, not after.
     for out in ["paper.toml", "paper.toml/new"] {
         begins(&refused(at, &["sweep", "paper.toml", "--trials", "1000000", "--out", out]), out);

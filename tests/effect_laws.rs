@@ -5,7 +5,8 @@ use dataset::{
 };
 use effects::{
     Backlash, CATALOGUE, ContactPatchWheelbase, CounterWrap, Effect, MissedCounts, Quantization, SamplingSkew,
-    SlipAcceleration, SlipSpeed, TractionLoss, TruthOutliers, WheelEccentricity, WheelMismatch, WheelScale, Wheelbase, Which,
+    SlipAcceleration, SlipSpeed, TractionLoss, TruthOutliers, WheelEccentricity, WheelMismatch, WheelScale, Wheelbase,
+    Which,
 };
 use kinematics::{Increment, Pose, Rule, Wheels};
 use scenario::{Engine, Instrument, Log, Scenario};

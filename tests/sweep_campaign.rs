@@ -273,6 +273,27 @@ fn what_does_not_fit_together_is_refused_with_the_reason() {
     assert!(refusal(here, &["sweep", "small.toml", "--out", "file"]).contains("cannot write results there"));
 }
 
+/// A trial of a sweep is a dataset that can be looked into: what the rows say of it is what a method finds in it.
+#[test]
+fn a_trial_of_a_sweep_can_be_looked_into() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let here = temporary.path();
+    write_scenario(here, 20);
+    succeed(here, &["simulate", "small.toml", "--point", "3", "--trial", "7", "--method", "direct", "--out", "trial"]);
+    let found = document(here, &["calibrate", "trial", "--method", "direct"]);
+    let found = found["methods"][0]["parameters"]["wheel_separation_m"]["value"].as_f64().expect("a number");
+    let scenario = Scenario::read(&here.join("small.toml")).expect("as written");
+    let plan = SweepPlan::new(&scenario, SweepOptions::default()).expect("a sweep");
+    let mut trial = bench::Trial::new(&plan.points()[2].scenario, plan.seed()).expect("simulates").at_point(2);
+    let session = [trial.drive(7).expect("drives")];
+    let expected = calib::method("direct").expect("there").calibrate(&session).expect("applies");
+    // Written with all digits and read again: the same.
+    assert_eq!(found, expected.geometry.wheel_separation_m());
+    assert!(refusal(here, &["simulate", "small.toml", "--point", "5", "--out", "t"]).contains("1 to 4"));
+    assert!(refusal(here, &["simulate", "small.toml", "--point", "0", "--out", "t"]).contains("1 to 4"));
+    assert!(refusal(here, &["simulate", "small.toml", "--method", "x", "--out", "t"]).contains("umbmark"));
+}
+
 /// A device that is always full stands where the estimates of the trials would go.
 #[cfg(target_os = "linux")]
 #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use dataset::Schedule;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
 use crate::axis::{self, Level, Levels};
@@ -50,8 +50,19 @@ pub struct Case {
     /// A name for people and tables.
     pub name: String,
     /// Dotted keys of the scenario, as for the axes, each with its value.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "quoted_keys")]
     pub set: BTreeMap<String, f64>,
+}
+
+/// Numbers by their dotted keys. A key without quotes is a table in TOML, and the refusal says how it is meant.
+fn quoted_keys<'de, D: Deserializer<'de>>(set: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "every value must be a number, and every dotted key stand in quotes")]
+    enum Value {
+        Number(f64),
+    }
+    let values = BTreeMap::<String, Value>::deserialize(set)?;
+    Ok(values.into_iter().map(|(key, Value::Number(value))| (key, value)).collect())
 }
 
 /// The axis on which a point's case is named.
@@ -384,6 +395,7 @@ mod tests {
         assert!(with("protocol.straights.runs, ", "protocol.1.runs, ").contains("protocol.1.runs is set twice"));
         assert!(with("robot.wheel_separation_m\" = 0.5", "robot.wheel_separation_m\" = -1.0").contains("-1"));
         assert!(with("[sweep.case.set]", "[sweep.case.sets]").contains("`set`"));
+        assert!(with("\"robot.wheel_separation_m\"", "robot.wheel_separation_m").contains("stand in quotes"));
         let twice = "[sweep.axes]\n\"effect.0.scale\" = [1.0]\n\"effect.wheel_scale.scale\" = [1.1]";
         assert!(refusal(twice).contains("effect.0.scale is set twice"));
     }

@@ -16,4 +16,4 @@ mod simulation;
 
 pub use robot::{SimulatedRobot, SimulationError};
 pub use servo::ServoError;
-pub use simulation::{HiddenTruth, Simulation, TrueRun, simulate};
+pub use simulation::{HiddenTruth, Simulation, TrueRun, simulate, simulate_programs};

@@ -1,7 +1,7 @@
 //! A whole scenario simulated: the dataset that a robot would have brought home, and the truth that it hides.
 
-use dataset::{Dataset, Platform, Provenance, Run};
-use effects::Effect;
+use dataset::{Dataset, MotionProgram, Platform, Provenance, Run};
+use effects::{Address, Effect};
 use kinematics::Pose;
 use scenario::Scenario;
 use serde::Serialize;
@@ -24,6 +24,8 @@ pub struct HiddenTruth {
     pub scenario: String,
     /// Seed of the draws.
     pub seed: u64,
+    /// Point of the sweep's design, counted from 0; 0 outside of sweeps.
+    pub point: u32,
     /// Trial of the draws.
     pub trial: u64,
     /// Mean effective diameter of the left wheel, metres.
@@ -76,10 +78,22 @@ impl TrueRun {
 /// # Errors
 /// [`SimulationError`] when the scenario cannot be simulated.
 pub fn simulate(scenario: &Scenario, seed: u64, trial: u64) -> Result<Simulation, SimulationError> {
-    let mut robot = SimulatedRobot::new(scenario, seed, trial)?;
-    let programs = scenario.programs();
+    simulate_programs(scenario, &scenario.programs(), Address { seed, point: 0, trial, run: 0 })
+}
+
+/// Drives programs with a scenario's robot, its draws at `first_run` and the runs that follow: one trial of a sweep, as the sweep had it.
+///
+/// # Errors
+/// [`SimulationError`] when the scenario cannot be simulated.
+pub fn simulate_programs(
+    scenario: &Scenario,
+    programs: &[MotionProgram],
+    first_run: Address,
+) -> Result<Simulation, SimulationError> {
+    let Address { seed, point, trial, .. } = first_run;
+    let mut robot = SimulatedRobot::new(scenario, seed, trial)?.at_point(point);
     let (mut runs, mut true_runs) = (Vec::with_capacity(programs.len()), Vec::with_capacity(programs.len()));
-    for program in &programs {
+    for program in programs {
         let mut run = Run::default();
         robot.drive_into(program, &mut run)?;
         true_runs.push(TrueRun::new(&program.id, robot.last_true_ends()));
@@ -97,6 +111,7 @@ pub fn simulate(scenario: &Scenario, seed: u64, trial: u64) -> Result<Simulation
         truth: HiddenTruth {
             scenario: scenario.name.clone(),
             seed,
+            point,
             trial,
             left_wheel_diameter_m: geometry.wheel_diameter_m().left,
             right_wheel_diameter_m: geometry.wheel_diameter_m().right,

@@ -178,7 +178,7 @@ impl DesignAxis {
 
     fn caption(&self, result: &SweepResult) -> String {
         let mut text = String::new();
-        if self.levels.iter().any(|level| matches!(level, Level::Name(_))) {
+        if self.is_of_cases() {
             let names = self.levels.iter().enumerate().map(|(place, level)| format!("{} = {level}", place + 1));
             text.push_str(&format!(" {}: {}.", self.key, names.collect::<Vec<_>>().join(", ")));
         }
@@ -217,7 +217,7 @@ impl DesignAxis {
             y = y.include(0.0);
         }
         let short = self.key.rsplit('.').next().unwrap_or(&self.key);
-        let mut panel = Panel::new(symbol(parameter), Axis::dimensionless(short), y);
+        let mut panel = Panel::new(symbol(parameter), self.horizontal(short), y);
         for (method, points) in &all {
             let kept = points.iter().filter(|(_, value, _)| !log || *value != 0.0);
             let drawn: Vec<(f64, f64)> =
@@ -225,8 +225,8 @@ impl DesignAxis {
             if drawn.is_empty() {
                 continue;
             }
-            let connected =
-                drawn.len() > 1 && drawn.windows(2).all(|pair| pair[0].0 < pair[1].0) && !self.others_vary(result);
+            let ascending = drawn.len() > 1 && drawn.windows(2).all(|pair| pair[0].0 < pair[1].0);
+            let connected = ascending && !self.is_of_cases() && !self.others_vary(result);
             if connected {
                 panel = panel.series(Series::line(method, drawn.clone()));
             }
@@ -237,6 +237,19 @@ impl DesignAxis {
             panel = panel.series(Series::new(text, Marks::HorizontalLine { y: ideal }));
         }
         if named { panel } else { panel.without_legend() }
+    }
+
+    /// Logarithmic where the levels were chosen so.
+    fn horizontal(&self, name: &str) -> Axis {
+        let numbers = self.levels.iter().filter_map(|level| if let Level::Number(x) = level { Some(*x) } else { None });
+        let (low, high) = numbers.fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+        let axis = Axis::dimensionless(name);
+        if low > 0.0 && high > LINEAR_FACTOR * low { axis.scale(Scale::Log) } else { axis }
+    }
+
+    /// Are the levels names, between which there is nothing?
+    fn is_of_cases(&self) -> bool {
+        self.levels.iter().any(|level| matches!(level, Level::Name(_)))
     }
 
     /// Do the points drawn differ in other axes too?
