@@ -1,6 +1,9 @@
-//! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, and calibrated by each method.
+//! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, calibrated by each method, all of it together
+//! beside a bare loop that does the same, and a point of a sweep.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+mod yardstick;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use dataset::Schedule;
 use scenario::{Engine, Scenario};
 
@@ -18,7 +21,7 @@ fn paper(engine: Engine) -> Scenario {
 
 fn trial(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("trial");
-    group.sample_size(10);
+    group.sample_size(20).throughput(Throughput::Elements(1));
     for (name, engine) in [("closed_form", Engine::ClosedForm), ("stepped", Engine::Stepping { step_s: 1e-3 })] {
         let mut trial = bench::Trial::new(&paper(engine), 1).expect("simulates");
         let mut number = 0;
@@ -31,13 +34,43 @@ fn trial(criterion: &mut Criterion) {
     }
     let mut trial = bench::Trial::new(&paper(Engine::ClosedForm), 1).expect("simulates");
     let session = [trial.drive(0).expect("drives")];
-    for method in calib::METHODS {
+    for method in calib::METHODS.iter().filter(|method| method.calibrate(&session).is_ok()) {
         group.bench_function(format!("calibrate/{}", method.name()), |bencher| {
             bencher.iter(|| method.calibrate(&session).expect("applies"));
+        });
+    }
+    let mut trial = bench::Trial::new(&paper(Engine::ClosedForm), 1).expect("simulates");
+    let methods = ["direct", "umbmark"].map(|name| calib::method(name).expect("there"));
+    let mut number = 0;
+    group.bench_function("whole/library", |bencher| {
+        bencher.iter(|| {
+            number += 1;
+            let session = [trial.drive(number).expect("drives")];
+            methods.map(|method| method.calibrate(&session).expect("applies"))
+        });
+    });
+    let mut bare = yardstick::Yardstick::new(1);
+    group.bench_function("whole/bare_loop", |bencher| bencher.iter(|| bare.trial()));
+    group.finish();
+}
+
+fn sweep(criterion: &mut Criterion) {
+    let mut scenario = paper(Engine::ClosedForm);
+    if let Some(sweep) = &mut scenario.sweep {
+        sweep.axes.clear();
+    }
+    const TRIALS: u64 = 2000;
+    let options = bench::SweepOptions { trials: Some(TRIALS), ..bench::SweepOptions::default() };
+    let plan = bench::SweepPlan::new(&scenario, options).expect("a sweep");
+    let mut group = criterion.benchmark_group("sweep");
+    group.sample_size(10).throughput(Throughput::Elements(TRIALS));
+    for jobs in [1, 2] {
+        group.bench_function(format!("point/{jobs}_threads"), |bencher| {
+            bencher.iter(|| plan.run(jobs, &|_| ()).expect("runs"));
         });
     }
     group.finish();
 }
 
-criterion_group!(benches, trial);
+criterion_group!(benches, trial, sweep);
 criterion_main!(benches);

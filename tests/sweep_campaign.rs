@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 
 use bench::{BenchError, Campaign, Ended, Shard, SweepOptions, SweepPlan};
 use dataset::Schedule;
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::record::Field;
 use scenario::Scenario;
 use support::{document, refusal, run_in, succeed, usage};
 
@@ -280,6 +282,7 @@ fn a_trial_of_a_sweep_can_be_looked_into() {
     let here = temporary.path();
     write_scenario(here, 20);
     succeed(here, &["simulate", "small.toml", "--point", "3", "--trial", "7", "--method", "direct", "--out", "trial"]);
+    succeed(here, &["sweep", "small.toml", "--rows", "--out", "rows"]);
     let found = document(here, &["calibrate", "trial", "--method", "direct"]);
     let found = found["methods"][0]["parameters"]["wheel_separation_m"]["value"].as_f64().expect("a number");
     let scenario = Scenario::read(&here.join("small.toml")).expect("as written");
@@ -289,6 +292,24 @@ fn a_trial_of_a_sweep_can_be_looked_into() {
     let expected = calib::method("direct").expect("there").calibrate(&session).expect("applies");
     // Written with all digits and read again: the same.
     assert_eq!(found, expected.geometry.wheel_separation_m());
+    let file = fs::File::open(here.join("rows/trials.parquet")).expect("rows");
+    let rows = SerializedFileReader::new(file).expect("a Parquet file").into_iter();
+    let rows = rows.map(|row| row.expect("a row").get_column_iter().map(|(k, v)| (k.clone(), v.clone())).collect());
+    let rows: Vec<BTreeMap<String, Field>> = rows.collect();
+    // Four points, twenty trials, two methods, three parameters.
+    assert_eq!(rows.len(), 4 * 20 * 2 * 3);
+    let text = |text: &str| Field::Str(text.to_owned());
+    let the_row = |row: &&BTreeMap<String, Field>| {
+        (row["point"] == Field::Long(3) && row["trial"] == Field::Long(7))
+            && (row["method"] == text("direct") && row["parameter"] == text("wheel_separation_m"))
+    };
+    let row = rows.iter().find(the_row).expect("the trial's row");
+    let sigma = expected.estimate(calib::Parameter::WheelSeparation).expect("has it").sigma.expect("of many spins");
+    for (column, value) in
+        [("estimate", found), ("sigma", sigma), ("truth", 0.363), ("instrument.floor_grid.reading_sigma_m", 0.001)]
+    {
+        assert_eq!(row[column], Field::Double(value), "{column}");
+    }
     assert!(refusal(here, &["simulate", "small.toml", "--point", "5", "--out", "t"]).contains("1 to 4"));
     assert!(refusal(here, &["simulate", "small.toml", "--point", "0", "--out", "t"]).contains("1 to 4"));
     assert!(refusal(here, &["simulate", "small.toml", "--method", "x", "--out", "t"]).contains("umbmark"));

@@ -2,12 +2,12 @@
 
 use dataset::{Dataset, MotionProgram, Platform, Run, Session};
 use scenario::Scenario;
-use sim_yair::{SimulatedRobot, SimulationError};
+use sim_yair::{Plan, SimulatedRobot, SimulationError};
 
 /// A simulated robot with its protocols and the dataset that they fill.
 pub struct Trial {
     robot: SimulatedRobot,
-    programs: Vec<MotionProgram>,
+    plans: Vec<Plan>,
     dataset: Dataset,
 }
 
@@ -37,7 +37,8 @@ impl Trial {
             points: robot.points().to_vec(),
             runs: vec![Run::default(); programs.len()],
         };
-        Ok(Self { robot, programs, dataset })
+        let plans = programs.into_iter().map(|program| robot.plan(program)).collect();
+        Ok(Self { robot, plans, dataset })
     }
 
     /// The same trial at another point of a sweep's design: other draws.
@@ -53,8 +54,8 @@ impl Trial {
     /// [`SimulationError`] when a motion cannot be driven.
     pub fn drive(&mut self, trial: u64) -> Result<Session<'_>, SimulationError> {
         self.robot.restart(trial);
-        for (program, run) in self.programs.iter().zip(&mut self.dataset.runs) {
-            self.robot.drive_into(program, run)?;
+        for (plan, run) in self.plans.iter().zip(&mut self.dataset.runs) {
+            self.robot.drive_plan_into(plan, run)?;
         }
         Ok(self.dataset.session())
     }

@@ -23,7 +23,8 @@ impl Dataset {
     /// A view of all runs.
     #[must_use]
     pub fn session(&self) -> Session<'_> {
-        self.session_of(|_| true)
+        let runs = self.runs.iter().map(|run| RunView { run, points: &self.points }).collect();
+        Session { runs, ..self.session_of(|_| false) }
     }
 
     /// A view of the runs that `keep` accepts.
@@ -173,7 +174,7 @@ impl<'a> RunView<'a> {
             .iter()
             .filter_map(|sample| Some((sample.t_s, Pose::new(sample.x_m, sample.y_m, sample.theta_rad()?))))
             .collect();
-        if from_truth.is_empty() { self.poses_from_points() } else { from_truth }
+        if from_truth.is_empty() { self.poses_from_points().collect() } else { from_truth }
     }
 
     /// The first and the last observed pose, where there are two.
@@ -186,28 +187,24 @@ impl<'a> RunView<'a> {
         if let Some(first) = poses.next() {
             return Some((first, poses.next_back()?));
         }
-        let points = self.poses_from_points();
-        match points.as_slice() {
-            [(_, first), .., (_, last)] => Some((*first, *last)),
-            _ => None,
-        }
+        let mut poses = self.poses_from_points().map(|(_, pose)| pose);
+        poses.next().zip(poses.last())
     }
 
     /// The body's pose at every instant at which at least two marked points were read: the rigid motion that fits them best
     /// (least squares, in closed form in the plane). Headings continue without jumps of whole turns.
-    fn poses_from_points(&self) -> Vec<(f64, Pose)> {
-        let mut poses: Vec<(f64, Pose)> = Vec::new();
-        for readings in self.run.point_readings.chunk_by(|a, b| a.t_s == b.t_s) {
+    fn poses_from_points(&self) -> impl Iterator<Item = (f64, Pose)> {
+        let mut previous_rad = None;
+        self.run.point_readings.chunk_by(|a, b| a.t_s == b.t_s).filter_map(move |readings| {
             let pairs =
                 readings.iter().filter_map(|reading| Some((self.points.get(reading.point)?.body, reading.room)));
-            if let Some(mut pose) = fit_rigid(pairs) {
-                if let Some((_, previous)) = poses.last() {
-                    pose.theta_rad = unwrap_near(pose.theta_rad, previous.theta_rad);
-                }
-                poses.push((readings[0].t_s, pose));
+            let mut pose = fit_rigid(pairs)?;
+            if let Some(previous_rad) = previous_rad {
+                pose.theta_rad = unwrap_near(pose.theta_rad, previous_rad);
             }
-        }
-        poses
+            previous_rad = Some(pose.theta_rad);
+            Some((readings[0].t_s, pose))
+        })
     }
 }
 

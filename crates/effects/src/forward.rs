@@ -93,8 +93,62 @@ pub struct Sighting {
     pub world_from_body: Pose,
 }
 
+/// Which hooks of an effect do anything. The simulator calls no others, so that an effect costs nothing at the stages that it leaves alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools)] // one a hook
+pub struct Hooks {
+    /// [`Forward::start_run`].
+    pub start_run: bool,
+    /// [`Forward::start_motion`].
+    pub start_motion: bool,
+    /// [`Forward::command`].
+    pub command: bool,
+    /// [`Forward::motor`].
+    pub motor: bool,
+    /// [`Forward::wheel`].
+    pub wheel: bool,
+    /// [`Forward::floor`].
+    pub floor: bool,
+    /// [`Forward::encoder`].
+    pub encoder: bool,
+    /// [`Forward::readout`].
+    pub readout: bool,
+    /// [`Forward::clock`].
+    pub clock: bool,
+    /// [`Forward::instrument`].
+    pub instrument: bool,
+}
+
+impl Hooks {
+    /// Every hook.
+    pub const ALL: Self = Self::each(true);
+
+    /// No hook.
+    pub const NONE: Self = Self::each(false);
+
+    const fn each(acts: bool) -> Self {
+        Self {
+            start_run: acts,
+            start_motion: acts,
+            command: acts,
+            motor: acts,
+            wheel: acts,
+            floor: acts,
+            encoder: acts,
+            readout: acts,
+            clock: acts,
+            instrument: acts,
+        }
+    }
+}
+
 /// An effect at work during one run.
 pub trait Forward: Send {
+    /// Which of the hooks below do anything: all, unless the effect says otherwise.
+    fn hooks(&self) -> Hooks {
+        Hooks::ALL
+    }
+
     /// Draws what is drawn once a run and keeps the stream for what is drawn later.
     fn start_run(&mut self, stream: Stream) {
         let _ = stream;

@@ -22,6 +22,7 @@ pub struct WheelNoise {
 
 impl WheelNoise {
     /// Variance of each wheel's travel after given travels, m².
+    #[inline]
     #[must_use]
     pub fn travel_var_m2(&self, travel_m: Wheels<f64>) -> Wheels<f64> {
         self.sigma_m_per_sqrt_m.zip_with(travel_m, |sigma, travel_m| sigma * sigma * travel_m.abs())
@@ -43,6 +44,7 @@ pub struct ArcScatter {
 
 impl ArcScatter {
     /// Scatter within an arc of given wheel travels (metres) whose travels vary by `travel_var_m2` (m²) over it.
+    #[inline]
     #[must_use]
     pub fn within(travel_m: Wheels<f64>, travel_var_m2: Wheels<f64>, wheel_separation_m: f64) -> Self {
         let turn_rad = (travel_m.right - travel_m.left) / wheel_separation_m;
@@ -59,13 +61,13 @@ fn tangent_variance_over_turn_squared(turn_rad: f64) -> (f64, f64) {
     let tt = turn_rad * turn_rad;
     if turn_rad.abs() < TANGENT_SERIES_BELOW_RAD {
         // Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − ..., ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − ...
-        let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt / 119_750_400.0)));
-        let across =
-            1.0 / 12.0 - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt / 79_833_600.0)));
+        let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt * (1.0 / 119_750_400.0))));
+        let across = 1.0 / 12.0
+            - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt * (1.0 / 79_833_600.0))));
         (along, across)
     } else {
-        let half = sinc(0.5 * turn_rad);
-        ((0.5 * (1.0 + sinc(turn_rad)) - half * half) / tt, 0.5 * (1.0 - sinc(turn_rad)) / tt)
+        let (half, whole) = (sinc(0.5 * turn_rad), sinc(turn_rad));
+        ((0.5 * (1.0 + whole) - half * half) / tt, 0.5 * (1.0 - whole) / tt)
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use crate::{Pose, Wheels, sinc};
+use crate::angle::{sin_cos, sinc_given_sine};
+use crate::{Pose, Wheels};
 
 /// Why a drive geometry or a count scale is not one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,6 +58,7 @@ impl DriveGeometry {
     }
 
     /// Travel for one radian of wheel turn, metres.
+    #[inline]
     #[must_use]
     pub fn m_per_rad(&self) -> Wheels<f64> {
         self.wheel_diameter_m.map(|diameter_m| diameter_m / 2.0)
@@ -72,6 +74,7 @@ impl DriveGeometry {
     }
 
     /// The robot's motion for given wheel travels in metres (paper, eq. 1 and 2).
+    #[inline]
     #[must_use]
     pub fn increment(&self, travel_m: Wheels<f64>) -> Increment {
         Increment::from_travel(travel_m, self.wheel_separation_m)
@@ -118,6 +121,7 @@ pub struct Increment {
 
 impl Increment {
     /// Motion for wheel travels over a separation, metres (paper, eq. 1 and 2).
+    #[inline]
     #[must_use]
     pub fn from_travel(travel_m: Wheels<f64>, wheel_separation_m: f64) -> Self {
         Self {
@@ -127,20 +131,32 @@ impl Increment {
     }
 
     /// `before_from_after` along the exact circular arc.
+    #[inline]
     #[must_use]
     pub fn arc(self) -> Pose {
-        self.chord(self.distance_m * sinc(0.5 * self.turn_rad))
+        self.scattered_arc(0.0, 0.0)
+    }
+
+    /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead along it and to its left, metres.
+    #[inline]
+    #[must_use]
+    pub fn scattered_arc(self, along_m: f64, across_m: f64) -> Pose {
+        let half_rad = 0.5 * self.turn_rad;
+        let (sin, cos) = sin_cos(half_rad);
+        let chord_m = self.distance_m * sinc_given_sine(half_rad, || sin);
+        let mut before_from_after = Pose::new(chord_m * cos, chord_m * sin, self.turn_rad);
+        if along_m != 0.0 || across_m != 0.0 {
+            before_from_after.x_m += cos * along_m - sin * across_m;
+            before_from_after.y_m += sin * along_m + cos * across_m;
+        }
+        before_from_after
     }
 
     /// `before_from_after` by the paper's midpoint rule (eq. 3): the arc length taken for the chord.
     #[must_use]
     pub fn midpoint(self) -> Pose {
-        self.chord(self.distance_m)
-    }
-
-    fn chord(self, chord_m: f64) -> Pose {
-        let (sin, cos) = (0.5 * self.turn_rad).sin_cos();
-        Pose::new(chord_m * cos, chord_m * sin, self.turn_rad)
+        let (sin, cos) = sin_cos(0.5 * self.turn_rad);
+        Pose::new(self.distance_m * cos, self.distance_m * sin, self.turn_rad)
     }
 }
 

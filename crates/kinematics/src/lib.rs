@@ -25,5 +25,5 @@ pub use angle::{sinc, sinc_derivative, unwrap_near, wrap_to_pi};
 pub use covariance::{ArcScatter, OdometryCovariance, WheelNoise};
 pub use dead_reckoning::{Count, DeadReckoning, Odometry, Rule};
 pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
-pub use pose::{Point, Pose};
+pub use pose::{Frame, Point, Pose};
 pub use wheels::{Side, Wheels};

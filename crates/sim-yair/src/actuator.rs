@@ -15,6 +15,14 @@ pub(crate) struct ShaftMotion {
     pub(crate) acceleration_rad_s2: Wheels<f64>,
 }
 
+impl ShaftMotion {
+    /// Standing still.
+    pub(crate) const REST: Self = {
+        let none = Wheels { left: 0.0, right: 0.0 };
+        Self { shaft_rad: none, rate_rad_s: none, acceleration_rad_s2: none }
+    };
+}
+
 /// The two wheels' drives.
 #[derive(Debug)]
 pub(crate) enum Actuator {
@@ -23,26 +31,18 @@ pub(crate) enum Actuator {
 }
 
 impl Actuator {
-    /// Starts a motion. `seen` is the share of a shaft's turn that its counter sees at a given motion: a controller drives *counts* to the target, so
-    /// that a counter that misses some makes the wheel go farther.
-    pub(crate) fn begin(
-        &mut self,
-        command: &Command,
-        seen: impl FnMut(Wheels<f64>) -> Wheels<f64>,
-    ) -> Result<(), ServoError> {
-        match self {
-            Self::ClosedForm(drive) => {
-                drive.begin(command, seen);
-                Ok(())
-            }
-            Self::Stepping(pair) => pair.begin(command),
+    /// Starts a piece of a motion, which only the closed form has.
+    #[inline]
+    pub(crate) fn begin_piece(&mut self, piece: Piece) {
+        if let Self::ClosedForm(drive) = self {
+            drive.begin(piece);
         }
     }
 
     /// Holds still.
     pub(crate) fn hold(&mut self, duration_s: f64) {
         match self {
-            Self::ClosedForm(drive) => drive.hold(duration_s),
+            Self::ClosedForm(drive) => drive.begin(Piece { rate_rad_s: Wheels::both(0.0), duration_s }),
             Self::Stepping(pair) => {
                 pair.hold_s = duration_s;
                 pair.sample_if_due();
@@ -50,15 +50,17 @@ impl Actuator {
         }
     }
 
-    /// Seconds until the actuator wants a step to end; `None` when the motion is over.
+    /// Seconds until the actuator wants a step to end; `None` when it is done.
+    #[inline]
     pub(crate) fn next_event_s(&self) -> Option<f64> {
         match self {
-            Self::ClosedForm(drive) => drive.pieces.get(drive.current).map(|piece| piece.remaining_s),
+            Self::ClosedForm(drive) => (drive.remaining_s > 0.0).then_some(drive.remaining_s),
             Self::Stepping(pair) => pair.next_event_s(),
         }
     }
 
     /// Turns the shafts for `dt_s`, at most [`Self::next_event_s`].
+    #[inline]
     pub(crate) fn turn(&mut self, dt_s: f64) -> ShaftMotion {
         match self {
             Self::ClosedForm(drive) => drive.turn(dt_s),
@@ -67,6 +69,7 @@ impl Actuator {
     }
 
     /// What the counters saw of the step, after the effects.
+    #[inline]
     pub(crate) fn count(&mut self, step: &Step) {
         match self {
             Self::ClosedForm(drive) => {
@@ -77,10 +80,10 @@ impl Actuator {
     }
 
     /// The counters' values.
+    #[inline]
     pub(crate) fn counts(&self) -> Wheels<i64> {
         match self {
-            #[allow(clippy::cast_possible_truncation)] // 2^63 counts are beyond any run
-            Self::ClosedForm(drive) => drive.counts.map(|counts| counts.floor() as i64),
+            Self::ClosedForm(drive) => drive.counts.map(whole_counts),
             Self::Stepping(pair) => {
                 pair.servos.as_ref().map(Servo::counts).zip_with(pair.start_counts, |counts, start| counts + start)
             }
@@ -88,26 +91,55 @@ impl Actuator {
     }
 }
 
-/// The closed form: constant speeds from standstill to standstill.
-///
-/// A motion is one piece at one speed, unless an effect depends on speed: then the trapezoid's ramps are two pieces each, at the speeds of the two-point
-/// Gauss rule, which integrates any cubic of the speed over a ramp exactly (so v², what slip costs), and the cruise is the fifth piece.
+/// The counts that a counter shows: the largest whole number not above. 2⁶³ counts are beyond any run.
+#[inline]
+#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+fn whole_counts(counts: f64) -> i64 {
+    // By the conversion, which cuts towards zero: without SSE 4.1 `floor` is a call.
+    let toward_zero = counts as i64;
+    toward_zero - i64::from(counts < toward_zero as f64)
+}
+
+/// The closed form: a piece of constant speed at a time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ConstantSpeed {
     counts_per_rad: f64,
     counts: Wheels<f64>,
-    /// Acceleration of the faster wheel, counts/s², when ramps matter.
-    ramp_counts_s2: Option<f64>,
-    pieces: [Piece; MOST_PIECES],
-    /// The piece under way; `MOST_PIECES` at rest.
-    current: usize,
-}
-
-/// Constant rates for a while.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Piece {
     rate_rad_s: Wheels<f64>,
     remaining_s: f64,
+}
+
+impl ConstantSpeed {
+    pub(crate) const fn new(counts_per_rad: f64, start_counts: Wheels<f64>) -> Self {
+        let rate_rad_s = Wheels { left: 0.0, right: 0.0 };
+        Self { counts_per_rad, counts: start_counts, rate_rad_s, remaining_s: 0.0 }
+    }
+
+    const fn begin(&mut self, piece: Piece) {
+        self.rate_rad_s = piece.rate_rad_s;
+        self.remaining_s = piece.duration_s;
+    }
+
+    #[inline]
+    fn turn(&mut self, dt_s: f64) -> ShaftMotion {
+        self.remaining_s = if dt_s >= self.remaining_s { 0.0 } else { self.remaining_s - dt_s };
+        ShaftMotion {
+            shaft_rad: self.rate_rad_s.map(|rate| rate * dt_s),
+            rate_rad_s: self.rate_rad_s,
+            ..ShaftMotion::REST
+        }
+    }
+}
+
+/// How the closed form cuts motions into pieces of constant speed.
+///
+/// A motion is one piece at one speed, unless an effect depends on speed: then the trapezoid's ramps are two pieces each, at the speeds of the two-point
+/// Gauss rule, which integrates any cubic of the speed over a ramp exactly (so v², what slip costs), and the cruise is the fifth piece.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Profile {
+    counts_per_rad: f64,
+    /// Acceleration of the faster wheel, counts/s², when ramps matter.
+    ramp_counts_s2: Option<f64>,
 }
 
 const MOST_PIECES: usize = 5;
@@ -118,79 +150,78 @@ const GAUSS_NODES: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9]
 /// Rounds of the fixed point that finds the shaft's rate from the counted one; each gains the lost share's order, 1e-2 to 1e-3.
 const SEEN_ROUNDS: u32 = 12;
 
-impl ConstantSpeed {
-    pub(crate) fn new(robot: &Robot, start_counts: Wheels<f64>, ramps: bool) -> Self {
+impl Profile {
+    pub(crate) fn new(robot: &Robot, ramps: bool) -> Self {
         let counts_per_turn = robot.encoder.counts_per_wheel_turn();
         let m_per_count = robot.wheel_diameter_m().map(|d_m| std::f64::consts::PI * d_m / counts_per_turn);
-        let rest = Piece { rate_rad_s: Wheels::both(0.0), remaining_s: 0.0 };
         Self {
             counts_per_rad: counts_per_turn / std::f64::consts::TAU,
-            counts: start_counts,
             ramp_counts_s2: ramps.then(|| robot.acceleration_m_s2 / m_per_count.left),
-            pieces: [rest; MOST_PIECES],
-            current: MOST_PIECES,
         }
     }
 
-    fn begin(&mut self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) {
+    /// The pieces of a motion. `seen` is the share of a shaft's turn that its counter sees at a given rate: a controller drives *counts* to the target,
+    /// so that a counter that misses some makes the wheel go farther.
+    pub(crate) fn pieces(&self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> Pieces {
         let travel = command.travel_counts;
         let speed = command.speed_counts_s.left.max(command.speed_counts_s.right);
         let longest = travel.left.abs().max(travel.right.abs());
+        let mut pieces = Pieces::default();
         if longest <= 0.0 {
-            self.current = MOST_PIECES;
-            return;
+            return pieces;
         }
-        let mut pieces = [(0.0, 0.0); MOST_PIECES];
+        let mut push = |speed: f64, duration_s: f64| {
+            if duration_s > 0.0 {
+                let counted_rad_s = travel.map(|counts| counts / longest * speed / self.counts_per_rad);
+                pieces.push(Piece { rate_rad_s: shaft_rate(counted_rad_s, &mut seen), duration_s });
+            }
+        };
         match self.ramp_counts_s2 {
-            None => pieces[MOST_PIECES - 1] = (speed, longest / speed),
+            None => push(speed, longest / speed),
             Some(acceleration) => {
                 let peak = speed.min((longest * acceleration).sqrt());
                 let ramp_s = peak / acceleration;
                 let [slow, fast] = GAUSS_NODES;
-                pieces = [
-                    (slow * peak, 0.5 * ramp_s),
-                    (fast * peak, 0.5 * ramp_s),
-                    (peak, (longest / peak - ramp_s).max(0.0)),
-                    (fast * peak, 0.5 * ramp_s),
-                    (slow * peak, 0.5 * ramp_s),
-                ];
+                push(slow * peak, 0.5 * ramp_s);
+                push(fast * peak, 0.5 * ramp_s);
+                push(peak, longest / peak - ramp_s);
+                push(fast * peak, 0.5 * ramp_s);
+                push(slow * peak, 0.5 * ramp_s);
             }
         }
-        self.current = 0;
-        for (piece, (speed, remaining_s)) in self.pieces.iter_mut().zip(pieces) {
-            piece.remaining_s = remaining_s;
-            if remaining_s > 0.0 {
-                let counted_rad_s = travel.map(|counts| counts / longest * speed / self.counts_per_rad);
-                piece.rate_rad_s = shaft_rate(counted_rad_s, &mut seen);
-            }
-        }
-        self.skip_finished();
+        pieces
+    }
+}
+
+/// Constant rates for a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    rate_rad_s: Wheels<f64>,
+    pub(crate) duration_s: f64,
+}
+
+/// A motion in pieces of constant speed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pieces {
+    pieces: [Piece; MOST_PIECES],
+    count: usize,
+}
+
+impl Default for Pieces {
+    fn default() -> Self {
+        Self { pieces: [Piece { rate_rad_s: Wheels::both(0.0), duration_s: 0.0 }; MOST_PIECES], count: 0 }
+    }
+}
+
+impl Pieces {
+    fn push(&mut self, piece: Piece) {
+        self.pieces[self.count] = piece;
+        self.count += 1;
     }
 
-    fn hold(&mut self, duration_s: f64) {
-        self.current = MOST_PIECES - 1;
-        self.pieces[self.current] = Piece { rate_rad_s: Wheels::both(0.0), remaining_s: duration_s };
-        self.skip_finished();
-    }
-
-    fn skip_finished(&mut self) {
-        while self.current < MOST_PIECES && self.pieces[self.current].remaining_s <= 0.0 {
-            self.current += 1;
-        }
-    }
-
-    fn turn(&mut self, dt_s: f64) -> ShaftMotion {
-        let mut rate_rad_s = Wheels::both(0.0);
-        if let Some(piece) = self.pieces.get_mut(self.current) {
-            rate_rad_s = piece.rate_rad_s;
-            piece.remaining_s = if dt_s >= piece.remaining_s { 0.0 } else { piece.remaining_s - dt_s };
-        }
-        self.skip_finished();
-        ShaftMotion {
-            shaft_rad: rate_rad_s.map(|rate| rate * dt_s),
-            rate_rad_s,
-            acceleration_rad_s2: Wheels::both(0.0),
-        }
+    /// In the order in which they are driven.
+    pub(crate) fn as_slice(&self) -> &[Piece] {
+        &self.pieces[..self.count]
     }
 }
 
@@ -243,7 +274,7 @@ impl ServoPair {
         })
     }
 
-    fn begin(&mut self, command: &Command) -> Result<(), ServoError> {
+    pub(crate) fn begin(&mut self, command: &Command) -> Result<(), ServoError> {
         let fastest = command.speed_counts_s.left.max(command.speed_counts_s.right);
         for side in kinematics::Side::BOTH {
             let counts = command.travel_counts[side];

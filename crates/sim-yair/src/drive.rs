@@ -5,50 +5,64 @@
 //! and then the noise *inside* the arc is added too: the Brownian bridge of [`kinematics::ArcScatter`], σ_θ²L²/12 across a straight of length L. Without it
 //! the spread of UMBmark's results comes out too small.
 
-use dataset::{MarkedPoint, Motion, Run, WheelLog};
-use effects::{Address, Command, Forward, Readout, SampleClock, Sighting, Step, Stream, StreamName};
-use kinematics::{ArcScatter, DriveGeometry, Increment, Pose, Side, WheelNoise, Wheels};
-use scenario::Robot;
+use dataset::{MarkedPoint, Run, WheelLog};
+use effects::{Command, Readout, SampleClock, Sighting, Step, Stream};
+use kinematics::{ArcScatter, Frame, Increment, Pose, Side, WheelNoise, Wheels};
 
-use crate::actuator::{Actuator, ShaftMotion};
+use crate::active::ActiveEffects;
+use crate::actuator::{Actuator, Piece, Pieces, Profile, ShaftMotion};
 use crate::instrument::Observer;
+use crate::plan::PlannedMotion;
 use crate::servo::ServoError;
-
-const WHEEL_NOISE: StreamName = StreamName::new("wheel noise");
-const SENSITIVITY: StreamName = StreamName::new("sensitivity");
 
 /// Two instants closer than this are one: a nanosecond, far under any sample time and far over the rounding of a long run's clock.
 const SAME_INSTANT_S: f64 = 1e-9;
 
-/// An effect at work, with the name of its stream.
-pub(crate) type ActiveEffect = (StreamName, Box<dyn Forward>);
-
-/// What stays the same during a run.
-pub(crate) struct DriveSetup<'a> {
-    pub(crate) actuator: Actuator,
-    pub(crate) robot: &'a Robot,
-    pub(crate) nominal_geometry: DriveGeometry,
-    pub(crate) true_geometry: DriveGeometry,
+/// What is the same in every run of a robot.
+#[derive(Debug, Clone)]
+pub(crate) struct DriveSetup {
+    pub(crate) counts_per_rad: f64,
+    pub(crate) nominal_radius_m: Wheels<f64>,
+    pub(crate) true_radius_m: Wheels<f64>,
+    pub(crate) wheel_separation_m: f64,
     pub(crate) noise: WheelNoise,
     pub(crate) sensitivity_sigma: f64,
     pub(crate) closed_form: bool,
+    pub(crate) profile: Profile,
     pub(crate) log_interval_s: Option<f64>,
-    pub(crate) points: &'a [MarkedPoint],
+    pub(crate) points: Vec<MarkedPoint>,
+}
+
+/// Where a run begins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Start {
+    pub(crate) world_from_body: Pose,
+    pub(crate) counts: Wheels<f64>,
+}
+
+/// The drive's own draws.
+#[derive(Debug)]
+pub(crate) struct DriveStreams {
+    pub(crate) wheel_noise: Stream,
+    /// Drawn from only where sensitivities scatter.
+    pub(crate) sensitivity: Stream,
 }
 
 /// A run in progress.
 pub(crate) struct Drive<'a> {
-    setup: DriveSetup<'a>,
-    effects: &'a mut [ActiveEffect],
+    setup: &'a DriveSetup,
+    actuator: Actuator,
+    effects: &'a mut ActiveEffects,
     observers: &'a mut [Observer],
     run: &'a mut Run,
     t_s: f64,
-    world_from_body: Pose,
+    world_from_body: Frame,
     wheel_angle_rad: Wheels<f64>,
     sensitivity: Wheels<f64>,
-    sensitivity_stream: Stream,
-    noise_stream: Stream,
+    streams: &'a mut DriveStreams,
     log: Option<LogClock>,
+    /// When the next instrument looks by itself.
+    next_look_s: f64,
 }
 
 /// The robot's own log: which row is due and which of its two readings are done.
@@ -60,12 +74,10 @@ struct LogClock {
 }
 
 impl LogClock {
-    fn schedule(interval_s: f64, rows: u32, effects: &mut [ActiveEffect]) -> Self {
+    fn schedule(interval_s: f64, rows: u32, effects: &mut ActiveEffects) -> Self {
         let t_s = f64::from(rows) * interval_s;
         let mut pending = SampleClock { stamp_s: t_s, read_s: Wheels::both(t_s) };
-        for (_, effect) in effects {
-            effect.clock(&mut pending);
-        }
+        effects.clock(&mut pending);
         Self { interval_s, rows, pending, read: Wheels::both(None) }
     }
 
@@ -76,103 +88,118 @@ impl LogClock {
 }
 
 impl<'a> Drive<'a> {
+    #[inline]
     pub(crate) fn start(
-        setup: DriveSetup<'a>,
-        address: &Address,
-        (world_from_body, start_counts): (Pose, Wheels<f64>),
-        effects: &'a mut [ActiveEffect],
+        setup: &'a DriveSetup,
+        (actuator, start): (Actuator, Start),
+        streams: &'a mut DriveStreams,
+        effects: &'a mut ActiveEffects,
         observers: &'a mut [Observer],
         run: &'a mut Run,
     ) -> Self {
-        let counts_per_rad = setup.robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
+        let next_look_s = next_look_s(observers);
         // The row at t = 0 is a standing row; the clock's first is one interval later.
         let log = setup.log_interval_s.map(|interval_s| LogClock::schedule(interval_s, 1, effects));
         Self {
             setup,
+            actuator,
             effects,
             observers,
             run,
             t_s: 0.0,
-            world_from_body,
-            wheel_angle_rad: start_counts.map(|counts| counts / counts_per_rad),
+            world_from_body: start.world_from_body.into(),
+            wheel_angle_rad: start.counts.map(|counts| counts / setup.counts_per_rad),
             sensitivity: Wheels::both(1.0),
-            sensitivity_stream: address.stream(SENSITIVITY),
-            noise_stream: address.stream(WHEEL_NOISE),
+            streams,
             log,
+            next_look_s,
         }
     }
 
     pub(crate) const fn world_from_body(&self) -> Pose {
-        self.world_from_body
+        self.world_from_body.pose()
     }
 
     /// Performs one motion and, where the counters have moved on, writes the row of its end.
-    pub(crate) fn perform(&mut self, motion: &Motion) -> Result<(), ServoError> {
-        match *motion {
-            Motion::Measure => self.stand(),
-            Motion::Pause { duration_s } => {
-                self.setup.actuator.hold(duration_s);
+    #[inline]
+    pub(crate) fn perform(&mut self, motion: &PlannedMotion) -> Result<(), ServoError> {
+        match motion {
+            PlannedMotion::Measure => self.stand(),
+            PlannedMotion::Pause { duration_s } => {
+                self.actuator.hold(*duration_s);
                 self.travel();
             }
-            Motion::Straight { length_m } => self.go(Increment { distance_m: length_m, turn_rad: 0.0 })?,
-            Motion::Spin { turn_rad } => self.go(Increment { distance_m: 0.0, turn_rad })?,
-            Motion::Arc { radius_m, turn_rad } => {
-                self.go(Increment { distance_m: radius_m * turn_rad.abs(), turn_rad })?;
-            }
+            PlannedMotion::Go { command, pieces } => self.go(*command, pieces.as_deref())?,
         }
         self.write_standing_row();
         Ok(())
     }
 
     /// The outside instruments read the standing robot.
+    #[inline]
     pub(crate) fn stand(&mut self) {
         self.look_if_due();
         if self.run.point_readings.last().is_none_or(|reading| self.t_s > reading.t_s + SAME_INSTANT_S) {
-            let sighting = self.sighting(self.t_s);
+            let (t_s, world_from_body) = self.sighting(self.t_s);
             for observer in &mut *self.observers {
-                observer.read_standing(sighting, self.setup.points, self.run);
+                observer.read_standing(t_s, world_from_body, &self.setup.points, self.run);
             }
         }
         self.write_standing_row();
     }
 
-    fn go(&mut self, increment: Increment) -> Result<(), ServoError> {
-        let mut command = command(self.setup.robot, &self.setup.nominal_geometry, increment);
-        for (_, effect) in &mut *self.effects {
-            effect.start_motion();
-            effect.command(&mut command);
-        }
+    #[inline]
+    fn go(&mut self, mut command: Command, foreseen: Option<&[Piece]>) -> Result<(), ServoError> {
+        self.effects.start_motion();
+        self.effects.command(&mut command);
         if self.setup.sensitivity_sigma > 0.0 {
-            self.sensitivity =
-                Wheels::from_sides(|_| 1.0 + self.setup.sensitivity_sigma * self.sensitivity_stream.normal());
+            let stream = &mut self.streams.sensitivity;
+            self.sensitivity = Wheels::from_sides(|_| 1.0 + self.setup.sensitivity_sigma * stream.normal());
         }
-        let mut probe = self.step(
-            0.0,
-            &ShaftMotion {
-                shaft_rad: Wheels::both(0.0),
-                rate_rad_s: Wheels::both(0.0),
-                acceleration_rad_s2: Wheels::both(0.0),
-            },
-        );
-        let effects = &mut *self.effects;
-        self.setup.actuator.begin(&command, |rate_rad_s| {
+        match (&mut self.actuator, foreseen) {
+            (Actuator::Stepping(pair), _) => {
+                pair.begin(&command)?;
+                self.travel();
+            }
+            (Actuator::ClosedForm(_), Some(pieces)) => self.travel_in(pieces),
+            (Actuator::ClosedForm(_), None) => {
+                let pieces = self.pieces(&command);
+                self.travel_in(pieces.as_slice());
+            }
+        }
+        Ok(())
+    }
+
+    /// The closed form drives a motion's pieces.
+    #[inline]
+    fn travel_in(&mut self, pieces: &[Piece]) {
+        let undisturbed = self.log.is_none() && self.next_look_s == f64::INFINITY;
+        for piece in pieces {
+            self.actuator.begin_piece(*piece);
+            if undisturbed {
+                self.advance(piece.duration_s);
+            } else {
+                self.travel();
+            }
+        }
+    }
+
+    /// How the closed form turns the shafts for a command, given what the counters now see of them.
+    fn pieces(&mut self, command: &Command) -> Pieces {
+        let mut probe = self.step(0.0, &ShaftMotion::REST);
+        self.setup.profile.pieces(command, |rate_rad_s| {
             probe.rate_rad_s = rate_rad_s;
             probe.encoder_rad = Wheels::both(1.0);
-            for (_, effect) in &mut *effects {
-                effect.encoder(&mut probe);
-            }
+            self.effects.encoder(&mut probe);
             probe.encoder_rad
-        })?;
-        self.travel();
-        Ok(())
+        })
     }
 
     /// Lets time pass until the actuator is done.
     fn travel(&mut self) {
-        while let Some(event_s) = self.setup.actuator.next_event_s() {
+        while let Some(event_s) = self.actuator.next_event_s() {
             let log_s = self.log.as_ref().map_or(f64::INFINITY, LogClock::next_read_s);
-            let look_s = self.observers.iter().map(Observer::next_look_s).fold(f64::INFINITY, f64::min);
-            let dt_s = event_s.min(log_s - self.t_s).min(look_s - self.t_s);
+            let dt_s = event_s.min(log_s - self.t_s).min(self.next_look_s - self.t_s);
             if dt_s > 0.0 {
                 self.advance(dt_s);
             }
@@ -185,16 +212,16 @@ impl<'a> Drive<'a> {
         Step {
             t_s: self.t_s,
             dt_s,
-            world_from_body: self.world_from_body,
-            nominal_radius_m: self.setup.nominal_geometry.m_per_rad(),
+            world_from_body: self.world_from_body.pose(),
+            nominal_radius_m: self.setup.nominal_radius_m,
             shaft_rad: motion.shaft_rad,
             rate_rad_s: motion.rate_rad_s,
             acceleration_rad_s2: motion.acceleration_rad_s2,
             wheel_angle_rad: self.wheel_angle_rad,
             wheel_rad: motion.shaft_rad,
-            radius_m: self.setup.true_geometry.m_per_rad(),
+            radius_m: self.setup.true_radius_m,
             travel_m: Wheels::both(0.0),
-            wheel_separation_m: self.setup.true_geometry.wheel_separation_m(),
+            wheel_separation_m: self.setup.wheel_separation_m,
             lateral_m: 0.0,
             extra_turn_rad: 0.0,
             creep_m: [0.0; 2],
@@ -202,82 +229,83 @@ impl<'a> Drive<'a> {
         }
     }
 
+    #[inline]
     fn advance(&mut self, dt_s: f64) {
-        let motion = self.setup.actuator.turn(dt_s);
+        let motion = self.actuator.turn(dt_s);
         let mut step = self.step(dt_s, &motion);
-        for (_, effect) in &mut *self.effects {
-            effect.motor(&mut step);
-        }
+        self.effects.motor(&mut step);
         step.wheel_rad = step.shaft_rad;
         step.encoder_rad = step.shaft_rad;
-        for (_, effect) in &mut *self.effects {
-            effect.wheel(&mut step);
-        }
+        self.effects.wheel(&mut step);
         self.wheel_angle_rad = self.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turn| angle + turn);
         let rolled_m = step.radius_m.zip_with(step.wheel_rad, |radius_m, turn| radius_m * turn);
         step.travel_m = rolled_m.zip_with(self.sensitivity, |rolled_m, factor| rolled_m * factor);
-        for (_, effect) in &mut *self.effects {
-            effect.floor(&mut step);
-        }
+        self.effects.floor(&mut step);
         self.move_body(&step);
-        for (_, effect) in &mut *self.effects {
-            effect.encoder(&mut step);
-        }
-        self.setup.actuator.count(&step);
+        self.effects.encoder(&mut step);
+        self.actuator.count(&step);
         self.t_s += dt_s;
     }
 
+    #[inline]
     fn move_body(&mut self, step: &Step) {
         let var_m2 = self.setup.noise.travel_var_m2(step.travel_m);
-        let noisy = var_m2.left > 0.0 || var_m2.right > 0.0;
-        let travel_m = if noisy {
-            let noise_m = Wheels::from_sides(|side| var_m2[side].sqrt() * self.noise_stream.normal());
-            step.travel_m.zip_with(noise_m, |travel_m, noise_m| travel_m + noise_m)
-        } else {
-            step.travel_m
-        };
+        let (mut travel_m, mut along_m, mut across_m) = (step.travel_m, 0.0, step.lateral_m);
+        if var_m2.left > 0.0 || var_m2.right > 0.0 {
+            let stream = &mut self.streams.wheel_noise;
+            let [left, right] = if self.setup.closed_form {
+                let scatter = ArcScatter::within(step.travel_m, var_m2, step.wheel_separation_m);
+                let [left, right, along, across] = stream.normals();
+                along_m += scatter.along_var_m2.sqrt() * along;
+                across_m += scatter.across_var_m2.sqrt() * across;
+                [left, right]
+            } else {
+                stream.normals()
+            };
+            travel_m.left += var_m2.left.sqrt() * left;
+            travel_m.right += var_m2.right.sqrt() * right;
+        }
         let mut increment = Increment::from_travel(travel_m, step.wheel_separation_m);
         increment.turn_rad += step.extra_turn_rad;
-        let mut before_from_after = increment.arc();
-        let (mut along_m, mut across_m) = (0.0, step.lateral_m);
-        if noisy && self.setup.closed_form {
-            let scatter = ArcScatter::within(step.travel_m, var_m2, step.wheel_separation_m);
-            along_m += scatter.along_var_m2.sqrt() * self.noise_stream.normal();
-            across_m += scatter.across_var_m2.sqrt() * self.noise_stream.normal();
-        }
-        if along_m != 0.0 || across_m != 0.0 {
-            let (sin, cos) = (0.5 * increment.turn_rad).sin_cos();
-            before_from_after.x_m += cos * along_m - sin * across_m;
-            before_from_after.y_m += sin * along_m + cos * across_m;
-        }
-        self.world_from_body = self.world_from_body * before_from_after;
-        self.world_from_body.x_m += step.creep_m[0];
-        self.world_from_body.y_m += step.creep_m[1];
+        let mut world_from_body = self.world_from_body * increment.scattered_arc(along_m, across_m);
+        world_from_body.x_m += step.creep_m[0];
+        world_from_body.y_m += step.creep_m[1];
+        self.world_from_body = world_from_body.into();
     }
 
-    /// What an instrument that looks at `t_s`, now, sees.
-    fn sighting(&mut self, t_s: f64) -> Sighting {
-        let mut sighting = Sighting { t_s, world_from_body: self.world_from_body };
-        for (_, effect) in &mut *self.effects {
-            effect.instrument(&mut sighting);
+    /// What an instrument that looks at `t_s`, now, sees: when and where.
+    #[inline]
+    fn sighting(&mut self, t_s: f64) -> (f64, Frame) {
+        if !self.effects.act_on_instruments() {
+            return (t_s, self.world_from_body);
         }
-        sighting
+        let mut sighting = Sighting { t_s, world_from_body: self.world_from_body.pose() };
+        self.effects.instrument(&mut sighting);
+        (sighting.t_s, sighting.world_from_body.into())
     }
 
+    #[inline]
     fn look_if_due(&mut self) {
+        if self.next_look_s <= self.t_s + SAME_INSTANT_S {
+            self.look();
+        }
+    }
+
+    fn look(&mut self) {
         for k in 0..self.observers.len() {
             let look_s = self.observers[k].next_look_s();
             if look_s <= self.t_s + SAME_INSTANT_S {
                 // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
-                let sighting = self.sighting(look_s);
-                self.observers[k].look(sighting, self.run);
+                let (t_s, world_from_body) = self.sighting(look_s);
+                self.observers[k].look(t_s, world_from_body, self.run);
             }
         }
+        self.next_look_s = next_look_s(self.observers);
     }
 
     fn read_counters_if_due(&mut self) {
         let Some(log) = &mut self.log else { return };
-        let counts = self.setup.actuator.counts();
+        let counts = self.actuator.counts();
         for side in Side::BOTH {
             if log.read[side].is_none() && log.pending.read_s[side] <= self.t_s + SAME_INSTANT_S {
                 log.read[side] = Some(counts[side]);
@@ -286,24 +314,31 @@ impl<'a> Drive<'a> {
         if let (Some(left), Some(right)) = (log.read.left, log.read.right) {
             let stamp_s = log.pending.stamp_s;
             *log = LogClock::schedule(log.interval_s, log.rows + 1, self.effects);
-            self.write_row(stamp_s, Wheels { left, right });
+            if self.row_is_due(stamp_s) {
+                self.write_row(stamp_s, Wheels { left, right });
+            }
         }
     }
 
     /// The row of a standstill: both counters rest, so that neither clock nor skew matters.
+    #[inline]
     fn write_standing_row(&mut self) {
-        let counts = self.setup.actuator.counts();
-        self.write_row(self.t_s, counts);
+        if self.row_is_due(self.t_s) {
+            let counts = self.actuator.counts();
+            self.write_row(self.t_s, counts);
+        }
     }
 
+    /// Is the last row of another instant?
+    #[inline]
+    fn row_is_due(&self, t_s: f64) -> bool {
+        self.run.odometry.t_s.last().is_none_or(|last_s| t_s > last_s + SAME_INSTANT_S)
+    }
+
+    #[inline]
     fn write_row(&mut self, t_s: f64, counts: Wheels<i64>) {
-        if self.run.odometry.t_s.last().is_some_and(|last_s| t_s <= last_s + SAME_INSTANT_S) {
-            return;
-        }
         let mut readout = Readout { ticks: counts };
-        for (_, effect) in &mut *self.effects {
-            effect.readout(&mut readout);
-        }
+        self.effects.readout(&mut readout);
         self.run.odometry.t_s.push(t_s);
         if let WheelLog::Ticks(ticks) = &mut self.run.odometry.wheels {
             ticks.left.push(readout.ticks.left);
@@ -312,14 +347,6 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// What the wheels are told for a motion: whole counts by the nominal geometry, both wheels done at the same time.
-fn command(robot: &Robot, nominal_geometry: &DriveGeometry, increment: Increment) -> Command {
-    let travel_m = nominal_geometry.travel_m(increment);
-    let counts_per_rad = robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
-    let m_per_count = nominal_geometry.m_per_rad().map(|m_per_rad| m_per_rad / counts_per_rad);
-    let travel_counts = travel_m.zip_with(m_per_count, |travel_m, m_per_count| (travel_m / m_per_count).round());
-    let longest = travel_counts.left.abs().max(travel_counts.right.abs()).max(1.0);
-    let speed_counts_s = travel_counts
-        .zip_with(m_per_count, |counts, m_per_count| robot.cruise_speed_m_s / m_per_count * (counts.abs() / longest));
-    Command { travel_counts, speed_counts_s }
+fn next_look_s(observers: &[Observer]) -> f64 {
+    observers.iter().map(Observer::next_look_s).fold(f64::INFINITY, f64::min)
 }

@@ -1,23 +1,37 @@
 //! The two outside instruments: the paper's floor grid and motion capture.
 
 use dataset::{MarkedPoint, PointReading, Run, TruthSample};
-use effects::{Address, Sighting, Stream, StreamName};
-use kinematics::{Point, Pose};
+use effects::{Address, Stream, StreamName};
+use kinematics::{Frame, Point, Pose};
 use scenario::Instrument;
 
 const READING: StreamName = StreamName::new("instrument reading");
 
-/// An instrument during one run.
+/// An instrument of the scenario, at work in one run after the other.
 #[derive(Debug)]
 pub(crate) struct Observer {
     instrument: Instrument,
+    name: StreamName,
     stream: Stream,
     samples: u32,
 }
 
 impl Observer {
+    /// The instrument at a position in the scenario's list, in the run of an address.
     pub(crate) fn new(instrument: Instrument, position: u64, address: &Address) -> Self {
-        Self { instrument, stream: address.stream(READING.nth(position)), samples: 0 }
+        let name = READING.nth(position);
+        Self { instrument, name, stream: address.stream(name), samples: 0 }
+    }
+
+    pub(crate) const fn instrument(&self) -> &Instrument {
+        &self.instrument
+    }
+
+    /// Another run begins; its draws come from `stream`.
+    #[inline]
+    pub(crate) fn restart(&mut self, stream: impl Fn(StreamName) -> Stream) {
+        self.stream = stream(self.name);
+        self.samples = 0;
     }
 
     /// When the instrument next looks by itself, seconds; the floor grid never does.
@@ -29,7 +43,7 @@ impl Observer {
     }
 
     /// A look at the moving robot at [`Self::next_look_s`].
-    pub(crate) fn look(&mut self, sighting: Sighting, run: &mut Run) {
+    pub(crate) fn look(&mut self, t_s: f64, world_from_body: Frame, run: &mut Run) {
         let Instrument::MotionCapture {
             sigma_xy_m,
             sigma_theta_rad,
@@ -42,27 +56,60 @@ impl Observer {
         else {
             return;
         };
+        let stream = &mut self.stream;
         self.samples += 1;
-        let world_from_marker = sighting.world_from_body * Pose::new(lever_x_m, lever_y_m, lever_theta_rad);
+        let world_from_marker = world_from_body * Pose::new(lever_x_m, lever_y_m, lever_theta_rad);
         run.truth.push(TruthSample::new(
-            sighting.t_s + latency_s,
-            world_from_marker.x_m + sigma_xy_m * self.stream.normal(),
-            world_from_marker.y_m + sigma_xy_m * self.stream.normal(),
-            Some(world_from_marker.theta_rad + sigma_theta_rad * self.stream.normal()),
+            t_s + latency_s,
+            world_from_marker.x_m + sigma_xy_m * stream.normal(),
+            world_from_marker.y_m + sigma_xy_m * stream.normal(),
+            Some(world_from_marker.theta_rad + sigma_theta_rad * stream.normal()),
         ));
     }
 
     /// A reading of the standing robot's marks on the floor grid.
-    pub(crate) fn read_standing(&mut self, sighting: Sighting, points: &[MarkedPoint], run: &mut Run) {
+    #[inline]
+    pub(crate) fn read_standing(&mut self, t_s: f64, world_from_body: Frame, points: &[MarkedPoint], run: &mut Run) {
         let Instrument::FloorGrid { resolution_m, reading_sigma_m } = self.instrument else { return };
-        let mut read = |value_m: f64| {
-            let read_m = value_m + reading_sigma_m * self.stream.normal();
-            if resolution_m > 0.0 { (read_m / resolution_m).round() * resolution_m } else { read_m }
-        };
+        run.point_readings.reserve(points.len());
         for (point, mark) in points.iter().enumerate() {
-            let room = sighting.world_from_body * mark.body;
-            let room = Point::new(read(room.x_m), read(room.y_m));
-            run.point_readings.push(PointReading { t_s: sighting.t_s, point, room });
+            let room = world_from_body * mark.body;
+            let [dx, dy] = self.stream.normals();
+            let (x_m, y_m) = (room.x_m + reading_sigma_m * dx, room.y_m + reading_sigma_m * dy);
+            let room = if resolution_m > 0.0 {
+                Point::new(round(x_m / resolution_m) * resolution_m, round(y_m / resolution_m) * resolution_m)
+            } else {
+                Point::new(x_m, y_m)
+            };
+            run.point_readings.push(PointReading { t_s, point, room });
         }
+    }
+}
+
+/// [`f64::round`], the same bits without the call that it is where the processor is not known to round by an instruction (SSE 4.1).
+#[inline]
+fn round(x: f64) -> f64 {
+    /// 1.5·2⁵²: added and taken away again it rounds to whole numbers, halves to even ones.
+    const SHIFTER: f64 = 6_755_399_441_055_744.0;
+    /// Below this the sum with the shifter has no fractions and does not leave its binade.
+    const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
+    let rounded = (x + SHIFTER) - SHIFTER;
+    if x.abs() < SHIFTS_BELOW && (x - rounded).abs() < 0.5 { rounded.copysign(x) } else { x.round() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_that_of_the_standard_library_to_the_bit() {
+        let halves = (-9..=9).map(|half| 0.5 * f64::from(half));
+        let large =
+            [2_f64.powi(50), 2_f64.powi(50) - 0.5, 2_f64.powi(51) + 0.5, 2_f64.powi(52) + 1.0, 1e300, f64::INFINITY];
+        let small = [0.0, f64::MIN_POSITIVE, 0.499_999_999_999_999_94, 1e-9, 0.3, 1234.567];
+        for x in halves.chain(large).chain(small).flat_map(|x| [x, -x, x.next_up(), x.next_down()]) {
+            assert_eq!(round(x).to_bits(), x.round().to_bits(), "{x}");
+        }
+        assert!(round(f64::NAN).is_nan());
     }
 }

@@ -4,16 +4,19 @@
 //! that calibrators drive without knowing what it is. Two engines share everything from the shaft to the record: stepping (≤ 1 ms; motors, controllers,
 //! transients) and the closed form (each motion one arc, noise summed), and statistical tests hold them equal.
 
+mod active;
 mod actuator;
 mod drive;
 mod hctl1100;
 mod instrument;
 mod motor;
+mod plan;
 mod quadrature;
 mod robot;
 mod servo;
 mod simulation;
 
+pub use plan::Plan;
 pub use robot::{SimulatedRobot, SimulationError};
 pub use servo::ServoError;
 pub use simulation::{HiddenTruth, Simulation, TrueRun, simulate, simulate_programs};

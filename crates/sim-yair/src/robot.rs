@@ -1,13 +1,15 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
 use dataset::{MarkedPoint, MotionProgram, NominalRobot, Platform, Run, RunInfo, TruthNoise, WheelLog};
-use effects::{Address, EffectError, Forward, StreamName};
+use effects::{Address, EffectError, Forward, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use scenario::{Engine, Instrument, Scenario};
 
-use crate::actuator::{Actuator, ConstantSpeed, ServoPair};
-use crate::drive::{ActiveEffect, Drive, DriveSetup};
+use crate::active::ActiveEffects;
+use crate::actuator::{Actuator, ConstantSpeed, Profile, ServoPair};
+use crate::drive::{Drive, DriveSetup, DriveStreams, Start};
 use crate::instrument::Observer;
+use crate::plan::{Plan, PlannedMotion};
 use crate::servo::ServoError;
 
 /// Why a scenario cannot be simulated.
@@ -35,6 +37,8 @@ pub enum SimulationError {
 
 const PLACEMENT: StreamName = StreamName::new("placement");
 const WHEEL_PHASE: StreamName = StreamName::new("wheel phase");
+const WHEEL_NOISE: StreamName = StreamName::new("wheel noise");
+const SENSITIVITY: StreamName = StreamName::new("sensitivity");
 
 /// YAIR, or another differential drive, as a scenario describes it, on one trial of its randomness.
 ///
@@ -42,18 +46,15 @@ const WHEEL_PHASE: StreamName = StreamName::new("wheel phase");
 pub struct SimulatedRobot {
     robot: scenario::Robot,
     nominal: NominalRobot,
-    points: Vec<MarkedPoint>,
     geometry: DriveGeometry,
     nominal_geometry: DriveGeometry,
     engine: Engine,
-    noise: WheelNoise,
-    sensitivity_sigma: f64,
     placement: scenario::Placement,
-    log_interval_s: Option<f64>,
-    instruments: Vec<Instrument>,
-    effects: Vec<ActiveEffect>,
+    setup: DriveSetup,
+    effects: ActiveEffects,
     /// Where the next run's draws are.
     address: Address,
+    streams: DriveStreams,
     observers: Vec<Observer>,
     last_ends: (Pose, Pose),
 }
@@ -81,7 +82,7 @@ impl SimulatedRobot {
         listed.iter().try_for_each(|effect| effect.physical().check())?;
         effects::sort_by_stage(&mut listed);
         let listed = listed.iter().filter_map(|effect| Some((effect.id(), effect.physical().forward()?)));
-        let mut effects: Vec<ActiveEffect> = Vec::new();
+        let mut effects: Vec<(StreamName, Box<dyn Forward>)> = Vec::new();
         let mut ids: Vec<&str> = Vec::new();
         for (id, effect) in listed.chain(more) {
             if scenario.engine == Engine::ClosedForm
@@ -97,21 +98,38 @@ impl SimulatedRobot {
         let mut nominal = scenario.robot.nominal();
         let counts_per_tick: u32 = effects.iter().filter_map(|(_, effect)| effect.counts_per_tick()).product();
         nominal.ticks_per_rev = nominal.ticks_per_rev.map(|counts| counts / f64::from(counts_per_tick));
+        let effects = ActiveEffects::new(effects);
+        let address = Address { seed, point: 0, trial, run: 0 };
+        let (geometry, nominal_geometry) = (scenario.true_geometry()?, scenario.nominal_geometry()?);
         let robot = Self {
-            robot: scenario.robot.clone(),
             nominal,
-            points: scenario.robot.marked_points(),
-            geometry: scenario.true_geometry()?,
-            nominal_geometry: scenario.nominal_geometry()?,
+            geometry,
+            nominal_geometry,
             engine: scenario.engine,
-            noise: WheelNoise { sigma_m_per_sqrt_m: Wheels::both(scenario.noise.wheel_sigma_m_per_sqrt_m) },
-            sensitivity_sigma: scenario.noise.sensitivity_sigma,
             placement: scenario.placement,
-            log_interval_s: scenario.log.map(|log| log.interval_s),
-            instruments: scenario.instruments.clone(),
+            setup: DriveSetup {
+                counts_per_rad: scenario.robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU,
+                nominal_radius_m: nominal_geometry.m_per_rad(),
+                true_radius_m: geometry.m_per_rad(),
+                wheel_separation_m: geometry.wheel_separation_m(),
+                noise: WheelNoise { sigma_m_per_sqrt_m: Wheels::both(scenario.noise.wheel_sigma_m_per_sqrt_m) },
+                sensitivity_sigma: scenario.noise.sensitivity_sigma,
+                closed_form: scenario.engine == Engine::ClosedForm,
+                profile: Profile::new(&scenario.robot, effects.depend_on_speed()),
+                log_interval_s: scenario.log.map(|log| log.interval_s),
+                points: scenario.robot.marked_points(),
+            },
+            robot: scenario.robot.clone(),
             effects,
-            address: Address { seed, point: 0, trial, run: 0 },
-            observers: Vec::new(),
+            address,
+            streams: DriveStreams {
+                wheel_noise: address.stream(WHEEL_NOISE),
+                sensitivity: address.stream(SENSITIVITY),
+            },
+            observers: (0..)
+                .zip(&scenario.instruments)
+                .map(|(position, &instrument)| Observer::new(instrument, position, &address))
+                .collect(),
             last_ends: (Pose::IDENTITY, Pose::IDENTITY),
         };
         // The controllers check themselves once, before anything is driven.
@@ -143,19 +161,67 @@ impl SimulatedRobot {
         self.last_ends
     }
 
-    fn start_counts(&self, address: &Address) -> Wheels<f64> {
-        let counts_per_turn = self.robot.encoder.counts_per_wheel_turn();
-        let mut stream = address.stream(WHEEL_PHASE);
-        Wheels::from_sides(|_| counts_per_turn * stream.uniform())
+    /// Makes a program ready: what its motions tell this robot's wheels is worked out once, and [`Self::drive_plan_into`] does not do it again.
+    #[must_use]
+    pub fn plan(&self, program: MotionProgram) -> Plan {
+        let foreseen = self.setup.closed_form && self.effects.leave_commands_and_counters_alone();
+        let pieces = |command: &_| foreseen.then(|| self.setup.profile.pieces(command, |_| Wheels::both(1.0)));
+        let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, pieces);
+        Plan { motions: program.motions.iter().map(planned).collect(), program }
     }
 
-    fn place(&self, address: &Address) -> Pose {
-        let mut stream = address.stream(PLACEMENT);
-        Pose::new(
-            stream.uniform_about_zero(self.placement.half_width_m),
-            stream.uniform_about_zero(self.placement.half_width_m),
-            stream.uniform_about_zero(self.placement.half_width_rad),
-        )
+    /// Drives a program as [`Platform::drive_into`] does.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when the controllers cannot do what is asked of them.
+    pub fn drive_plan_into(&mut self, plan: &Plan, run: &mut Run) -> Result<(), SimulationError> {
+        // The streams first, all at once: none waits for another's draws.
+        let streams = self.address.streams();
+        self.address.run += 1;
+        self.effects.start_run(|name| streams.stream(name));
+        for observer in &mut self.observers {
+            observer.restart(|name| streams.stream(name));
+        }
+        self.streams.wheel_noise = streams.stream(WHEEL_NOISE);
+        if self.setup.sensitivity_sigma > 0.0 {
+            self.streams.sensitivity = streams.stream(SENSITIVITY);
+        }
+        let start = self.start(streams.stream(PLACEMENT), streams.stream(WHEEL_PHASE));
+        let actuator = match self.engine {
+            Engine::ClosedForm => Actuator::ClosedForm(ConstantSpeed::new(self.setup.counts_per_rad, start.counts)),
+            Engine::Stepping { step_s } => {
+                Actuator::Stepping(Box::new(ServoPair::new(&self.robot, start.counts, step_s)?))
+            }
+        };
+        empty(run, &plan.program);
+
+        let mut drive = Drive::start(
+            &self.setup,
+            (actuator, start),
+            &mut self.streams,
+            &mut self.effects,
+            &mut self.observers,
+            run,
+        );
+        drive.stand();
+        for motion in &plan.motions {
+            drive.perform(motion)?;
+        }
+        drive.stand();
+        self.last_ends = (start.world_from_body, drive.world_from_body());
+        Ok(())
+    }
+
+    fn start(&self, mut placement: Stream, mut wheel_phase: Stream) -> Start {
+        let counts_per_turn = self.robot.encoder.counts_per_wheel_turn();
+        Start {
+            world_from_body: Pose::new(
+                placement.uniform_about_zero(self.placement.half_width_m),
+                placement.uniform_about_zero(self.placement.half_width_m),
+                placement.uniform_about_zero(self.placement.half_width_rad),
+            ),
+            counts: Wheels::from_sides(|_| counts_per_turn * wheel_phase.uniform()),
+        }
     }
 }
 
@@ -167,13 +233,13 @@ impl Platform for SimulatedRobot {
     }
 
     fn points(&self) -> &[MarkedPoint] {
-        &self.points
+        &self.setup.points
     }
 
     fn truth_noise(&self) -> TruthNoise {
         let mut noise = TruthNoise::default();
-        for instrument in &self.instruments {
-            let (xy_m, theta_rad) = match *instrument {
+        for observer in &self.observers {
+            let (xy_m, theta_rad) = match *observer.instrument() {
                 Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
                     (reading_sigma_m.hypot(resolution_m / 12_f64.sqrt()), 0.0)
                 }
@@ -187,53 +253,7 @@ impl Platform for SimulatedRobot {
     }
 
     fn drive_into(&mut self, program: &MotionProgram, run: &mut Run) -> Result<(), SimulationError> {
-        let address = self.address;
-        self.address.run += 1;
-        for (name, effect) in &mut self.effects {
-            effect.start_run(address.stream(*name));
-        }
-        let start_counts = self.start_counts(&address);
-        let actuator = match self.engine {
-            Engine::ClosedForm => {
-                let ramps = self.effects.iter().any(|(_, effect)| effect.depends_on_speed());
-                Actuator::ClosedForm(ConstantSpeed::new(&self.robot, start_counts, ramps))
-            }
-            Engine::Stepping { step_s } => {
-                Actuator::Stepping(Box::new(ServoPair::new(&self.robot, start_counts, step_s)?))
-            }
-        };
-        self.observers.clear();
-        for (position, instrument) in (0..).zip(&self.instruments) {
-            self.observers.push(Observer::new(*instrument, position, &address));
-        }
-        empty(run, program);
-
-        let start = self.place(&address);
-        let mut drive = Drive::start(
-            DriveSetup {
-                actuator,
-                robot: &self.robot,
-                nominal_geometry: self.nominal_geometry,
-                true_geometry: self.geometry,
-                noise: self.noise,
-                sensitivity_sigma: self.sensitivity_sigma,
-                closed_form: self.engine == Engine::ClosedForm,
-                log_interval_s: self.log_interval_s,
-                points: &self.points,
-            },
-            &address,
-            (start, start_counts),
-            &mut self.effects,
-            &mut self.observers,
-            run,
-        );
-        drive.stand();
-        for motion in &program.motions {
-            drive.perform(motion)?;
-        }
-        drive.stand();
-        self.last_ends = (start, drive.world_from_body());
-        Ok(())
+        self.drive_plan_into(&self.plan(program.clone()), run)
     }
 }
 
@@ -245,7 +265,9 @@ fn empty(run: &mut Run, program: &MotionProgram) {
     run.info.protocol = Some(program.protocol);
     run.info.settings = program.settings;
     run.odometry.t_s.clear();
-    run.odometry.extra.clear();
+    if !run.odometry.extra.is_empty() {
+        run.odometry.extra.clear();
+    }
     match &mut run.odometry.wheels {
         WheelLog::Ticks(ticks) => {
             ticks.left.clear();

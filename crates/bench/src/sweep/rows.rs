@@ -1,7 +1,8 @@
 //! Every trial's estimates as a Parquet file, for who wants distributions instead of moments.
 //!
 //! A Parquet file is readable only when it is whole, so trials are first appended to a spool of fixed records, which an interrupted campaign cuts back to what its
-//! state knows of. At the end the spool becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the levels of its point.
+//! state knows of. At the end the spool becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the number of
+//! its point, counted from 1, and its levels.
 //! The `parquet` crate (Apache Arrow's own) writes it, without its compressors: estimates are noise, and noise does not compress.
 
 use std::fs::{File, OpenOptions};
@@ -106,7 +107,7 @@ pub(super) fn write_rows(
             let mut first = 0;
             while first < point.trials {
                 let trials = TRIALS_PER_GROUP.min(point.trials - first);
-                let group = Group { plan, point: number as i64, levels: &levels, truth: &truth, first, trials };
+                let group = Group { plan, point: number as i64 + 1, levels: &levels, truth: &truth, first, trials };
                 let mut bytes = vec![0; plan.estimates() * RECORD * usize::try_from(trials)?];
                 input.read_exact(&mut bytes)?;
                 let mut row_group = writer.next_row_group()?;

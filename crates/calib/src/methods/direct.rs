@@ -8,11 +8,11 @@
 //! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
-use dataset::{Protocol, RunView, Schedule, Session};
+use dataset::{PointReading, Protocol, RunView, Schedule, Session};
 use kinematics::{DriveGeometry, Point, Side, Wheels, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
-use crate::robust::{MedianMad, Summary};
+use crate::robust::{MedianMad, Summary, mean};
 
 /// The method with its outlier rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +43,14 @@ fn mark_sigma_m(session: &Session<'_>) -> f64 {
     session.truth_noise.sigma_xy_m.unwrap_or(0.0)
 }
 
+/// What of a session the marks of every run need.
+struct MarkReader<'s, 'a> {
+    session: &'s Session<'a>,
+    geometry: DriveGeometry,
+    /// The outermost marked points and where they are on the robot.
+    outermost: Option<Wheels<(usize, Point)>>,
+}
+
 /// The two marks of a run at its start and its end, in the room.
 struct Marks {
     start: Wheels<Point>,
@@ -60,6 +68,55 @@ impl Marks {
     }
 }
 
+impl<'s, 'a> MarkReader<'s, 'a> {
+    fn new(session: &'s Session<'a>) -> Result<Self, CalibError> {
+        let geometry =
+            session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Direct::NAME, source })?;
+        let points = || session.points.iter().map(|point| point.body).enumerate();
+        let by_y = |a: &(usize, Point), b: &(usize, Point)| a.1.y_m.total_cmp(&b.1.y_m);
+        let outermost = points().max_by(by_y).zip(points().min_by(by_y));
+        Ok(Self { session, geometry, outermost: outermost.map(|(left, right)| Wheels { left, right }) })
+    }
+
+    /// The runs of one protocol, each with its wheels' turns and its marks, where both were measured.
+    fn runs(
+        &self,
+        protocol: Protocol,
+    ) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
+        let runs = self.session.runs.iter().filter(move |run| run.info().protocol == Some(protocol));
+        runs.filter_map(|run| {
+            let wheel_rad = run.wheel_turn_rad(self.session.robot)?;
+            let marks = self.marks(run).transpose()?;
+            Some(marks.map(|marks| (run.info().id.as_str(), wheel_rad, marks)))
+        })
+    }
+
+    fn marks(&self, run: &RunView<'_>) -> Result<Option<Marks>, CalibError> {
+        let half_m = 0.5 * self.geometry.wheel_separation_m();
+        let readings = &run.run().point_readings;
+        if readings.is_empty() {
+            // Poses: the contacts themselves are the marks.
+            return Ok(run.observed_ends().map(|(start, end)| {
+                let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
+                Marks { start: contacts.map(|p| start * p), end: contacts.map(|p| end * p), outside_m: Wheels::both(0.0) }
+            }));
+        }
+        let Some(outermost) = self.outermost else { return Ok(None) };
+        let body = outermost.map(|(_, body)| body);
+        if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
+            return Err(Direct::not_applicable("it needs one marked point on each side of the robot".to_owned()));
+        }
+        if body.left.x_m.abs().max(body.right.x_m.abs()) > MARK_OFF_AXLE_M {
+            return Err(Direct::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
+        }
+        let start = outermost.map(|(point, _)| readings.iter().find(|reading| reading.point == point));
+        let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
+        let both = |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
+        let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
+        Ok(Some(Marks { start, end, outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m } }))
+    }
+}
+
 impl Direct {
     /// The method as the table of contents offers it.
     pub const DEFAULT: Self = Self { outliers: MedianMad { cut: 3.5 } };
@@ -70,58 +127,28 @@ impl Direct {
         CalibError::NotApplicable { method: Self::NAME, why }
     }
 
-    fn marks(session: &Session<'_>, run: &RunView<'_>, geometry: &DriveGeometry) -> Result<Option<Marks>, CalibError> {
-        let half_m = 0.5 * geometry.wheel_separation_m();
-        let readings = &run.run().point_readings;
-        if readings.is_empty() {
-            // Poses: the contacts themselves are the marks.
-            return Ok(run.observed_ends().map(|(start, end)| {
-                let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
-                Marks { start: contacts.map(|p| start * p), end: contacts.map(|p| end * p), outside_m: Wheels::both(0.0) }
-            }));
-        }
-        let by_y = |a: &usize, b: &usize| session.points[*a].body.y_m.total_cmp(&session.points[*b].body.y_m);
-        let (Some(left), Some(right)) = ((0..session.points.len()).max_by(by_y), (0..session.points.len()).min_by(by_y))
-        else {
-            return Ok(None);
-        };
-        let body = Wheels { left: session.points[left].body, right: session.points[right].body };
-        if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
-            return Err(Self::not_applicable("it needs one marked point on each side of the robot".to_owned()));
-        }
-        if body.left.x_m.abs().max(body.right.x_m.abs()) > MARK_OFF_AXLE_M {
-            return Err(Self::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
-        }
-        let reading = |point: usize, last: bool| {
-            let mut of_point = readings.iter().filter(|reading| reading.point == point);
-            if last { of_point.next_back() } else { of_point.next() }.map(|reading| reading.room)
-        };
-        let both = |last| Some(Wheels { left: reading(left, last)?, right: reading(right, last)? });
-        let (Some(start), Some(end)) = (both(false), both(true)) else { return Ok(None) };
-        Ok(Some(Marks { start, end, outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m } }))
-    }
-
     /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of its pulses.
     ///
     /// # Errors
     /// [`CalibError::NotApplicable`] when marks are where (6) does not hold.
     pub fn straight_values<'a>(sessions: &[Session<'a>]) -> Result<Wheels<Vec<RunValue<'a>>>, CalibError> {
-        let mut values = Wheels { left: Vec::new(), right: Vec::new() };
+        let most = sessions.iter().map(|session| session.runs.len()).sum();
+        let mut values = Wheels { left: Vec::with_capacity(most), right: Vec::with_capacity(most) };
         for session in sessions {
-            let geometry = session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Self::NAME, source })?;
-            for run in session.runs.iter().filter(|run| run.info().protocol == Some(Protocol::Straight)) {
-                let Some(wheel_rad) = run.wheel_turn_rad(session.robot) else { continue };
-                let Some(marks) = Self::marks(session, run, &geometry)? else { continue };
+            // Both ends of a chord are read.
+            let chord_sigma_m = 2_f64.sqrt() * mark_sigma_m(session);
+            for measured in MarkReader::new(session)?.runs(Protocol::Straight) {
+                let (run, wheel_rad, marks) = measured?;
                 let turn_rad = marks.turn_rad(0.0);
+                let chord_over_arc = sinc(0.5 * turn_rad);
                 for side in Side::BOTH {
                     // Signed with the direction of travel: backward runs have negative chords and negative counts.
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * wheel_rad[side].signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };
-                    let arc_m = chord_m / sinc(0.5 * turn_rad) + outward * marks.outside_m[side] * turn_rad;
+                    let arc_m = chord_m / chord_over_arc + outward * marks.outside_m[side] * turn_rad;
                     if wheel_rad[side] != 0.0 {
-                        // Both ends of the chord are read.
-                        let stated_sigma = 2_f64.sqrt() * mark_sigma_m(session) / wheel_rad[side].abs();
-                        values[side].push(RunValue { run: &run.run().info.id, value: arc_m / wheel_rad[side], stated_sigma });
+                        let stated_sigma = chord_sigma_m / wheel_rad[side].abs();
+                        values[side].push(RunValue { run, value: arc_m / wheel_rad[side], stated_sigma });
                     }
                 }
             }
@@ -137,43 +164,50 @@ impl Direct {
         sessions: &[Session<'a>],
         m_per_rad: Wheels<f64>,
     ) -> Result<Vec<(RunValue<'a>, Wheels<f64>)>, CalibError> {
-        let mut values = Vec::new();
+        let mut values = Vec::with_capacity(sessions.iter().map(|session| session.runs.len()).sum());
         for session in sessions {
-            let geometry = session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Self::NAME, source })?;
-            for run in session.runs.iter().filter(|run| run.info().protocol == Some(Protocol::Spin)) {
-                let Some(wheel_rad) = run.wheel_turn_rad(session.robot) else { continue };
-                let Some(marks) = Self::marks(session, run, &geometry)? else { continue };
+            let mark_sigma_m = mark_sigma_m(session);
+            let reader = MarkReader::new(session)?;
+            for measured in reader.runs(Protocol::Spin) {
+                let (run, wheel_rad, marks) = measured?;
                 // Whole turns come from the counts and the sensitivities already found.
                 let travel_m = wheel_rad.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad);
-                let turn_rad = marks.turn_rad(geometry.increment(travel_m).turn_rad);
+                let turn_rad = marks.turn_rad(reader.geometry.increment(travel_m).turn_rad);
                 if turn_rad.abs() > SMALLEST_SPIN_RAD {
                     let value = (travel_m.right - travel_m.left) / turn_rad;
                     let slope = Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad };
                     // Two marks across the axle, read at both ends, give the turn to 2σ/w.
                     let across_m = marks.start.left.distance_m(marks.start.right);
-                    let stated_sigma = (value / turn_rad).abs() * 2.0 * mark_sigma_m(session) / across_m;
-                    values.push((RunValue { run: &run.run().info.id, value, stated_sigma }, slope));
+                    let stated_sigma = (value / turn_rad).abs() * 2.0 * mark_sigma_m / across_m;
+                    values.push((RunValue { run, value, stated_sigma }, slope));
                 }
             }
         }
         Ok(values)
     }
 
-    /// Keeps the typical values and notes the others.
-    fn filter(&self, values: &[RunValue<'_>], of: &str, rejected: &mut Vec<Rejected>) -> Vec<bool> {
-        let numbers: Vec<f64> = values.iter().map(|value| value.value).collect();
-        let stated_sigma = values.iter().map(|value| value.stated_sigma).fold(0.0, f64::max);
+    /// Which values are typical, and what these say together; the others are noted.
+    fn filter<'v, 'a: 'v>(
+        &self,
+        values: impl ExactSizeIterator<Item = &'v RunValue<'a>> + Clone,
+        of: &str,
+        rejected: &mut Vec<Rejected>,
+    ) -> (Vec<bool>, Option<Summary>) {
+        let numbers: Vec<f64> = values.clone().map(|value| value.value).collect();
+        let stated_sigma = values.clone().map(|value| value.stated_sigma).fold(0.0, f64::max);
         let keep = self.outliers.keep(&numbers, stated_sigma);
-        for (value, _) in values.iter().zip(&keep).filter(|(_, keep)| !**keep) {
+        for (value, _) in values.zip(&keep).filter(|(_, keep)| !**keep) {
             let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
             rejected.push(Rejected { run: value.run.to_owned(), why });
         }
-        keep
+        let summary = Summary::of(kept(numbers.iter().copied(), &keep));
+        (keep, summary)
     }
 }
 
-fn kept<'v>(values: &'v [f64], keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
-    values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value)
+/// The values that are kept.
+fn kept<'v>(values: impl Iterator<Item = f64> + Clone + 'v, keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
+    values.zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| value)
 }
 
 impl Method for Direct {
@@ -204,9 +238,7 @@ impl Method for Direct {
         let mut runs_rejected = Vec::new();
         let mut radius = Wheels::both(None);
         for side in Side::BOTH {
-            let keep = self.filter(&straights[side], side.name(), &mut runs_rejected);
-            let numbers: Vec<f64> = straights[side].iter().map(|value| value.value).collect();
-            radius[side] = Summary::of(kept(&numbers, &keep));
+            (_, radius[side]) = self.filter(straights[side].iter(), side.name(), &mut runs_rejected);
         }
         let (Some(left), Some(right)) = (radius.left, radius.right) else {
             return Err(Self::not_applicable("no straight run is left".to_owned()));
@@ -214,10 +246,8 @@ impl Method for Direct {
         let m_per_rad = Wheels { left: left.mean, right: right.mean };
 
         let spins = Self::spin_values(sessions, m_per_rad)?;
-        let values: Vec<_> = spins.iter().map(|(value, _)| *value).collect();
-        let keep = self.filter(&values, "wheelbase", &mut runs_rejected);
-        let numbers: Vec<f64> = values.iter().map(|value| value.value).collect();
-        let Some(base) = Summary::of(kept(&numbers, &keep)) else {
+        let (keep, base) = self.filter(spins.iter().map(|(value, _)| value), "wheelbase", &mut runs_rejected);
+        let Some(base) = base else {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
@@ -226,8 +256,7 @@ impl Method for Direct {
         };
 
         let slope = Wheels::from_sides(|side| {
-            let slopes: Vec<f64> = spins.iter().map(|(_, slope)| slope[side]).collect();
-            Summary::of(kept(&slopes, &keep)).map_or(0.0, |summary| summary.mean)
+            mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0)
         });
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
         Ok(Calibration {

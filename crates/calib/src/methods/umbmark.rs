@@ -12,6 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use dataset::{Protocol, Schedule, Session};
 use kinematics::{Pose, Rule, Wheels};
+use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
 use crate::robust::Summary;
@@ -114,9 +115,9 @@ impl Method for Umbmark {
         let by_beta = mean_m * base_m / side_m * 0.5 * (0.5 * corner.beta_rad).cos();
         let covariance = corner.variances.map(|(var, cov)| {
             // α and β are half sum and half difference of the same two means: equal variances, and a covariance where one direction scatters more.
-            let jacobian = Covariance::from_row_slice(3, 2, &[0.0, -by_beta, 0.0, by_beta, by_alpha, 0.0]);
-            let corners = Covariance::from_row_slice(2, 2, &[var, cov, cov, var]);
-            &jacobian * corners * jacobian.transpose()
+            let jacobian = Matrix3x2::new(0.0, -by_beta, 0.0, by_beta, by_alpha, 0.0);
+            let covariance = jacobian * Matrix2::new(var, cov, cov, var) * jacobian.transpose();
+            Covariance::from_column_slice(3, 3, covariance.as_slice())
         });
         Ok(Calibration {
             method: Self::NAME,

@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Step};
+use crate::forward::{Forward, Hooks, Step};
 use crate::stream::Stream;
 
 /// Scatter of the effective wheelbase.
@@ -57,6 +57,10 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, start_motion: true, floor: true, ..Hooks::NONE }
+    }
+
     fn start_run(&mut self, mut stream: Stream) {
         self.slow_m = self.size.slow_sigma_m * stream.normal();
         self.stream = Some(stream);

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Readout};
+use crate::forward::{Forward, Hooks, Readout};
 
 /// Coarseness of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +32,10 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { readout: true, ..Hooks::NONE }
+    }
+
     fn readout(&mut self, readout: &mut Readout) {
         readout.ticks = readout.ticks.map(|counts| counts.div_euclid(i64::from(self.size.counts_per_tick)));
     }
