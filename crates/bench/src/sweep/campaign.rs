@@ -78,7 +78,7 @@ impl SweepPlan {
         }
     }
 
-    /// Runs a campaign as asked. With a folder the state is there from the first seconds on, and is removed by [`super::write_results`]' caller, [`finish`],
+    /// Runs a campaign as asked. With a folder the state is there from the first seconds on, until [`super::write_results`] takes it away
     /// once the results stand.
     ///
     /// # Errors
