@@ -173,11 +173,14 @@ impl State {
         Ok(state)
     }
 
-    /// Writes the state in one piece.
+    /// Writes the state in one piece: aside under one name, which the next writing takes again when a kill left it behind, and then into its place.
     pub(super) fn write(&self, path: &Path) -> Result<(), BenchError> {
         let failed = |why: String| BenchError::Write { path: path.display().to_string(), why };
         let bytes = serde_json::to_vec(self).map_err(|error| failed(error.to_string()))?;
-        report::write_whole(path, &bytes).map_err(|error| failed(error.to_string()))
+        let aside = path.with_extension("part");
+        std::fs::write(&aside, bytes)
+            .and_then(|()| std::fs::rename(&aside, path))
+            .map_err(|error| failed(error.to_string()))
     }
 
     /// Refuses a state of another campaign than `ours`.
