@@ -200,7 +200,7 @@ fn a_killed_command_goes_on_where_it_was() {
     let temporary = tempfile::tempdir().expect("a folder");
     let here = temporary.path();
     // About ten seconds of work for two cores: it must not be done before the first state, which is written after two.
-    write_scenario(here, 100_000);
+    write_scenario(here, 250_000);
     let arguments = ["sweep", "small.toml", "--rows", "--json", "--quiet", "--out"];
     let undisturbed = run_in(here, &[&arguments[..], &["whole"]].concat());
     assert_eq!(undisturbed.code, Some(0), "{}", undisturbed.stderr);
