@@ -73,10 +73,10 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
             Some(calibration) => nominal.and_then(|nominal| calibration.geometry(session.robot, nominal)),
             None => nominal,
         };
-        let body_from_instrument = calibration.map_or(Pose::IDENTITY, NamedCalibration::body_from_instrument);
+        let body_from_sensor = calibration.map_or(Pose::IDENTITY, NamedCalibration::body_from_sensor);
         for run in &session.runs {
             let mut drift = match geometry {
-                Some(geometry) => run_drift(session, run, geometry, body_from_instrument),
+                Some(geometry) => run_drift(session, run, geometry, body_from_sensor),
                 None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
             };
             drift.dataset = name_runs.then(|| session.name.to_owned());
@@ -104,11 +104,11 @@ fn run_drift(
     session: &Session<'_>,
     run: &RunView<'_>,
     geometry: DriveGeometry,
-    body_from_instrument: Pose,
+    body_from_sensor: Pose,
 ) -> RunDrift {
     let observed = run.observed_poses();
     let start =
-        observed.first().map(|(_, world_from_instrument)| *world_from_instrument * body_from_instrument.inverse());
+        observed.first().map(|(_, world_from_sensor)| *world_from_sensor * body_from_sensor.inverse());
     let mut log: Vec<(f64, Pose)> = Vec::with_capacity(run.odometry().t_s.len());
     let mut length_m = 0.0;
     run.dead_reckon(session.robot, &geometry, Rule::Midpoint, start.unwrap_or_default(), |t_s, pose| {
@@ -138,10 +138,10 @@ fn run_drift(
     };
     let identity = moved == Pose::IDENTITY;
     let (mut row, mut largest, mut last) = (0, None::<(f64, f64)>, None);
-    for (t_s, world_from_instrument) in &observed {
+    for (t_s, world_from_sensor) in &observed {
         let Some(reckoned) = at(&log, *t_s, &mut row) else { continue };
         let reckoned = if identity { reckoned } else { moved * reckoned };
-        let seen = *world_from_instrument * body_from_instrument.inverse();
+        let seen = *world_from_sensor * body_from_sensor.inverse();
         let position_m = reckoned.position().distance_m(seen.position());
         let heading_rad = wrap_to_pi(reckoned.theta_rad - seen.theta_rad).abs();
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
@@ -283,7 +283,7 @@ mod tests {
     fn a_calibration_with_the_right_scale_does_not_drift_and_a_mounted_instrument_is_taken_into_account() {
         let mut values: std::collections::BTreeMap<String, f64> =
             [("left_m_per_tick".to_owned(), 1.02e-3), ("right_m_per_tick".to_owned(), 1.02e-3)].into();
-        values.insert("instrument_theta_rad".to_owned(), 0.2);
+        values.insert("sensor_theta_rad".to_owned(), 0.2);
         let calibration = NamedCalibration { name: "right".to_owned(), values };
         let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2 + 0.2)));
         let drift = evaluate(&[dataset.session()], Some(&calibration), true);

@@ -1,8 +1,8 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
 use dataset::{NominalRobot, Schedule, Session};
-use kinematics::{DriveGeometry, GeometryError, Wheels};
-use nalgebra::DMatrix;
+use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
+use nalgebra::{DMatrix, Matrix3};
 
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,6 +18,12 @@ pub enum Parameter {
     LeftPerTick,
     /// Travel of the right wheel per tick, metres (`C_R`).
     RightPerTick,
+    /// Where the outside instrument sits on the robot: ahead of the drive's centre, metres.
+    SensorX,
+    /// Where it sits: to the left of the drive's centre, metres.
+    SensorY,
+    /// Where it looks: its heading on the robot, radians.
+    SensorTheta,
     /// The factor common to both wheels; only ever not observable.
     CommonScale,
 }
@@ -32,11 +38,14 @@ impl Parameter {
             Self::WheelSeparation => "wheel_separation_m",
             Self::LeftPerTick => "left_m_per_tick",
             Self::RightPerTick => "right_m_per_tick",
+            Self::SensorX => "sensor_x_m",
+            Self::SensorY => "sensor_y_m",
+            Self::SensorTheta => "sensor_theta_rad",
             Self::CommonScale => "common_scale",
         }
     }
 
-    /// Every parameter that a result may carry a value of.
+    /// Every parameter of the drive that a result may carry a value of.
     pub const ESTIMATED: [Self; 5] = [
         Self::LeftWheelDiameter,
         Self::RightWheelDiameter,
@@ -44,6 +53,9 @@ impl Parameter {
         Self::LeftPerTick,
         Self::RightPerTick,
     ];
+
+    /// The parameters of [`Mounting`], in the order of its covariance.
+    pub const MOUNTING: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
 }
 
 /// A value with its standard deviation.
@@ -59,6 +71,15 @@ pub struct Estimate {
 
 /// Joint covariance of the drive's geometry, order: left diameter, right diameter, separation (m²).
 pub type Covariance = DMatrix<f64>;
+
+/// Where the outside instrument sits on the robot, for methods that find it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mounting {
+    /// The instrument's frame on the robot.
+    pub body_from_sensor: Pose,
+    /// Covariance of x, y (m²) and heading (rad²), in this order; `None` when the data do not show a scatter.
+    pub covariance: Option<Matrix3<f64>>,
+}
 
 /// A parameter that the data do not determine.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,6 +110,8 @@ pub struct Calibration {
     pub ticks_per_rev: Option<f64>,
     /// Covariance of the geometry; `None` when the data do not show a scatter (one run a direction, say).
     pub covariance: Option<Covariance>,
+    /// Where the outside instrument sits on the robot; `None` for methods that take it to be at the drive's centre.
+    pub mounting: Option<Mounting>,
     /// What the data do not determine.
     pub not_observable: Vec<NotObservable>,
     /// How many runs the values rest on.
@@ -100,6 +123,23 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// A converged result with nothing but its geometry; a method sets what else it knows:
+    /// `Calibration { runs_used, covariance, ..Calibration::new(name, geometry, ticks_per_rev) }`.
+    #[must_use]
+    pub const fn new(method: &'static str, geometry: DriveGeometry, ticks_per_rev: Option<f64>) -> Self {
+        Self {
+            method,
+            geometry,
+            ticks_per_rev,
+            covariance: None,
+            mounting: None,
+            not_observable: Vec::new(),
+            runs_used: 0,
+            runs_rejected: Vec::new(),
+            converged: true,
+        }
+    }
+
     /// The value of a parameter with its standard deviation; `None` when the method has no such parameter.
     #[must_use]
     pub fn estimate(&self, parameter: Parameter) -> Option<Estimate> {
@@ -111,10 +151,19 @@ impl Calibration {
             Parameter::WheelSeparation => (2, self.geometry.wheel_separation_m(), 1.0),
             Parameter::LeftPerTick => (0, diameter_m.left, per_tick()?),
             Parameter::RightPerTick => (1, diameter_m.right, per_tick()?),
+            Parameter::SensorX | Parameter::SensorY | Parameter::SensorTheta => return self.mounted(parameter),
             Parameter::CommonScale => return None,
         };
         let sigma = self.covariance.as_ref().map(|covariance| covariance[(row, row)].sqrt() * factor);
         Some(Estimate { parameter, value: value * factor, sigma })
+    }
+
+    fn mounted(&self, parameter: Parameter) -> Option<Estimate> {
+        let mounting = self.mounting?;
+        let row = Parameter::MOUNTING.iter().position(|of| *of == parameter)?;
+        let Pose { x_m, y_m, theta_rad } = mounting.body_from_sensor;
+        let sigma = mounting.covariance.map(|covariance| covariance[(row, row)].sqrt());
+        Some(Estimate { parameter, value: [x_m, y_m, theta_rad][row], sigma })
     }
 
     /// Remarks on values that are far from nominal: calibration corrects per cents, and a factor is a fault of another kind.
@@ -138,7 +187,8 @@ impl Calibration {
 
     /// Every value that the method has.
     pub fn estimates(&self) -> impl Iterator<Item = Estimate> + '_ {
-        Parameter::ESTIMATED.into_iter().filter_map(|parameter| self.estimate(parameter))
+        let all = Parameter::ESTIMATED.into_iter().chain(Parameter::MOUNTING);
+        all.filter_map(|parameter| self.estimate(parameter))
     }
 }
 

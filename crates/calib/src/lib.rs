@@ -6,15 +6,18 @@
 mod drift;
 mod drive;
 mod estimate;
+mod looks;
 mod report;
 mod robust;
+mod sensitivity;
+mod wheel_track;
 
 pub mod methods;
 
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
-    CalibError, Calibration, Covariance, Estimate, Method, NotObservable, Parameter, Rejected, refuse_wrapped_counters,
+    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, Parameter, Rejected, refuse_wrapped_counters,
 };
 pub use methods::{METHODS, method};
 pub use report::{

@@ -230,11 +230,11 @@ impl CalibrationReport {
         let known: Vec<&str> = KNOWN_KEYS.to_vec();
         for method in &report.methods {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
-                let length = !key.starts_with("instrument_");
+                let length = !Parameter::MOUNTING.iter().any(|of| of.key() == key.as_str());
                 !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
             }) {
                 let message = format!(
-                    "[methods.parameters] of {}: {key} = {} is no known length in metres; known: {}",
+                    "[methods.parameters] of {}: {key} = {} is no known value; lengths are positive; known: {}",
                     method.method,
                     value.value,
                     known.join(", ")
@@ -266,14 +266,10 @@ const KNOWN_KEYS: &[&str] = &[
     Parameter::WheelSeparation.key(),
     Parameter::LeftPerTick.key(),
     Parameter::RightPerTick.key(),
-    INSTRUMENT_X,
-    INSTRUMENT_Y,
-    INSTRUMENT_THETA,
+    Parameter::SensorX.key(),
+    Parameter::SensorY.key(),
+    Parameter::SensorTheta.key(),
 ];
-
-const INSTRUMENT_X: &str = "instrument_x_m";
-const INSTRUMENT_Y: &str = "instrument_y_m";
-const INSTRUMENT_THETA: &str = "instrument_theta_rad";
 
 /// Values to dead reckon with, under a name.
 #[derive(Debug, Clone, PartialEq)]
@@ -303,9 +299,10 @@ impl NamedCalibration {
 
     /// Where the outside instrument's frame is on the robot; at its centre unless the calibration says otherwise.
     #[must_use]
-    pub fn body_from_instrument(&self) -> Pose {
-        let value = |key| self.values.get(key).copied().unwrap_or(0.0);
-        Pose::new(value(INSTRUMENT_X), value(INSTRUMENT_Y), value(INSTRUMENT_THETA))
+    pub fn body_from_sensor(&self) -> Pose {
+        let [x_m, y_m, theta_rad] =
+            Parameter::MOUNTING.map(|parameter| self.values.get(parameter.key()).copied().unwrap_or(0.0));
+        Pose::new(x_m, y_m, theta_rad)
     }
 }
 

@@ -3,7 +3,7 @@
 //! A program is commanded in what the robot believes: "0.5 m" is so many counts by its nominal wheels, "a quarter turn" so many by its
 //! nominal wheelbase. How far the robot really goes is what calibration is about.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +76,17 @@ pub enum Schedule {
         /// How many in each direction.
         runs_each_way: u32,
     },
+    /// Circles of the bidirectional circular path test, alternately clockwise and counter-clockwise (Abbas 2006). The robot stands and is read every half
+    /// turn or sooner: a reading across a circle shows its diameter, one that closes it shows nothing.
+    Circles {
+        /// Nominal radius of the centre's path, metres.
+        radius_m: f64,
+        /// How often each run goes round, a real number; 1 when it is left out.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        turns: Option<f64>,
+        /// How many in each direction.
+        runs_each_way: u32,
+    },
     /// The paper's validation path: nine straight legs joined by eight quarter turns on the spot, read at even steps.
     ValidationPath {
         /// Length of the whole path, metres (the paper: about 40).
@@ -96,7 +107,7 @@ impl Schedule {
     pub fn runs(&self) -> u64 {
         match *self {
             Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => runs.into(),
-            Self::Squares { runs_each_way, .. } => 2 * u64::from(runs_each_way),
+            Self::Squares { runs_each_way, .. } | Self::Circles { runs_each_way, .. } => 2 * u64::from(runs_each_way),
         }
     }
 
@@ -107,7 +118,7 @@ impl Schedule {
             Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => {
                 *runs = pairs.saturating_mul(2);
             }
-            Self::Squares { runs_each_way, .. } => *runs_each_way = pairs,
+            Self::Squares { runs_each_way, .. } | Self::Circles { runs_each_way, .. } => *runs_each_way = pairs,
         }
         self
     }
@@ -132,6 +143,9 @@ impl Schedule {
                 .collect(),
             Self::Squares { side_m, runs_each_way } => {
                 (0..2 * runs_each_way).map(|run| square(run, side_m, run % 2 == 0)).collect()
+            }
+            Self::Circles { radius_m, turns, runs_each_way } => {
+                (0..2 * runs_each_way).map(|run| circle(run, radius_m, turns.unwrap_or(1.0), run % 2 == 0)).collect()
             }
             Self::ValidationPath { length_m, measure_every_m, runs } => {
                 (0..runs).map(|run| validation_path(run, length_m, measure_every_m)).collect()
@@ -159,6 +173,17 @@ fn square(run: u32, side_m: f64, clockwise: bool) -> MotionProgram {
     program(protocol.name(), run, protocol, settings, side.repeat(4))
 }
 
+/// Equal arcs of at most half a turn with a reading between each two.
+fn circle(run: u32, radius_m: f64, turns: f64, clockwise: bool) -> MotionProgram {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a number of turns that someone drives
+    let arcs = (2.0 * turns).ceil().max(1.0) as u32;
+    let (sign, protocol) = if clockwise { (-1.0, Protocol::CircleCw) } else { (1.0, Protocol::CircleCcw) };
+    let arc = Motion::Arc { radius_m, turn_rad: sign * TAU * turns / f64::from(arcs) };
+    let motions: Vec<_> = (0..arcs).flat_map(|_| [arc, Motion::Measure]).take(2 * arcs as usize - 1).collect();
+    let settings = ProtocolSettings { radius_m: Some(radius_m), ..ProtocolSettings::default() };
+    program(protocol.name(), run, protocol, settings, motions)
+}
+
 /// A corridor loop: two rounds of a rectangle would close; this walks nine legs, four turns left and four right, as the paper's figure 7
 /// does not say which.
 fn validation_path(run: u32, length_m: f64, measure_every_m: f64) -> MotionProgram {
@@ -182,7 +207,6 @@ fn validation_path(run: u32, length_m: f64, measure_every_m: f64) -> MotionProgr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     fn length_m(program: &MotionProgram) -> f64 {
         program
@@ -218,6 +242,7 @@ mod tests {
             Schedule::Straights { length_m, runs: 7 },
             Schedule::Spins { turn_rad: TAU, runs: 7 },
             Schedule::Squares { side_m: 1.0, runs_each_way: 7 },
+            Schedule::Circles { radius_m: 1.0, turns: None, runs_each_way: 7 },
         ] {
             let programs = schedule.with_pairs(3).programs();
             assert_eq!((programs.len(), schedule.with_pairs(3).runs()), (6, 6));
@@ -236,6 +261,28 @@ mod tests {
             let turn: f64 = turns(square).iter().sum();
             assert_eq!(turn.abs(), TAU);
             assert_eq!(turn < 0.0, square.protocol == Protocol::SquareCw);
+        }
+    }
+
+    #[test]
+    fn circles_go_round_as_often_as_asked_and_are_read_every_half_turn_or_sooner() {
+        for (turns, arcs) in [(None, 2), (Some(0.5), 1), (Some(0.25), 1), (Some(0.75), 2), (Some(2.0), 4)] {
+            let circles = Schedule::Circles { radius_m: 1.5, turns, runs_each_way: 2 }.programs();
+            assert_eq!(circles.len(), 4);
+            for circle in circles {
+                let of = |motion: &Motion| match *motion {
+                    Motion::Arc { radius_m: 1.5, turn_rad } => Some(turn_rad),
+                    _ => None,
+                };
+                let arcs_rad: Vec<f64> = circle.motions.iter().filter_map(of).collect();
+                let readings = circle.motions.iter().filter(|motion| **motion == Motion::Measure).count();
+                assert_eq!((arcs_rad.len(), readings, circle.motions.len()), (arcs, arcs - 1, 2 * arcs - 1));
+                let turn_rad: f64 = arcs_rad.iter().sum();
+                // A sum of four numbers of size π.
+                assert!((turn_rad.abs() - TAU * turns.unwrap_or(1.0)).abs() < 1e-14);
+                assert_eq!(turn_rad < 0.0, circle.protocol == Protocol::CircleCw);
+                assert_eq!(circle.settings.radius_m, Some(1.5));
+            }
         }
     }
 

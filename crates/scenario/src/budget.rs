@@ -1,8 +1,8 @@
 //! A budget: the floor and the time, or the distance, that a calibration may take, and protocols fitted to it.
 //!
-//! A straight run is shrunk to the longer side of the room less the robot's clearance, a square to the shorter one; nothing is stretched. Then all
-//! numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers are proportions. Runs
-//! stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
+//! A straight run is shrunk to the longer side of the room less the robot's clearance, a square or the diameter of a circle to the shorter one; nothing
+//! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
+//! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
 
 use dataset::{Cost, MotionProgram, Pace, Schedule};
 use serde::{Deserialize, Serialize};
@@ -155,6 +155,10 @@ impl Budget {
             Schedule::Squares { side_m, runs_each_way } => {
                 Ok(Schedule::Squares { side_m: side_m.min(free(shorter_m, SHORTEST_RUN_M)?), runs_each_way })
             }
+            Schedule::Circles { radius_m, turns, runs_each_way } => {
+                let radius_m = radius_m.min(0.5 * free(shorter_m, 2.0 * SHORTEST_RUN_M)?);
+                Ok(Schedule::Circles { radius_m, turns, runs_each_way })
+            }
             Schedule::Spins { .. } => Ok(schedule),
             Schedule::ValidationPath { .. } => Err(NoFit::ValidationPath),
         }
@@ -239,6 +243,7 @@ mod tests {
     const STRAIGHTS: Schedule = Schedule::Straights { length_m: 100.0, runs: 20 };
     const SPINS: Schedule = Schedule::Spins { turn_rad: 6.0, runs: 10 };
     const SQUARES: Schedule = Schedule::Squares { side_m: 100.0, runs_each_way: 5 };
+    const CIRCLES: Schedule = Schedule::Circles { radius_m: 100.0, turns: Some(2.0), runs_each_way: 5 };
 
     fn paper(budget: Budget) -> Scenario {
         let mut scenario = Scenario::parse(PAPER, "paper.toml").expect("shipped");
@@ -274,6 +279,8 @@ mod tests {
             panic!("the same kinds: {fitted:?}")
         };
         assert_eq!((length_m, turn_rad, side_m), (3.0 - 0.6, 6.0, 2.0 - 0.6));
+        let fitted = fit(ROOM, &[CIRCLES]).expect("there is room");
+        assert!(matches!(fitted[0], Schedule::Circles { radius_m: 0.7, turns: Some(2.0), .. }), "{fitted:?}");
         let short =
             [Schedule::Straights { length_m: 0.5, runs: 2 }, Schedule::Squares { side_m: 0.4, runs_each_way: 1 }];
         let fitted = fit(ROOM, &short).expect("there is room");
@@ -315,8 +322,14 @@ mod tests {
     #[test]
     fn the_largest_common_factor_is_taken_and_never_costs_more_than_the_budget() {
         let uneven = Schedule::Straights { length_m: 0.7, runs: 7 };
-        let mixes: [&[Schedule]; 5] =
-            [&[STRAIGHTS], &[SQUARES], &[STRAIGHTS, SPINS], &[uneven, SPINS, SQUARES], &[SPINS, SPINS.with_pairs(40)]];
+        let mixes: [&[Schedule]; 6] = [
+            &[STRAIGHTS],
+            &[SQUARES],
+            &[STRAIGHTS, SPINS],
+            &[uneven, SPINS, SQUARES],
+            &[SPINS, SPINS.with_pairs(40)],
+            &[CIRCLES, SPINS],
+        ];
         for protocols in mixes {
             for room_m in [0.8, 1.5, 4.0, 30.0] {
                 for handling_s in [0.0, 45.0] {
@@ -336,7 +349,7 @@ mod tests {
     fn no_run_leaves_the_room() {
         for room_x_m in [0.61, 1.0, 2.5, 9.0] {
             let budget = Budget { room_x_m, minutes: Some(600.0), ..ROOM };
-            let programs: Vec<_> = fit(budget, &[STRAIGHTS, SPINS, SQUARES])
+            let programs: Vec<_> = fit(budget, &[STRAIGHTS, SPINS, SQUARES, CIRCLES])
                 .expect("there is room")
                 .iter()
                 .flat_map(Schedule::programs)
@@ -348,11 +361,17 @@ mod tests {
                     let (distance_m, turn_rad) = match *motion {
                         dataset::Motion::Straight { length_m } => (length_m, 0.0),
                         dataset::Motion::Spin { turn_rad } => (0.0, turn_rad),
-                        _ => panic!("no such motion in these protocols"),
+                        dataset::Motion::Arc { radius_m, turn_rad } => (radius_m * turn_rad.abs(), turn_rad),
+                        dataset::Motion::Measure => continue,
+                        dataset::Motion::Pause { .. } => panic!("no such motion in these protocols"),
                     };
-                    here = here * kinematics::Increment { distance_m, turn_rad }.arc();
-                    for (k, value) in [here.x_m, here.y_m].into_iter().enumerate() {
-                        (least[k], most[k]) = (least[k].min(value), most[k].max(value));
+                    // A quarter of a half turn ends where a circle is widest.
+                    let quarter = kinematics::Increment { distance_m: 0.25 * distance_m, turn_rad: 0.25 * turn_rad };
+                    for _ in 0..4 {
+                        here = here * quarter.arc();
+                        for (k, value) in [here.x_m, here.y_m].into_iter().enumerate() {
+                            (least[k], most[k]) = (least[k].min(value), most[k].max(value));
+                        }
                     }
                 }
                 let extent = [most[0] - least[0] + budget.clearance_m, most[1] - least[1] + budget.clearance_m];
@@ -367,13 +386,15 @@ mod tests {
     #[test]
     fn what_cannot_fit_says_why() {
         let narrow = Budget { room_x_m: 0.5, ..ROOM };
-        for protocol in [STRAIGHTS, SPINS, SQUARES] {
+        for protocol in [STRAIGHTS, SPINS, SQUARES, CIRCLES] {
             assert_eq!(fit(narrow, &[protocol]), Err(NoFit::Room { room_m: 0.5, clearance_m: 0.6 }));
         }
         // As wide as the robot: it can turn and drive along the room, and no square is left.
         let just = Budget { room_x_m: 0.6, ..ROOM };
         assert!(fit(just, &[SPINS, STRAIGHTS]).is_ok());
-        assert_eq!(fit(just, &[SQUARES]), Err(NoFit::Room { room_m: 0.6, clearance_m: 0.6 }));
+        for protocol in [SQUARES, CIRCLES] {
+            assert_eq!(fit(just, &[protocol]), Err(NoFit::Room { room_m: 0.6, clearance_m: 0.6 }));
+        }
         let hasty = Budget { minutes: Some(0.5), ..ROOM };
         let no_time = fit(hasty, &[SPINS]).expect_err("two handlings take a minute");
         assert!(matches!(no_time, NoFit::Time { needed_min, minutes: 0.5 } if needed_min > 1.0), "{no_time:?}");

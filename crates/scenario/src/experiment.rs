@@ -196,6 +196,13 @@ pub enum Instrument {
         /// How the marker's frame is turned on the robot, radians.
         lever_theta_rad: f64,
     },
+    /// A tachometer on the ground beside each wheel, as of a roller or a fifth wheel (`wheel_reference.csv`).
+    Tachometer {
+        /// Samples per second. A sample is the mean speed since the one before, as from pulses counted over a gate time.
+        rate_hz: f64,
+        /// Standard deviation of each sample, m/s.
+        sigma_m_s: f64,
+    },
 }
 
 impl Scenario {
@@ -352,6 +359,10 @@ impl Scenario {
                     finite("instrument.lever_y_m", lever_y_m)?;
                     finite("instrument.lever_theta_rad", lever_theta_rad)?;
                 }
+                Instrument::Tachometer { rate_hz, sigma_m_s } => {
+                    interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
+                    not_negative("instrument.sigma_m_s", sigma_m_s)?;
+                }
             }
         }
         for effect in &self.effects {
@@ -396,6 +407,11 @@ fn check_schedules(place: &str, key: &str, schedules: &[Schedule]) -> Result<(),
                 range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
             }
             Schedule::Squares { side_m, .. } => length("side_m", side_m)?,
+            Schedule::Circles { radius_m, turns, .. } => {
+                length("radius_m", radius_m)?;
+                let turns = turns.unwrap_or(1.0);
+                range("turns", turns, (0.25..=1e3).contains(&turns), "from 0.25 to 1000")?;
+            }
             Schedule::ValidationPath { length_m, measure_every_m, .. } => {
                 length("length_m", length_m)?;
                 let holds = measure_every_m >= 1e-3 && measure_every_m <= length_m;

@@ -58,6 +58,8 @@ pub(crate) struct Drive<'a> {
     t_s: f64,
     world_from_body: Frame,
     wheel_angle_rad: Wheels<f64>,
+    /// What each contact has gone over the ground, metres.
+    ground_m: Wheels<f64>,
     sensitivity: Wheels<f64>,
     streams: &'a mut DriveStreams,
     log: Option<LogClock>,
@@ -109,6 +111,7 @@ impl<'a> Drive<'a> {
             t_s: 0.0,
             world_from_body: start.world_from_body.into(),
             wheel_angle_rad: start.counts.map(|counts| counts / setup.counts_per_rad),
+            ground_m: Wheels::both(0.0),
             sensitivity: Wheels::both(1.0),
             streams,
             log,
@@ -265,6 +268,7 @@ impl<'a> Drive<'a> {
             travel_m.left += var_m2.left.sqrt() * left;
             travel_m.right += var_m2.right.sqrt() * right;
         }
+        self.ground_m = self.ground_m.zip_with(travel_m, |sum_m, travel_m| sum_m + travel_m);
         let mut increment = Increment::from_travel(travel_m, step.wheel_separation_m);
         increment.turn_rad += step.extra_turn_rad;
         let mut world_from_body = self.world_from_body * increment.scattered_arc(along_m, across_m);
@@ -297,7 +301,7 @@ impl<'a> Drive<'a> {
             if look_s <= self.t_s + SAME_INSTANT_S {
                 // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
                 let (t_s, world_from_body) = self.sighting(look_s);
-                self.observers[k].look(t_s, world_from_body, self.run);
+                self.observers[k].look(t_s, world_from_body, self.ground_m, self.run);
             }
         }
         self.next_look_s = next_look_s(self.observers);

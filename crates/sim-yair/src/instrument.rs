@@ -1,8 +1,8 @@
-//! The two outside instruments: the paper's floor grid and motion capture.
+//! The outside instruments: the paper's floor grid, motion capture, and a tachometer beside each wheel.
 
-use dataset::{MarkedPoint, PointReading, Run, TruthSample};
+use dataset::{MarkedPoint, PointReading, Run, TruthSample, WheelSpeed};
 use effects::{Address, Stream, StreamName};
-use kinematics::{Frame, Point, Pose};
+use kinematics::{Frame, Point, Pose, Wheels};
 use scenario::Instrument;
 
 const READING: StreamName = StreamName::new("instrument reading");
@@ -14,13 +14,15 @@ pub(crate) struct Observer {
     name: StreamName,
     stream: Stream,
     samples: u32,
+    /// What each wheel's contact had gone at the last look, metres.
+    ground_m: Wheels<f64>,
 }
 
 impl Observer {
     /// The instrument at a position in the scenario's list, in the run of an address.
     pub(crate) fn new(instrument: Instrument, position: u64, address: &Address) -> Self {
         let name = READING.nth(position);
-        Self { instrument, name, stream: address.stream(name), samples: 0 }
+        Self { instrument, name, stream: address.stream(name), samples: 0, ground_m: Wheels::both(0.0) }
     }
 
     pub(crate) const fn instrument(&self) -> &Instrument {
@@ -32,18 +34,30 @@ impl Observer {
     pub(crate) fn restart(&mut self, stream: impl Fn(StreamName) -> Stream) {
         self.stream = stream(self.name);
         self.samples = 0;
+        self.ground_m = Wheels::both(0.0);
     }
 
     /// When the instrument next looks by itself, seconds; the floor grid never does.
     pub(crate) fn next_look_s(&self) -> f64 {
         match self.instrument {
             Instrument::FloorGrid { .. } => f64::INFINITY,
-            Instrument::MotionCapture { rate_hz, .. } => f64::from(self.samples) / rate_hz,
+            Instrument::MotionCapture { rate_hz, .. } | Instrument::Tachometer { rate_hz, .. } => {
+                f64::from(self.samples) / rate_hz
+            }
         }
     }
 
-    /// A look at the moving robot at [`Self::next_look_s`].
-    pub(crate) fn look(&mut self, t_s: f64, world_from_body: Frame, run: &mut Run) {
+    /// A look at the moving robot at [`Self::next_look_s`], whose contacts have gone so far over the ground.
+    pub(crate) fn look(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
+        if let Instrument::Tachometer { rate_hz, sigma_m_s } = self.instrument {
+            let mut speed = |now_m, before_m| (now_m - before_m) * rate_hz + sigma_m_s * self.stream.normal();
+            // The first sample, at standstill, has nothing before it.
+            let speed_m_s = ground_m.zip_with(self.ground_m, &mut speed);
+            run.wheel_reference.push(WheelSpeed { t_s, speed_m_s });
+            self.samples += 1;
+            self.ground_m = ground_m;
+            return;
+        }
         let Instrument::MotionCapture {
             sigma_xy_m,
             sigma_theta_rad,

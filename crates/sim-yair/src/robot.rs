@@ -244,6 +244,8 @@ impl Platform for SimulatedRobot {
                     (reading_sigma_m.hypot(resolution_m / 12_f64.sqrt()), 0.0)
                 }
                 Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => (sigma_xy_m, sigma_theta_rad),
+                // It sees no pose.
+                Instrument::Tachometer { .. } => (0.0, 0.0),
             };
             let known = |sigma: f64| (sigma > 0.0).then_some(sigma);
             noise.sigma_xy_m = noise.sigma_xy_m.or(known(xy_m));

@@ -39,6 +39,9 @@ pub enum NoBound {
     /// Nothing looks at the robot.
     #[error("no instrument sees the robot")]
     NoInstrument,
+    /// A tachometer measures the wheels, and the bound takes looks at the pose alone.
+    #[error("a tachometer's wheel speeds are no look at the pose: leave the instrument out for a bound")]
+    WheelSpeeds,
     /// The floor grid reads fewer than two distinct points.
     #[error("the robot's marked points give no heading: two of them must differ")]
     NoHeading,

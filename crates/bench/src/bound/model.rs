@@ -139,6 +139,7 @@ impl Sight {
                 let covariance = body_from_reading * Matrix3::from_diagonal(&var) * body_from_reading.transpose();
                 Ok(Self { rate_hz: Some(rate_hz), covariance })
             }
+            Instrument::Tachometer { .. } => Err(NoBound::WheelSpeeds),
         }
     }
 

@@ -259,15 +259,12 @@ impl Method for Direct {
             mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0)
         });
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
+        let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
         Ok(Calibration {
-            method: Self::NAME,
-            geometry: drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?,
-            ticks_per_rev: robot.ticks_per_rev,
             covariance,
-            not_observable: Vec::new(),
             runs_used: straights.left.len().max(straights.right.len()) + spins.len(),
             runs_rejected,
-            converged: true,
+            ..Calibration::new(Self::NAME, geometry, robot.ticks_per_rev)
         })
     }
 }

@@ -18,6 +18,14 @@ macro_rules! contents {
 contents! {
     direct::Direct,
     umbmark::Umbmark,
+    jung_chung::JungChung,
+    circular::Circular,
+    ivanjko::Ivanjko,
+    linear::Linear,
+    tachometer::Tachometer,
+    censi::Censi,
+    segments::Segments,
+    augmented_kalman::AugmentedKalman,
 }
 
 /// A method by name.

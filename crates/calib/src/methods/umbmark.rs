@@ -120,17 +120,13 @@ impl Method for Umbmark {
             Covariance::from_column_slice(3, 3, covariance.as_slice())
         });
         Ok(Calibration {
-            method: Self::NAME,
-            geometry: drive(Self::NAME, diameter_m, separation_m)?,
-            ticks_per_rev: robot.ticks_per_rev,
             covariance,
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
                 why: "a closed square hides the scale common to both wheels, and reads it as a wrong wheelbase; measure a straight run of known length first",
             }],
             runs_used: cw.x_m.count + ccw.x_m.count,
-            runs_rejected: Vec::new(),
-            converged: true,
+            ..Calibration::new(Self::NAME, drive(Self::NAME, diameter_m, separation_m)?, robot.ticks_per_rev)
         })
     }
 }

@@ -1,0 +1,152 @@
+//! Dead reckoning with its derivatives by the three lengths of the drive, for methods that descend on a path's error.
+//!
+//! Steps are exact arcs (kinematics, `Rule::ExactArc`): position `p += ΔS·sinc(Δθ/2)·u(θ + Δθ/2)`, heading `θ += Δθ`, with `ΔS = (r_R φ_R + r_L φ_L)/2` and
+//! `Δθ = (r_R φ_R − r_L φ_L)/B` (paper, eq. 1 to 3) for wheel turns φ. The derivatives are carried along step by step, so that they are exact too.
+
+use kinematics::{Increment, Pose, Wheels, sinc, sinc_derivative};
+use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
+
+use crate::estimate::Parameter;
+
+/// The lengths that turn wheel turns into motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lengths {
+    /// Travel of each wheel for a radian, metres: its radius.
+    pub(crate) m_per_rad: Wheels<f64>,
+    /// Distance between the wheel contacts, metres.
+    pub(crate) separation_m: f64,
+}
+
+/// One step's motion with what it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Step {
+    /// Displacement in the frame in which the heading before the step was given, and turn.
+    pub(crate) moved: Pose,
+    /// ∂(displacement, turn)/∂(left radius, right radius, separation) of this step alone.
+    pub(crate) by_lengths: Matrix3<f64>,
+}
+
+impl Lengths {
+    /// The motion of wheel turns from a heading.
+    pub(crate) fn step(&self, theta_rad: f64, wheel_rad: Wheels<f64>) -> Step {
+        let travel_m = self.m_per_rad.zip_with(wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.separation_m);
+        let half_rad = 0.5 * turn_rad;
+        let (sin, cos) = (theta_rad + half_rad).sin_cos();
+        let (along, across) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
+        let chord = sinc(half_rad);
+        let moved = distance_m * chord * along;
+        let by_turn = 0.5 * distance_m * (sinc_derivative(half_rad) * along + chord * across);
+        let by_distance = RowVector3::new(0.5 * wheel_rad.left, 0.5 * wheel_rad.right, 0.0);
+        let turn_by = RowVector3::new(-wheel_rad.left, wheel_rad.right, -turn_rad) / self.separation_m;
+        let mut by_lengths = Matrix3::zeros();
+        by_lengths.fixed_rows_mut::<2>(0).copy_from(&(chord * along * by_distance + by_turn * turn_by));
+        by_lengths.set_row(2, &turn_by);
+        Step { moved: Pose::new(moved.x, moved.y, turn_rad), by_lengths }
+    }
+}
+
+/// A pose that is dead reckoned, and its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Reckoned {
+    /// Where the robot is.
+    pub(crate) pose: Pose,
+    /// ∂(x, y, θ)/∂(left radius, right radius, separation).
+    pub(crate) by_lengths: Matrix3<f64>,
+}
+
+impl Reckoned {
+    /// Standing at a pose that does not depend on the lengths.
+    pub(crate) fn at(pose: Pose) -> Self {
+        Self { pose, by_lengths: Matrix3::zeros() }
+    }
+
+    /// Takes one step of the wheels, radians.
+    pub(crate) fn advance(&mut self, lengths: &Lengths, wheel_rad: Wheels<f64>) {
+        let Step { moved, by_lengths } = lengths.step(self.pose.theta_rad, wheel_rad);
+        // A heading that is off turns the step: the displacement's quarter turn.
+        let heading = self.by_lengths.row(2).into_owned();
+        let mut turned = Matrix3::zeros();
+        turned.set_row(0, &(-moved.y_m * heading));
+        turned.set_row(1, &(moved.x_m * heading));
+        self.by_lengths += by_lengths + turned;
+        self.pose = Pose::new(
+            self.pose.x_m + moved.x_m,
+            self.pose.y_m + moved.y_m,
+            self.pose.theta_rad + moved.theta_rad,
+        );
+    }
+}
+
+/// The parameter that a direction in the relative sizes of left wheel, right wheel and separation stands for, and what to drive where it is not seen.
+pub(crate) fn unseen(direction: &Vector3<f64>) -> (Parameter, &'static str) {
+    let sizes = direction.normalize().abs();
+    // All three grow together: every turn stays, every length grows.
+    if sizes.min() > 0.3 {
+        (Parameter::CommonScale, "the runs only turn on the spot, or close: add straight runs, or looks on the way")
+    } else {
+        match sizes.imax() {
+            0 => (Parameter::LeftWheelDiameter, "that wheel hardly turns: add straight runs, and turns to both sides"),
+            1 => (Parameter::RightWheelDiameter, "that wheel hardly turns: add straight runs, and turns to both sides"),
+            _ => (Parameter::WheelSeparation, "the runs hardly turn: add spins, arcs or squares"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinematics::DriveGeometry;
+
+    const LENGTHS: Lengths = Lengths { m_per_rad: Wheels { left: 0.0811, right: 0.0797 }, separation_m: 0.363 };
+
+    /// Straights, arcs, spins and standing, forward and backward; 20 rad of turn of a wheel and 2 m in all.
+    const PATH: [(f64, f64); 8] =
+        [(3.0, 3.0), (0.0, 0.0), (-2.0, 2.5), (4.0, 3.0), (-3.0, -1.0), (1e-7, 0.0), (5.0, 5.01), (-1.0, 3.0)];
+
+    fn reckon(lengths: &Lengths, steps: &[(f64, f64)]) -> Reckoned {
+        let mut reckoned = Reckoned::at(Pose::new(0.3, -0.2, 0.7));
+        for &(left, right) in steps {
+            reckoned.advance(lengths, Wheels { left, right });
+        }
+        reckoned
+    }
+
+    #[test]
+    fn the_jacobian_is_the_derivative_and_would_not_pass_wrong() {
+        let h = 1e-6;
+        for end in 1..=PATH.len() {
+            let reckoned = reckon(&LENGTHS, &PATH[..end]);
+            for column in 0..3 {
+                let moved = |by: f64| {
+                    let mut lengths = LENGTHS;
+                    *[&mut lengths.m_per_rad.left, &mut lengths.m_per_rad.right, &mut lengths.separation_m][column] += by;
+                    let Pose { x_m, y_m, theta_rad } = reckon(&lengths, &PATH[..end]).pose;
+                    [x_m, y_m, theta_rad]
+                };
+                let (plus, minus) = (moved(h), moved(-h));
+                for row in 0..3 {
+                    let difference = (plus[row] - minus[row]) / (2.0 * h);
+                    // Third derivatives stay under 2 m·(20/0.363)³ ≈ 3e5: truncation h²/6 of it 6e-8. Rounding 1e-15/1e-6 = 1e-9.
+                    let tolerance = 1e-7;
+                    let found = reckoned.by_lengths[(row, column)];
+                    assert!((found - difference).abs() < tolerance, "{end} {row} {column}: {found} {difference}");
+                    assert!((found + 1e-3 - difference).abs() > tolerance);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn poses_are_those_of_exact_arcs() {
+        let diameter_m = LENGTHS.m_per_rad.map(|radius_m| 2.0 * radius_m);
+        let geometry = DriveGeometry::new(diameter_m, LENGTHS.separation_m).expect("valid");
+        let product = PATH.iter().fold(Pose::new(0.3, -0.2, 0.7), |pose, &(left, right)| {
+            pose * geometry.increment(Wheels { left: 0.0811 * left, right: 0.0797 * right }).arc()
+        });
+        let reckoned = reckon(&LENGTHS, &PATH).pose;
+        // Eight steps of half a metre at most: a few roundings each.
+        assert!(reckoned.position().distance_m(product.position()) < 1e-14);
+        assert!((reckoned.theta_rad - product.theta_rad).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,168 @@
+//! The turn of each wheel along a run, at its rows and at instants between them.
+//!
+//! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
+//! compares the wheels with such looks integrates the same motion.
+
+use dataset::{NominalRobot, RunView, WheelLog};
+use kinematics::{Count, Twist, Wheels};
+
+/// An instant may miss a row by the rounding of its file.
+const SAME_INSTANT_S: f64 = 1e-9;
+
+/// Turns of both wheels since a run's first row.
+#[derive(Debug, Clone)]
+pub(crate) struct WheelTrack<'a> {
+    t_s: &'a [f64],
+    turn_rad: Wheels<Vec<f64>>,
+    continuous: bool,
+}
+
+impl<'a> WheelTrack<'a> {
+    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a turn.
+    ///
+    /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
+    pub(crate) fn of(run: &RunView<'a>, robot: &NominalRobot) -> Option<Self> {
+        fn since_first<C: Count>(column: &[C], rad: f64) -> Vec<f64> {
+            column.iter().map(|count| count.since(column[0]) * rad).collect()
+        }
+        let odometry = run.odometry();
+        if odometry.t_s.is_empty() {
+            return None;
+        }
+        let turn_rad = match &odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
+                ticks.as_ref().map(|column| since_first(column, rad))
+            }
+            WheelLog::Angles(angles) => angles.as_ref().map(|column| since_first(column, 1.0)),
+            WheelLog::Twist { v_mps, omega_radps } => {
+                let geometry = robot.geometry().ok()?;
+                let mut turns = Wheels::both(vec![0.0]);
+                // A row's twist holds over the interval that ends there.
+                for (row, t_s) in odometry.t_s.windows(2).enumerate() {
+                    let twist = Twist { v_m_s: v_mps[row + 1], omega_rad_s: omega_radps[row + 1] };
+                    let speed_rad_s = geometry.wheel_speed_m_s(twist).zip_with(geometry.m_per_rad(), |v, r| v / r);
+                    turns = turns.zip_with(speed_rad_s, |mut turns: Vec<f64>, speed| {
+                        turns.push(turns[row] + speed * (t_s[1] - t_s[0]));
+                        turns
+                    });
+                }
+                turns
+            }
+        };
+        Some(Self { t_s: &odometry.t_s, turn_rad, continuous: run.info().continuous })
+    }
+
+    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
+    /// one of its intervals lies between them.
+    pub(crate) fn steps(&self, from_s: f64, to_s: f64) -> Option<Vec<Wheels<f64>>> {
+        let (first, last) = (self.row_before(from_s)?, self.row_before(to_s)?);
+        let from = self.turn_at(first, from_s)?;
+        let to = self.turn_at(last, to_s)?;
+        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + SAME_INSTANT_S)
+            ..self.t_s.partition_point(|t_s| *t_s < to_s - SAME_INSTANT_S);
+        if to_s < from_s || !(self.continuous || within.is_empty()) {
+            return None;
+        }
+        let mut previous = from;
+        let inner = within.map(|row| self.row_rad(row));
+        let step = |next: Wheels<f64>| {
+            let turned = next.zip_with(previous, |next, previous| next - previous);
+            previous = next;
+            turned
+        };
+        Some(inner.chain([to]).map(step).collect())
+    }
+
+    /// Whether [`Self::steps`] says anything between two instants.
+    pub(crate) fn spans(&self, from_s: f64, to_s: f64) -> bool {
+        self.steps(from_s, to_s).is_some()
+    }
+
+    fn row_rad(&self, row: usize) -> Wheels<f64> {
+        Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
+    }
+
+    /// The last row at or before an instant.
+    fn row_before(&self, t_s: f64) -> Option<usize> {
+        self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S).checked_sub(1)
+    }
+
+    fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
+        let since_s = t_s - self.t_s[row];
+        if since_s.abs() <= SAME_INSTANT_S {
+            return Some(self.row_rad(row));
+        }
+        let next_s = *self.t_s.get(row + 1)?;
+        let share = since_s / (next_s - self.t_s[row]);
+        Some(self.row_rad(row).zip_with(self.row_rad(row + 1), |a, b| a + share * (b - a)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dataset::{Dataset, Odometry, Provenance, Run, RunInfo, TruthNoise};
+
+    fn dataset(wheels: WheelLog, continuous: bool) -> Dataset {
+        let odometry = Odometry { t_s: vec![0.0, 1.0, 2.0, 4.0], wheels, ..Odometry::default() };
+        let run = Run { info: RunInfo { continuous, ..RunInfo::default() }, odometry, ..Run::default() };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.2,
+                right_wheel_diameter_m: 0.4,
+                wheel_separation_m: 0.5,
+                ticks_per_rev: Some(std::f64::consts::TAU),
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![run],
+        }
+    }
+
+    fn steps(wheels: WheelLog, continuous: bool, from_s: f64, to_s: f64) -> Option<Vec<(f64, f64)>> {
+        let dataset = dataset(wheels, continuous);
+        let session = dataset.session();
+        let track = WheelTrack::of(&session.runs[0], session.robot)?;
+        Some(track.steps(from_s, to_s)?.into_iter().map(|step| (step.left, step.right)).collect())
+    }
+
+    fn ticks() -> WheelLog {
+        WheelLog::Ticks(Wheels { left: vec![7, 17, 27, 67], right: vec![0, 0, -10, -10] })
+    }
+
+    #[test]
+    fn steps_follow_the_rows_and_share_the_outer_intervals() {
+        assert_eq!(steps(ticks(), true, 0.0, 2.0), Some(vec![(10.0, 0.0), (10.0, -10.0)]));
+        assert_eq!(steps(ticks(), true, 0.5, 3.0), Some(vec![(5.0, 0.0), (10.0, -10.0), (20.0, 0.0)]));
+        assert_eq!(steps(ticks(), true, 2.5, 3.5), Some(vec![(20.0, 0.0)]));
+        // A rounding beside a row is that row.
+        assert_eq!(steps(ticks(), true, 1.0 + 1e-10, 2.0 - 1e-10), Some(vec![(10.0, -10.0)]));
+        assert_eq!(steps(ticks(), true, 4.0, 4.0), Some(vec![(0.0, 0.0)]));
+    }
+
+    #[test]
+    fn outside_of_the_log_and_across_gaps_nothing_is_said() {
+        for (from_s, to_s) in [(-0.1, 1.0), (1.0, 4.1), (2.0, 1.0)] {
+            assert_eq!(steps(ticks(), true, from_s, to_s), None, "{from_s} {to_s}");
+        }
+        assert_eq!(steps(ticks(), false, 1.0, 2.0), Some(vec![(10.0, -10.0)]));
+        assert_eq!(steps(ticks(), false, 1.2, 1.8).map(|steps| steps.len()), Some(1));
+        assert_eq!(steps(ticks(), false, 0.0, 2.0), None);
+    }
+
+    #[test]
+    fn a_twist_is_rebuilt_into_wheels_and_angles_are_taken_as_they_are() {
+        let twist = WheelLog::Twist { v_mps: vec![9.0, 1.0, 0.0, 0.0], omega_radps: vec![9.0, 0.0, 0.4, 0.0] };
+        // A metre on wheels of 0.1 m and 0.2 m radius, then 0.4 rad over 0.5 m.
+        let found = steps(twist, true, 0.0, 2.0).expect("spanned");
+        let expected = [(10.0, 5.0), (-1.0, 0.5)];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found.0 - expected.0).abs() < 1e-14 && (found.1 - expected.1).abs() < 1e-14, "{found:?}");
+        }
+        let angles = WheelLog::Angles(Wheels { left: vec![1.0, 2.5, 3.0, 3.0], right: vec![0.0; 4] });
+        assert_eq!(steps(angles, true, 0.0, 1.0), Some(vec![(1.5, 0.0)]));
+    }
+}
