@@ -17,7 +17,8 @@ pub mod methods;
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
-    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, Parameter, Rejected, refuse_wrapped_counters,
+    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, Parameter, Rejected,
+    refuse_wrapped_counters,
 };
 pub use methods::{METHODS, method};
 pub use report::{

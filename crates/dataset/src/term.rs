@@ -1,49 +1,114 @@
-//! A term of the measurement model: what an unmodelled effect adds to the odometry, as a function of recorded quantities.
+//! A term of the measurement model: what an unmodelled effect adds to the odometry or to what the instrument sees, as a function of recorded quantities.
 //!
 //! The trait lives here, below both the calibrators, whose likelihood consumes terms, and the effects, which implement them. A term sees what was
-//! recorded and the robot's nominal values; it cannot see what a simulator hid.
+//! recorded, the geometry in force and where the fit puts the robot; it cannot see what a simulator hid.
 
-use kinematics::{Increment, Pose, Wheels};
+use kinematics::{Increment, Pose, Twist, Wheels};
+
+use crate::record::RunInfo;
 
 /// One interval between two recorded rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+#[derive(Debug, Clone, Copy)]
+pub struct Interval<'r> {
+    /// Its start, seconds from the run's start.
+    pub t_s: f64,
     /// Length, seconds.
     pub dt_s: f64,
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
+    /// Travel of each wheel in the interval before, by the same, metres; zero at the start of a run.
+    pub previous_m: Wheels<f64>,
+    /// Length of the interval before, seconds; that of this one at the start of a run.
+    pub previous_dt_s: f64,
     /// Distance between the wheels in force, metres.
     pub wheel_separation_m: f64,
+    /// Angle of each wheel at the start, by its counter, radians: its phase where the log is continuous.
+    pub wheel_rad: Wheels<f64>,
+    /// Where the robot is at the start, by the counts and what the instrument saw.
+    pub world_from_body: Pose,
+    /// How far the centre went in the runs before and in this one, metres: what wears with distance.
+    pub session_m: f64,
+    /// The run, with its covariates and its place on the session's clock.
+    pub run: &'r RunInfo,
 }
 
-impl Interval {
+impl Interval<'_> {
     /// Motion of the drive's centre by the counts.
     #[must_use]
     pub fn increment(&self) -> Increment {
         Increment::from_travel(self.travel_m, self.wheel_separation_m)
     }
+
+    /// Motion of the drive's centre when the wheels' travels change by this much.
+    #[must_use]
+    pub fn change(&self, travel_m: Wheels<f64>) -> Pose {
+        let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.wheel_separation_m);
+        Pose::new(distance_m, 0.0, turn_rad)
+    }
+
+    /// Mean speed of each wheel's contact, m/s; zero in an interval of no length.
+    #[must_use]
+    pub fn speed_m_s(&self) -> Wheels<f64> {
+        self.travel_m.map(|travel_m| if self.dt_s > 0.0 { travel_m / self.dt_s } else { 0.0 })
+    }
+
+    /// Mean speed of each wheel's contact in the interval before, m/s.
+    #[must_use]
+    pub fn previous_speed_m_s(&self) -> Wheels<f64> {
+        self.previous_m.map(|travel_m| if self.previous_dt_s > 0.0 { travel_m / self.previous_dt_s } else { 0.0 })
+    }
+
+    /// Time on the session's clock, seconds; that of the run where the run does not say when it began.
+    #[must_use]
+    pub fn session_s(&self) -> f64 {
+        self.run.start_s.unwrap_or(0.0) + self.t_s
+    }
+}
+
+/// One look of the outside instrument.
+#[derive(Debug, Clone, Copy)]
+pub struct Look<'r> {
+    /// When it was, seconds from the run's start.
+    pub t_s: f64,
+    /// Where the robot was then, by the counts and what the instrument saw.
+    pub world_from_body: Pose,
+    /// How it moved then, by the counts.
+    pub twist: Twist,
+    /// The run.
+    pub run: &'r RunInfo,
 }
 
 /// A parameter of a term.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermParameter {
     /// Its name, with the unit's suffix; the same as in the effect's forward face where the two mean the same.
     pub name: &'static str,
     /// Its unit, for people.
     pub unit: &'static str,
+    /// A size that would be large for a real robot: the standard deviation of what is plausible before any data.
+    pub plausible: f64,
 }
 
-/// A mean term: the body-frame increment that the effect adds in an interval, linear in its parameters.
+/// A mean term, linear in its parameters: what an effect adds to the motion of an interval, or to what the instrument sees.
 ///
-/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it.
+/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it. Intervals and looks come in the order of time.
 pub trait ModelTerm: Send {
-    /// The parameters in the order of the gradient.
+    /// The parameters in the order of the gradients.
     fn parameters(&self) -> &'static [TermParameter];
 
     /// A run begins.
-    fn restart(&mut self) {}
+    fn restart(&mut self, run: &RunInfo) {
+        let _ = run;
+    }
 
-    /// Derivative of the interval's body-frame increment (x, y, θ) by each parameter, at zero size; `gradient` is as long as
-    /// [`Self::parameters`].
-    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]);
+    /// Derivative of the interval's motion, in the body's frame at its start (x, y, θ), by each parameter, at zero size. `gradient` is as long as
+    /// [`Self::parameters`] and comes in as zeros.
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let _ = (interval, gradient);
+    }
+
+    /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each parameter, at zero size. `gradient` is as above.
+    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+        let _ = (look, gradient);
+    }
 }

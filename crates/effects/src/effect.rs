@@ -1,10 +1,10 @@
 //! What every effect of the catalogue offers.
 
-use dataset::ModelTerm;
 use kinematics::{DriveGeometry, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::forward::Forward;
+use crate::hypothesis::Hypothesis;
 
 /// Why the sizes of an effect make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,8 +64,17 @@ pub trait PhysicalEffect {
         None
     }
 
-    /// The hypothesis face: how recorded data would show the effect, or `None` when no term is written for it yet.
-    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
+    /// The hypothesis face: how recorded data would show the effect, of whatever size.
+    fn hypothesis() -> Hypothesis
+    where
+        Self: Sized;
+
+    /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make one.
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        let _ = sizes;
         None
     }
 }

@@ -2,16 +2,18 @@
 //!
 //! An effect has two faces that share a file and its parameters, never code. The *forward* face ([`Forward`]) is how the world does it: it acts
 //! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
-//! The *hypothesis* face ([`dataset::ModelTerm`]) is how recorded data would show it: it sees recorded quantities only.
+//! The *hypothesis* face ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
 //!
 //! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow.
 
 mod effect;
 mod forward;
+mod hypothesis;
 mod stream;
 
 pub use effect::{EffectError, PhysicalEffect, Which};
 pub use forward::{Command, Forward, Readout, SampleClock, Sighting, Step};
+pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
 pub use stream::{Address, Stream, StreamName};
 
 /// Declares the catalogue: for each effect its module and its parameters' type.
@@ -71,6 +73,24 @@ macro_rules! contents {
                 match self {
                     $(Self::$Type(_) => stringify!($module),)*
                 }
+            }
+        }
+
+        /// How data would show an effect, by its id; `None` for an unknown id.
+        #[must_use]
+        pub fn hypothesis(id: &str) -> Option<Hypothesis> {
+            match id {
+                $(stringify!($module) => Some(<$Type as PhysicalEffect>::hypothesis()),)*
+                _ => None,
+            }
+        }
+
+        /// The effect of an id with the sizes that a fit found; `None` when they do not make one.
+        #[must_use]
+        pub fn effect_of_sizes(id: &str, sizes: &[(&str, f64)]) -> Option<Effect> {
+            match id {
+                $(stringify!($module) => <$Type as PhysicalEffect>::of_sizes(sizes).map(Effect::$Type),)*
+                _ => None,
             }
         }
 

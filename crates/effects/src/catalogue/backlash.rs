@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect, Which};
 use crate::forward::{Forward, Step};
+use crate::hypothesis::Hypothesis;
 use crate::stream::Stream;
 
 /// Play of one wheel or of both.
@@ -29,6 +30,10 @@ impl PhysicalEffect for Backlash {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self, lead_rad: Wheels::both(0.0) }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Silent
     }
 }
 

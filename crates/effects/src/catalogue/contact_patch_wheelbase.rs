@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Sign};
 use crate::stream::Stream;
 
 /// Scatter of the effective wheelbase.
@@ -46,6 +47,10 @@ impl PhysicalEffect for ContactPatchWheelbase {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self, stream: None, motion_m: 0.0, slow_m: 0.0 }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Scatter(&[Sign::ScatterWithTurn])
     }
 }
 

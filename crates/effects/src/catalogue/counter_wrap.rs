@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Readout};
+use crate::hypothesis::Hypothesis;
 
 /// Width of the recorded counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,6 +25,10 @@ impl PhysicalEffect for CounterWrap {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Silent
     }
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, SampleClock};
+use crate::hypothesis::Hypothesis;
 
 /// Delay of the right reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,6 +26,10 @@ impl PhysicalEffect for SamplingSkew {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Silent
     }
 }
 

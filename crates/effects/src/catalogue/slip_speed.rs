@@ -9,6 +9,7 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
+use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::forward::{Forward, Step};
 
 /// Slip in proportion to speed.
@@ -28,8 +29,12 @@ impl PhysicalEffect for SlipSpeed {
         Some(Box::new(State { size: *self }))
     }
 
-    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
-        Some(Box::new(Term))
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { slip_s_m: size(sizes, "slip_s_m")? })
     }
 }
 
@@ -52,13 +57,11 @@ struct Term;
 
 impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "slip_s_m", unit: "s/m" }]
+        &[TermParameter { name: "slip_s_m", unit: "s/m", plausible: 0.02 }]
     }
 
-    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
-        let lost_m = interval.travel_m.map(|travel_m| -travel_m * travel_m.abs() / interval.dt_s);
-        let change = Interval { travel_m: lost_m, ..*interval }.increment();
-        gradient[0] = Pose::new(change.distance_m, 0.0, change.turn_rad);
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s(), |travel_m, speed_m_s| -travel_m * speed_m_s.abs()));
     }
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Step};
+use crate::hypothesis::{Hypothesis, Sign};
 
 /// Standard gravity, m/s² (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -39,6 +40,10 @@ impl PhysicalEffect for TractionLoss {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self, ground_m_s: Wheels::both(0.0), sliding: Wheels::both(false) }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Scatter(&[Sign::WayJumps])
     }
 }
 

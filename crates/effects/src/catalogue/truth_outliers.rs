@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Sighting};
+use crate::hypothesis::{Hypothesis, Sign};
 use crate::stream::Stream;
 
 /// Gross errors of the outside instrument.
@@ -39,6 +40,10 @@ impl PhysicalEffect for TruthOutliers {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         Some(Box::new(State { size: *self, stream: None }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Scatter(&[Sign::IsolatedLooks])
     }
 }
 

@@ -4,11 +4,11 @@
 //! Observability: heading after driving straight. Alias: none on paths that drive both ways round.
 //! Reference: Borenstein & Feng 1996, eq. for E_d; Navarro et al., eq. (4): the differential part of α_c.
 
-use dataset::{Interval, ModelTerm, TermParameter};
-use kinematics::{DriveGeometry, Pose, Wheels};
+use kinematics::{DriveGeometry, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
+use crate::hypothesis::Hypothesis;
 
 /// Ratio of the diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,22 +32,7 @@ impl PhysicalEffect for WheelMismatch {
         DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
     }
 
-    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
-        Some(Box::new(Term))
-    }
-}
-
-struct Term;
-
-impl ModelTerm for Term {
-    fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "right_over_left", unit: "1" }]
-    }
-
-    /// D_R grows by half of the ratio's change and D_L shrinks by the other half.
-    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
-        let half_m = Wheels { left: -0.5 * interval.travel_m.left, right: 0.5 * interval.travel_m.right };
-        let change = Interval { travel_m: half_m, ..*interval }.increment();
-        gradient[0] = Pose::new(change.distance_m, 0.0, change.turn_rad);
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Geometry
     }
 }

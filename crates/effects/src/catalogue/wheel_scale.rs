@@ -4,11 +4,11 @@
 //! Observability: any distance measured from outside. Alias: `clock_rate` when speeds are logged; the wheelbase where a robot only spins.
 //! Reference: Navarro et al., eq. (4): the common part of α_c; Borenstein & Feng 1996 (who cannot see it on closed squares).
 
-use dataset::{Interval, ModelTerm, TermParameter};
-use kinematics::{DriveGeometry, Pose};
+use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
+use crate::hypothesis::Hypothesis;
 
 /// Common factor of both diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,20 +29,7 @@ impl PhysicalEffect for WheelScale {
         DriveGeometry::new(diameter_m, geometry.wheel_separation_m()).unwrap_or(geometry)
     }
 
-    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
-        Some(Box::new(Term))
-    }
-}
-
-struct Term;
-
-impl ModelTerm for Term {
-    fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "scale", unit: "1" }]
-    }
-
-    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
-        let increment = interval.increment();
-        gradient[0] = Pose::new(increment.distance_m, 0.0, increment.turn_rad);
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Geometry
     }
 }

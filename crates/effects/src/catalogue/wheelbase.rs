@@ -4,11 +4,11 @@
 //! Observability: turns measured from outside. Alias: `wheel_scale` where the robot only spins; `turn_rate_wheelbase` at one yaw rate.
 //! Reference: Navarro et al., eq. (10); Borenstein & Feng 1996.
 
-use dataset::{Interval, ModelTerm, TermParameter};
-use kinematics::{DriveGeometry, Pose};
+use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
+use crate::hypothesis::Hypothesis;
 
 /// Ratio of the wheelbases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,19 +27,7 @@ impl PhysicalEffect for Wheelbase {
         DriveGeometry::new(geometry.wheel_diameter_m(), self.ratio * geometry.wheel_separation_m()).unwrap_or(geometry)
     }
 
-    fn hypothesis(&self) -> Option<Box<dyn ModelTerm>> {
-        Some(Box::new(Term))
-    }
-}
-
-struct Term;
-
-impl ModelTerm for Term {
-    fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "ratio", unit: "1" }]
-    }
-
-    fn gradient(&mut self, interval: &Interval, gradient: &mut [Pose]) {
-        gradient[0] = Pose::new(0.0, 0.0, -interval.increment().turn_rad);
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Geometry
     }
 }
