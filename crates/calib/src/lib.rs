@@ -6,6 +6,7 @@
 mod drift;
 mod drive;
 mod estimate;
+pub mod likelihood;
 mod looks;
 mod report;
 mod robust;
