@@ -131,6 +131,33 @@ impl<'a> Records<'a> {
         self.chains.iter().filter(move |chain| chain.run == run).filter_map(|chain| chain.end_error(model))
     }
 
+    /// The heading of the instrument on the robot, roughly, from the directions in which it and the wheels say that the robot went between looks, each weighed
+    /// by its length; a spin has none, and an arc errs as much one way as its mirror image the other.
+    pub(crate) fn sensor_heading_rad(&self, model: &Model) -> f64 {
+        let (mut dot, mut cross) = (0.0, 0.0);
+        for chain in &self.chains {
+            let mut before = match chain.start {
+                Start::Seen => None,
+                Start::Origin => Some((Pose::IDENTITY, 0)),
+            };
+            for look in &chain.looks {
+                let Some(theta_rad) = look.theta_rad else { return 0.0 };
+                let pose = Pose::new(look.x_m, look.y_m, theta_rad);
+                if let Some((seen, after)) = before {
+                    let moved = chain.pieces[after..look.after].iter().fold(Pose::IDENTITY, |moved, piece| {
+                        let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                        moved * Increment::from_travel(travel_m, model.separation_m).arc()
+                    });
+                    let seen = seen.to(pose);
+                    dot += moved.x_m * seen.x_m + moved.y_m * seen.y_m;
+                    cross += seen.x_m * moved.y_m - seen.y_m * moved.x_m;
+                }
+                before = Some((pose, look.after));
+            }
+        }
+        if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
+    }
+
     /// Times between looks that follow each other, seconds.
     pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
         self.chains.iter().flat_map(|chain| chain.looks.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))

@@ -34,6 +34,8 @@ const PHASES: usize = 4;
 const LEAST_LOOKS_A_RUN: f64 = 1.0;
 /// A direction of the lengths is seen when its relative standard deviation is below this: nominal values are better known than worse.
 const LARGEST_SIGMA: f64 = 0.03;
+/// An instrument whose heading on the robot seems to be more than this is mounted so on purpose; less may be the lie of a short log.
+const TURNED_ASIDE_RAD: f64 = 0.2;
 /// With fewer runs, they are cut into blocks to be held out.
 const LEAST_RUNS: usize = 6;
 const FOLDS: usize = 6;
@@ -51,6 +53,8 @@ pub struct JointFit<'a> {
     pub selections: Vec<Selection>,
     /// The nominal drive.
     pub nominal: Model,
+    /// Where fits start: the nominal drive with its instrument turned as it seems to be.
+    pub(crate) start: Model,
     /// The fit.
     pub fit: Fit,
     /// The free columns.
@@ -83,9 +87,11 @@ impl Joint {
             columns: Column::GEOMETRY.to_vec(),
             unseen: Vec::new(),
             records,
+            start: nominal.clone(),
             nominal,
             prior,
         };
+        found.look_at_the_mounting();
         found.refit(None)?;
         found.thin()?;
         if self.nuisances && std::env::var("JNN").is_err() {
@@ -102,8 +108,17 @@ fn refused(error: FitError) -> CalibError {
 }
 
 impl JointFit<'_> {
+    /// An instrument that looks to the side cannot be left out of the first fit.
+    fn look_at_the_mounting(&mut self) {
+        let heading_rad = self.records.sensor_heading_rad(&self.nominal);
+        if heading_rad.abs() > TURNED_ASIDE_RAD {
+            self.start.body_from_sensor.theta_rad = heading_rad;
+            self.columns.extend(Column::MOUNTING);
+        }
+    }
+
     fn refit(&mut self, from: Option<From>) -> Result<(), CalibError> {
-        let from = from.unwrap_or_else(|| From { model: self.nominal.clone(), noise: None, free_headings: None });
+        let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let held = self.unseen.iter().map(|direction| {
             DVector::from_fn(self.columns.len(), |row, _| direction.get(self.columns[row].index()).copied().unwrap_or(0.0))
         });
@@ -172,11 +187,13 @@ impl JointFit<'_> {
             &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency],
         ];
         let units = self.units();
-        let Some(base) = self.held_out(&units, &Column::GEOMETRY) else { return Ok(()) };
+        let present = self.columns.clone();
+        let Some(base) = self.held_out(&units, &present) else { return Ok(()) };
         let best = sets
             .into_iter()
             .filter_map(|set| {
-                let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(set.iter().copied()).collect();
+                let columns: Vec<Column> =
+                    present.iter().chain(set.iter().filter(|column| !present.contains(column))).copied().collect();
                 let found = self.held_out(&units, &columns)?;
                 let gains: Vec<f64> = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
                 let (mean, error) = mean_and_error(&gains)?;
