@@ -1,6 +1,7 @@
 //! The `yair` command: one file a subcommand, and the only code that knows the terminal.
 
 mod calibrate;
+mod compare;
 mod evaluate;
 mod import;
 mod merge;
@@ -36,6 +37,7 @@ enum Command {
     Import(import::Arguments),
     Calibrate(calibrate::Arguments),
     Evaluate(evaluate::Arguments),
+    Compare(compare::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
     Reproduce(reproduce::Arguments),
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
+        Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
         Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),

@@ -100,15 +100,9 @@ fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {
     }
 }
 
-fn run_drift(
-    session: &Session<'_>,
-    run: &RunView<'_>,
-    geometry: DriveGeometry,
-    body_from_sensor: Pose,
-) -> RunDrift {
+fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, body_from_sensor: Pose) -> RunDrift {
     let observed = run.observed_poses();
-    let start =
-        observed.first().map(|(_, world_from_sensor)| *world_from_sensor * body_from_sensor.inverse());
+    let start = observed.first().map(|(_, world_from_sensor)| *world_from_sensor * body_from_sensor.inverse());
     let mut log: Vec<(f64, Pose)> = Vec::with_capacity(run.odometry().t_s.len());
     let mut length_m = 0.0;
     run.dead_reckon(session.robot, &geometry, Rule::Midpoint, start.unwrap_or_default(), |t_s, pose| {

@@ -40,7 +40,12 @@ pub(crate) struct Looks<'a> {
 
 impl<'a> Looks<'a> {
     /// The looks at a run; `None` when fewer than two poses lie within its log, or the log has gaps.
-    pub(crate) fn at(run: &RunView<'a>, track: &WheelTrack<'_>, nominal: &DriveGeometry, spacing: Spacing) -> Option<Self> {
+    pub(crate) fn at(
+        run: &RunView<'a>,
+        track: &WheelTrack<'_>,
+        nominal: &DriveGeometry,
+        spacing: Spacing,
+    ) -> Option<Self> {
         let poses = run.observed_poses();
         let spanned = |pair: &[(f64, Pose)]| track.spans(pair[0].0, pair[1].0);
         let begins = poses.windows(2).position(spanned).filter(|_| run.info().continuous)?;
@@ -96,8 +101,7 @@ impl<'a> Looks<'a> {
     }
 }
 
-const NO_POSES: &str =
-    "no run has the robot's pose at two instants (truth.csv with headings, or two marked points) and wheels that are logged";
+const NO_POSES: &str = "no run has the robot's pose at two instants (truth.csv with headings, or two marked points) and wheels that are logged";
 const NO_LOOKS: &str = "its log has gaps, or does not span two of its poses";
 
 #[cfg(test)]
@@ -168,7 +172,10 @@ mod tests {
         late.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s += 100.0);
         for dataset in [dataset(false), late] {
             let why = Looks::of_all("test", &[dataset.session()], spacing).expect_err("no looks").to_string();
-            assert!(why.contains("two instants") && why.ends_with("a: its log has gaps, or does not span two of its poses"), "{why}");
+            assert!(
+                why.contains("two instants") && why.ends_with("a: its log has gaps, or does not span two of its poses"),
+                "{why}"
+            );
         }
     }
 }

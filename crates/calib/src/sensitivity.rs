@@ -70,11 +70,8 @@ impl Reckoned {
         turned.set_row(0, &(-moved.y_m * heading));
         turned.set_row(1, &(moved.x_m * heading));
         self.by_lengths += by_lengths + turned;
-        self.pose = Pose::new(
-            self.pose.x_m + moved.x_m,
-            self.pose.y_m + moved.y_m,
-            self.pose.theta_rad + moved.theta_rad,
-        );
+        self.pose =
+            Pose::new(self.pose.x_m + moved.x_m, self.pose.y_m + moved.y_m, self.pose.theta_rad + moved.theta_rad);
     }
 }
 
@@ -120,7 +117,8 @@ mod tests {
             for column in 0..3 {
                 let moved = |by: f64| {
                     let mut lengths = LENGTHS;
-                    *[&mut lengths.m_per_rad.left, &mut lengths.m_per_rad.right, &mut lengths.separation_m][column] += by;
+                    *[&mut lengths.m_per_rad.left, &mut lengths.m_per_rad.right, &mut lengths.separation_m][column] +=
+                        by;
                     let Pose { x_m, y_m, theta_rad } = reckon(&lengths, &PATH[..end]).pose;
                     [x_m, y_m, theta_rad]
                 };
