@@ -88,9 +88,14 @@ fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!("{} sessions: {}", comparison.sessions.len(), counts.join(", ")))?;
     terminal.say("mean error at the ends of runs that the calibration has not seen; n = ordered pairs of sessions")?;
     for evaluated in kinds.chunks(KINDS_A_TABLE) {
-        let mut headers = vec!["trained on".to_owned(), "method".to_owned()];
+        // Units stand in the last line, a kind's name as low above them as it goes.
+        let lines = evaluated.iter().map(|(kind, _)| kind.split(" + ").count()).max().unwrap_or(1);
+        let above = |lines: usize| "\n".repeat(lines);
+        let mut headers = vec![format!("{}trained on", above(lines)), format!("{}method", above(lines))];
         for (kind, _) in evaluated {
-            headers.extend([format!("{kind}\nmm"), "\ndeg".to_owned(), "\nn".to_owned()]);
+            let name = kind.replace(" + ", "\n+ ");
+            let gap = above(lines - kind.split(" + ").count());
+            headers.extend([format!("{gap}{name}\nmm"), format!("{}deg", above(lines)), format!("{}n", above(lines))]);
         }
         let mut rows = table(&headers.iter().map(String::as_str).collect::<Vec<_>>(), 2);
         rows.add_row(row("–", nominal, None, evaluated));
@@ -98,8 +103,11 @@ fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
             // A kind is printed where it begins, so that the eye finds the blocks.
             let mut label = *trained;
             for method in &comparison.methods[1..] {
-                rows.add_row(row(label, method, Some(trained), evaluated));
-                label = "";
+                let refused = method.refusals.iter().filter(|refusal| refusal.path_kind == *trained).count();
+                if refused < sessions_of(trained) {
+                    rows.add_row(row(label, method, Some(trained), evaluated));
+                    label = "";
+                }
             }
         }
         terminal.say(&rows.to_string())?;
