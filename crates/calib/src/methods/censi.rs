@@ -112,7 +112,11 @@ impl CensiFit {
     #[must_use]
     pub fn residual(&self, excursion: &Excursion) -> Vector3<f64> {
         let (predicted, seen) = (self.predicted(excursion), excursion.sensor_from_later);
-        Vector3::new(predicted.x_m - seen.x_m, predicted.y_m - seen.y_m, wrap_to_pi(predicted.theta_rad - seen.theta_rad))
+        Vector3::new(
+            predicted.x_m - seen.x_m,
+            predicted.y_m - seen.y_m,
+            wrap_to_pi(predicted.theta_rad - seen.theta_rad),
+        )
     }
 
     /// ∂[`Self::predicted`]/∂(left radius, right radius, separation, ℓ_x, ℓ_y, ℓ_θ).
@@ -293,7 +297,8 @@ pub fn solutions<'e>(excursions: &mut (dyn Iterator<Item = &'e Excursion> + '_))
     let unseen = CalibError::Unobservable {
         method: Censi::NAME,
         parameter: Parameter::SensorX,
-        why: "between two looks the robot turns by nothing or by whole turns only; add looks after quarter turns".to_owned(),
+        why: "between two looks the robot turns by nothing or by whole turns only; add looks after quarter turns"
+            .to_owned(),
     };
     if eigenvalues.min() * LARGEST_PLACE_CONDITION <= eigenvalues.max() {
         return Err(unseen);
@@ -397,7 +402,10 @@ impl Method for Censi {
         let runs_rejected = by_run
             .iter()
             .filter(|(_, (_, lost))| *lost > 0)
-            .map(|(run, (all, lost))| Rejected { run: (*run).to_owned(), why: format!("{lost} of {all} displacements are among the worst") })
+            .map(|(run, (all, lost))| Rejected {
+                run: (*run).to_owned(),
+                why: format!("{lost} of {all} displacements are among the worst"),
+            })
             .collect();
 
         let covariance = covariance(&fit, &excursions, &kept, dropped);
@@ -563,7 +571,9 @@ mod tests {
         // By the midpoint rule over the density that is left.
         for dropped in [0.0, 0.01, 0.04, 0.3] {
             let (plane, axis) = left_of_variance((dropped, dropped));
-            let cut = |tail: &dyn Fn(f64) -> f64| (0..60_000).map(|k| 1e-4 * f64::from(k)).find(|c| tail(*c) <= dropped).unwrap_or(6.0);
+            let cut = |tail: &dyn Fn(f64) -> f64| {
+                (0..60_000).map(|k| 1e-4 * f64::from(k)).find(|c| tail(*c) <= dropped).unwrap_or(6.0)
+            };
             let normal = Normal::standard();
             let density = |c: f64| normal.pdf(c);
             let integral = |upto: f64, of: &dyn Fn(f64) -> f64| {
