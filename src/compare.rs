@@ -114,7 +114,7 @@ fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
     }
     let refusals = refusals(comparison, &kinds);
     if !refusals.is_empty() {
-        let mut rows = table(&["trained on", "method", "refused", "why"], 4);
+        let mut rows = table(&["method", "refused", "why"], 3);
         for refusal in refusals {
             rows.add_row(refusal);
         }
@@ -137,20 +137,28 @@ fn row(label: &str, method: &ComparedMethod, trained: Option<&str>, evaluated: &
     row
 }
 
-/// Kind, method, how many of the kind's sessions it refused, and the first one's reason.
-fn refusals(comparison: &Comparison, kinds: &[(&str, usize)]) -> Vec<[String; 4]> {
+/// Method, which sessions it refused, and why: the reason of the first one, by name where others have their own.
+fn refusals(comparison: &Comparison, kinds: &[(&str, usize)]) -> Vec<[String; 3]> {
     let mut rows = Vec::new();
-    for (kind, sessions) in kinds {
-        for method in &comparison.methods {
+    for method in &comparison.methods {
+        // The method stands beside it.
+        let reason = |why: &str| {
+            let why = why.trim_start_matches(method.method.as_str()).trim_start_matches(':');
+            why.trim_start().to_owned()
+        };
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for (kind, sessions) in kinds {
             let refused: Vec<_> = method.refusals.iter().filter(|refusal| refusal.path_kind == *kind).collect();
             let Some(first) = refused.first() else { continue };
-            let of = format!("{} of {sessions}", refused.len());
-            // The method stands beside it.
-            let why = first.why.trim_start_matches(method.method.as_str()).trim_start_matches(':').trim_start();
-            let others = refused.iter().any(|refusal| refusal.why != first.why);
-            let why = if others { format!("{}: {why}", first.dataset) } else { why.to_owned() };
-            rows.push([(*kind).to_owned(), method.method.clone(), of, why]);
+            let own = refused.iter().any(|refusal| refusal.why != first.why);
+            let why = if own { format!("{}: {}", first.dataset, reason(&first.why)) } else { reason(&first.why) };
+            let of = format!("{} of {sessions} {kind}", refused.len());
+            match groups.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, kinds)) => kinds.push(of),
+                None => groups.push((why, vec![of])),
+            }
         }
+        rows.extend(groups.into_iter().map(|(why, of)| [method.method.clone(), of.join(", "), why]));
     }
     rows
 }

@@ -8,6 +8,7 @@ mod merge;
 mod reproduce;
 mod simulate;
 mod sweep;
+mod sweep_summary;
 mod sweep_table;
 mod terminal;
 
