@@ -112,6 +112,11 @@ fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
         }
         terminal.say(&rows.to_string())?;
     }
+    for pair in &nominal.pairs {
+        if let Some(why) = &pair.why_null {
+            terminal.say(&format!("nothing is evaluated on {}: {why}", pair.evaluated_on))?;
+        }
+    }
     let refusals = refusals(comparison, &kinds);
     if !refusals.is_empty() {
         let mut rows = table(&["method", "refused", "why"], 3);

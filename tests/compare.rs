@@ -117,6 +117,31 @@ fn the_table_fits_and_only_the_asked_for_methods_are_in_it() {
     assert!(all.stdout.lines().all(|line| line.chars().count() <= 100), "{}", all.stdout);
 }
 
+/// A session of a single mark can be neither calibrated on nor evaluated on, and says why; the others are compared all the same.
+#[test]
+fn a_session_without_poses_gives_no_pair_and_says_why() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    sessions(at);
+    let points = at.join("sessions/others-1/points.csv");
+    let text = fs::read_to_string(&points).expect("read");
+    // One mark is a position and no pose.
+    let left: Vec<&str> = text.lines().filter(|line| !line.contains("right")).collect();
+    fs::write(&points, left.join("\n") + "\n").expect("written");
+    let found = document(at, &["compare", "sessions", "--method", "direct"]);
+    let nominal = entries(named(entries(&found, "methods"), "method", "nominal"), "pairs");
+    let without = named(nominal, "evaluated_on", "others-1");
+    assert!(without["mean_final_position_m"].is_null() && without["why_null"].is_string(), "{without}");
+    let direct = named(entries(&found, "methods"), "method", "direct");
+    let refused: Vec<&Value> = entries(direct, "refusals").iter().map(|refusal| &refusal["dataset"]).collect();
+    assert!(refused.contains(&&Value::from("others-1")), "{refused:?}");
+    // others-0 on both sessions of squares, and nothing else.
+    let evaluated = entries(direct, "kinds").iter().map(|kind| kind["pairs"].as_u64().expect("a count")).sum::<u64>();
+    assert_eq!(evaluated, 2, "{direct}");
+    let shown = succeed(at, &["compare", "sessions", "--method", "direct"]).stdout;
+    assert!(shown.contains("nothing is evaluated on others-1: no absolute truth"), "{shown}");
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused_with_what_to_do() {
     let temp = tempfile::tempdir().expect("a temporary folder");
