@@ -47,7 +47,8 @@ fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
 }
 
 /// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by 0.5 % and are halved where a slope changes its sign. It ends
-/// when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest.
+/// when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a narrow valley: it bounces from side to side,
+/// the mean stays, and that is taken for the end.
 fn rprop(session: &Session<'_>) -> Vector3<f64> {
     const LEAST_M: f64 = 1e-5;
     let sessions = std::slice::from_ref(session);
@@ -64,11 +65,8 @@ fn rprop(session: &Session<'_>) -> Vector3<f64> {
                 steps_m[i] = (1.005_f64 * steps_m[i]).min(2.5e-4);
             } else if turned < 0.0 {
                 steps_m[i] = (0.5_f64 * steps_m[i]).max(LEAST_M);
-                slopes[i] = 0.0;
             }
-            if slopes[i] != 0.0 {
-                lengths_m[i] -= steps_m[i] * slopes[i].signum();
-            }
+            lengths_m[i] -= steps_m[i] * slopes[i].signum();
         }
         if costs.len() >= 30 {
             let mean = |costs: &[f64]| costs.iter().sum::<f64>() / 10.0;
@@ -82,7 +80,7 @@ fn rprop(session: &Session<'_>) -> Vector3<f64> {
 }
 
 #[test]
-fn optiodoms_descent_stops_where_the_valley_is_flat() {
+fn optiodoms_descent_ends_where_it_bounces() {
     let simulation = circles();
     let session = simulation.dataset.session();
     let truth = true_geometry(&simulation);
@@ -90,11 +88,12 @@ fn optiodoms_descent_stops_where_the_valley_is_flat() {
     // A count of 40 000 a turn of the wheel, cut at instants on the way.
     assert!(relative(&found.geometry, &truth) < 2e-6, "{:?}", found.geometry);
     let stopped = rprop(&session);
-    let off = relative(&geometry(&stopped), &truth);
-    assert!((off - 5.8e-4).abs() < 0.1e-4, "{off}");
-    // There the cost is ten thousand times what the truth costs.
+    // The nominal diameters are 1.1 % and 0.9 % small: it ends farther away than it began.
+    let small = 1.0 - stopped[0] / lengths(&truth)[0];
+    assert!((small - 0.0129).abs() < 1e-4, "{stopped}");
+    // There the cost is a million times what the truth costs.
     let (stopped, right) = (cost_m2(&session, &stopped), cost_m2(&session, &Vector3::from(lengths(&truth))));
-    assert!(stopped > 1e4 * right, "{stopped} {right}");
+    assert!(stopped > 1e6 * right, "{stopped} {right}");
 }
 
 fn optiodom(session: &std::path::Path) -> Dataset {
@@ -118,11 +117,12 @@ fn minimum(session: &Session<'_>, from: Vector3<f64>) -> Vector3<f64> {
     lengths_m
 }
 
-/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and how many micrometres the left diameter is short there.
+/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and how many micrometres the left diameter is short there. The descent above ends within
+/// 63 µm of the published values (rounding to a micrometre, and what we do not know of the program), and so does not go on to the minimum either.
 const ABOVE_THE_MINIMUM: [(&str, f64, f64); 6] = [
     ("250620202104", 1.21, 495.0),
     ("250620202119", 1.14, 438.0),
-    ("250620202236", 1.08, 299.0),
+    ("250620202236", 1.08, 300.0),
     ("250620202251", 1.16, 425.0),
     ("250620202317", 1.51, 436.0),
     ("250620202345", 1.20, 504.0),
@@ -144,8 +144,13 @@ fn published_optiodom_is_not_at_the_minimum_of_its_own_cost() {
         };
         let published =
             Vector3::new(number("left_diameter_m"), number("right_diameter_m"), number("wheel_separation_m"));
-        let dataset = optiodom(&folder.join(path));
+        let mut dataset = optiodom(&folder.join(path));
+        dataset.robot.left_wheel_diameter_m = number("nominal_left_diameter_m");
+        dataset.robot.right_wheel_diameter_m = number("nominal_right_diameter_m");
+        dataset.robot.wheel_separation_m = number("nominal_wheel_separation_m");
         let session = dataset.session();
+        let off_um = 1e6 * (rprop(&session) - published).amax();
+        assert!(off_um < 63.0, "{name}: {off_um}");
         let best = minimum(&session, published);
         let ratio = cost_m2(&session, &published) / cost_m2(&session, &best);
         assert!((ratio - above).abs() < 0.006, "{name}: {ratio}");
