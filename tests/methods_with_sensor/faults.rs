@@ -46,9 +46,9 @@ fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
     POSITIONS.cost(std::slice::from_ref(session), &geometry(lengths_m)).expect("poses").value_m2
 }
 
-/// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by 0.5 % and are halved where a slope changes its sign. It ends
-/// when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a narrow valley: it bounces from side to side,
-/// the mean stays, and that is taken for the end.
+/// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by 0.5 % and are halved where a slope changes its
+/// sign. It ends when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a
+/// narrow valley: it bounces from side to side, the mean stays, and that is taken for the end.
 fn rprop(session: &Session<'_>) -> Vector3<f64> {
     const LEAST_M: f64 = 1e-5;
     let sessions = std::slice::from_ref(session);
@@ -117,8 +117,9 @@ fn minimum(session: &Session<'_>, from: Vector3<f64>) -> Vector3<f64> {
     lengths_m
 }
 
-/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and how many micrometres the left diameter is short there. The descent above ends within
-/// 63 µm of the published values (rounding to a micrometre, and what we do not know of the program), and so does not go on to the minimum either.
+/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and how many micrometres the left diameter is short
+/// there. The descent above ends within 63 µm of the published values (rounding to a micrometre, and what we do not know of the program), and so does not go on
+/// to the minimum either.
 const ABOVE_THE_MINIMUM: [(&str, f64, f64); 6] = [
     ("250620202104", 1.21, 495.0),
     ("250620202119", 1.14, 438.0),
@@ -209,7 +210,8 @@ const UMBMARK: [[(f64, f64); 3]; 4] = [
     [(1.0, 1.7), (1.0, 0.8879), (0.9122, 1.0)],
 ];
 
-/// Errors of four corners do not add up when each turns what comes after it: α and β are of first order. The heading-based `jung_chung` is exact on the same squares.
+/// Errors of four corners do not add up when each turns what comes after it: α and β are of first order. The heading-based `jung_chung` is exact on the same
+/// squares.
 #[test]
 fn umbmark_is_of_first_order_and_its_axes_may_not_be_exchanged() {
     for [robot, umbmark, exchanged] in UMBMARK {
@@ -245,7 +247,8 @@ fn slope(dataset: &Dataset) -> f64 {
     product / square
 }
 
-/// Ticks of 1 mm at 0.25 m/s, 47 rows a second: 5.319 ticks a row come as fives and sixes, with a variance of 0.319 · 0.681 about their mean, which is 0.76 % of the square.
+/// Ticks of 1 mm at 0.25 m/s, 47 rows a second: 5.319 ticks a row come as fives and sixes, with a variance of 0.319 · 0.681 about their mean, which is 0.76 %
+/// of the square.
 #[test]
 fn a_slope_through_the_origin_is_drawn_towards_zero_by_the_rounding_of_the_counts() {
     let mut scenario = shipped("paper.toml");

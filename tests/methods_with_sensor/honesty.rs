@@ -67,8 +67,8 @@ fn mean_square(errors: &[Moments], trials: u32) -> Vec<f64> {
         .collect()
 }
 
-/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false alarm of 4e-4 a case. Trimming normal errors costs an efficiency that Fisher's
-/// information does not know of: 4 % dropped in each of position and heading, up to 1.3 of the variance were it iterated for ever.
+/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false alarm of 4e-4 a case. Trimming normal errors costs an efficiency
+/// that Fisher's information does not know of: 4 % dropped in each of position and heading, up to 1.3 of the variance were it iterated for ever.
 #[test]
 fn censi_finds_drive_and_mounting_and_knows_how_well() {
     let trials = 400;
@@ -104,7 +104,8 @@ fn censi_finds_drive_and_mounting_and_knows_how_well() {
     assert!(trimmed_m < 2.0 * usual_m && spoilt_m > 5.0 * usual_m, "{usual_m} {trimmed_m} {spoilt_m}");
 }
 
-/// 200 trials of 24 runs, three parameters. The filter's model is the simulator's: mean squares within four standard errors (2e-4 a case), whether it is told the instrument's noise or finds it.
+/// 200 trials of 24 runs, three parameters. The filter's model is the simulator's: mean squares within four standard errors (2e-4 a case), whether it is told
+/// the instrument's noise or finds it.
 /// `segments` leaves out one run at a time, whose scatter follows Student's t with some 20 degrees of freedom: ν/(ν−2), and leverage on top of it, up to 1.3.
 /// Rejected: sigmas understated to 0.6 of themselves.
 #[test]

@@ -64,8 +64,8 @@ fn errors_in_sigmas(filter: &AugmentedFilter<i64>, truth: &DriveGeometry) -> [f6
     std::array::from_fn(|i| (found[i] - truth[i]) / covariance[(i, i)].sqrt())
 }
 
-/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with three degrees of freedom a look: their sum lies within
-/// 4.5 standard deviations √(6 n) (7e-6). Rejects a filter that is told wheels of half the noise.
+/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with three degrees of freedom a look: their sum lies
+/// within 4.5 standard deviations √(6 n) (7e-6). Rejects a filter that is told wheels of half the noise.
 #[test]
 fn row_by_row_the_filter_finds_the_drive_and_its_innovations_are_as_large_as_it_says() {
     let (sigma_m, sigma_rad) = (3e-4, 5e-4);

@@ -1,8 +1,8 @@
 //! Sessions of one robot against each other: each method calibrates on one session and is evaluated on every other, pair by pair.
 //!
-//! A session evaluated on its own runs shows how well a method describes what it was given; only another one shows what the calibration is worth. Sessions are grouped by
-//! the kind of path that they drive, since a method may describe its own kind of path well and no other. The measure of a pair is the mean final error of
-//! position and heading over the runs of the second session; that of a kind, the mean over its ordered pairs.
+//! A session evaluated on its own runs shows how well a method describes what it was given; only another one shows what the calibration is worth. Sessions are
+//! grouped by the kind of path that they drive, since a method may describe its own kind of path well and no other. The measure of a pair is the mean final
+//! error of position and heading over the runs of the second session; that of a kind, the mean over its ordered pairs.
 
 use std::collections::BTreeSet;
 
