@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 const ALL: &str = "all";
 
 fn methods() -> String {
-    let lines: Vec<_> = METHODS.iter().map(|method| format!("  {:10} {}", method.name(), method.about())).collect();
+    let lines: Vec<_> = METHODS.iter().map(|method| format!("  {:16} {}", method.name(), method.about())).collect();
     format!("Methods:\n{}", lines.join("\n"))
 }
 
@@ -66,14 +66,15 @@ fn show(report: &CalibrationReport, sessions: &[Session<'_>], terminal: &Termina
     let mut table = table(&["method", "parameter", "nominal", "value", "sigma", "unit"], 2);
     for method in &report.methods {
         for (key, value) in &method.parameters {
-            let decimals = decimals(value.sigma.map(|sigma| 1e3 * sigma));
+            let (scale, unit) = if key.ends_with("_rad") { (180.0 / std::f64::consts::PI, "deg") } else { (1e3, "mm") };
+            let decimals = decimals(value.sigma.map(|sigma| scale * sigma));
             table.add_row([
                 method.method.clone(),
                 key.clone(),
-                cell(nominal(robot, key), 1e3, decimals),
-                cell(Some(value.value), 1e3, decimals),
-                cell(value.sigma, 1e3, decimals),
-                "mm".to_owned(),
+                cell(nominal(robot, key), scale, decimals),
+                cell(Some(value.value), scale, decimals),
+                cell(value.sigma, scale, decimals),
+                unit.to_owned(),
             ]);
         }
     }
