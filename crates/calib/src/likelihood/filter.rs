@@ -365,8 +365,11 @@ impl<'f, 'a> Filter<'f, 'a> {
     fn motion(&mut self, leg: &Leg) -> Moved {
         let Model { m_per_rad, separation_m, .. } = *self.model;
         let parameters = self.gradients.len();
-        let mut moved =
-            Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3], by_terms: vec![Vector3::zeros(); parameters] };
+        let mut moved = Moved {
+            motion: Pose::IDENTITY,
+            by_lengths: [Vector3::zeros(); 3],
+            by_terms: vec![Vector3::zeros(); parameters],
+        };
         for piece in &self.chain.pieces[leg.pieces.clone()] {
             let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
@@ -455,9 +458,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
         let rotation = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
         carry(&mut self.covariance, -step.y, step.x);
-        let noise: [Matrix3<f64>; 2] = std::array::from_fn(|k| {
-            rotation * leg.noise[k] * rotation.transpose() * self.noise.variance[k]
-        });
+        let noise: [Matrix3<f64>; 2] =
+            std::array::from_fn(|k| rotation * leg.noise[k] * rotation.transpose() * self.noise.variance[k]);
         self.covariance += noise[0] + noise[1];
         if self.want.noise_score {
             for covariance in &mut self.covariance_by {
@@ -533,16 +535,20 @@ impl<'f, 'a> Filter<'f, 'a> {
             correction += gain * v;
             self.covariance -= gain * ph.transpose();
         }
-        self.pose = Pose::new(
-            self.pose.x_m + correction.x,
-            self.pose.y_m + correction.y,
-            self.pose.theta_rad + correction.z,
-        );
+        self.pose =
+            Pose::new(self.pose.x_m + correction.x, self.pose.y_m + correction.y, self.pose.theta_rad + correction.z);
         true
     }
 
     /// Squared distance of a look from where it should be, over its variance.
-    fn distance(&self, axes: &[Vector3<f64>; 3], rows: &[Vector3<f64>; 3], error: Vector3<f64>, r: &[f64; 3], components: usize) -> f64 {
+    fn distance(
+        &self,
+        axes: &[Vector3<f64>; 3],
+        rows: &[Vector3<f64>; 3],
+        error: Vector3<f64>,
+        r: &[f64; 3],
+        components: usize,
+    ) -> f64 {
         let (mut covariance, mut correction, mut sum) = (self.covariance, Vector3::zeros(), 0.0);
         for component in 0..components {
             let v: f64 = axes[component].dot(&error) - rows[component].dot(&correction);

@@ -67,8 +67,10 @@ impl Fit {
         let split: Vec<Selection> = selections.to_vec();
         (0..blocks)
             .flat_map(|block| {
-                let part: Vec<Selection> = split.iter().map(|selection| selection.block(records, block, blocks)).collect();
-                let found = pass(records, &part, &self.model, &self.noise, &self.free_headings, &mut [], Want::default());
+                let part: Vec<Selection> =
+                    split.iter().map(|selection| selection.block(records, block, blocks)).collect();
+                let found =
+                    pass(records, &part, &self.model, &self.noise, &self.free_headings, &mut [], Want::default());
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
@@ -139,7 +141,8 @@ pub(crate) fn fit_from(
             let want = Want { innovations: true, no_gate: true, noise_score: false };
             let found = pass(records, selections, &model, &noise, &headings, terms, want);
             step(&mut model, &mut headings, &found, options, &basis)?;
-            let mut squares: Vec<f64> = found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
+            let mut squares: Vec<f64> =
+                found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
             if squares.is_empty() {
                 break;
             }
@@ -159,9 +162,20 @@ pub(crate) fn fit_from(
             break;
         }
     }
-    let want = Want { innovations: true, ..Want::default() };
-    let pass = pass(records, selections, &model, &noise, &headings, terms, want);
+    let pass = pass_with_innovations(records, selections, &model, &noise, &headings, terms);
     Ok(Fit { model, noise, free_headings: headings, pass, converged })
+}
+
+/// A pass at given values, with its innovations.
+pub(crate) fn pass_with_innovations(
+    records: &Records<'_>,
+    selections: &[Selection],
+    model: &Model,
+    noise: &Noise,
+    free_headings: &[f64],
+    terms: &mut [Box<dyn ModelTerm>],
+) -> Pass {
+    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, ..Want::default() })
 }
 
 /// An orthonormal basis of the directions that may move.
@@ -173,7 +187,8 @@ fn basis(options: &FitOptions) -> DMatrix<f64> {
     let held = DMatrix::from_columns(&options.held);
     // Held directions have eigenvalue 1 or more in H Hᵀ, the others 0.
     let eigen = (&held * held.transpose()).symmetric_eigen();
-    let free: Vec<_> = (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+    let free: Vec<_> =
+        (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
     DMatrix::from_columns(&free)
 }
 
@@ -193,10 +208,8 @@ fn step(
         let reduced = basis.transpose() * &matrix * basis;
         let m = reduced.nrows();
         let damping = DVector::from_fn(m, |k, _| DAMPING * reduced[(k, k)] + LEAST_INFORMATION);
-        let damped = Information {
-            matrix: &reduced + DMatrix::from_diagonal(&damping),
-            gradient: basis.transpose() * gradient,
-        };
+        let damped =
+            Information { matrix: &reduced + DMatrix::from_diagonal(&damping), gradient: basis.transpose() * gradient };
         let (step, _) = damped.solve().ok_or(FitError::Diverges)?;
         size = (step.transpose() * &reduced * &step)[0];
         let step = basis * step;
@@ -234,7 +247,8 @@ impl Pace {
     /// The step to take instead of `step`.
     fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
-            self.share[k] = if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
+            self.share[k] =
+                if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
         }
         self.last = step;
         let tamed = step.component_mul(&self.share);

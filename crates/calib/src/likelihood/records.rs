@@ -56,7 +56,8 @@ pub struct Chain<'a> {
 
 impl Chain<'_> {
     fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
-        let pose = |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
+        let pose =
+            |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
         let start = match self.start {
             Start::Seen => pose(self.looks.first()?)?,
             Start::Origin => model.body_from_sensor.inverse(),
@@ -226,8 +227,13 @@ fn add_displacements<'a>(chains: &mut Vec<Chain<'a>>, base: &Chain<'a>, track: &
         let mut pieces = Vec::new();
         if cursor.pieces(seen.t0_s, seen.t1_s, &mut pieces) {
             let pose = Pose::new(seen.dx_m, seen.dy_m, seen.dtheta_rad);
-            let look =
-                Seen { t_s: seen.t1_s, x_m: pose.x_m, y_m: pose.y_m, theta_rad: Some(pose.theta_rad), after: pieces.len() };
+            let look = Seen {
+                t_s: seen.t1_s,
+                x_m: pose.x_m,
+                y_m: pose.y_m,
+                theta_rad: Some(pose.theta_rad),
+                after: pieces.len(),
+            };
             chains.push(Chain { start: Start::Origin, pieces, looks: vec![look], wheel_rad, ..base.clone() });
         }
     }

@@ -83,10 +83,11 @@ impl Selection {
     /// How many looks it takes a chain that has any, on average; starts left out.
     #[must_use]
     pub fn mean_looks(&self) -> f64 {
-        let (chains, looks) = self.legs.iter().filter(|legs| !legs.is_empty()).fold((0.0, 0.0), |(chains, looks), legs| {
-            #[allow(clippy::cast_precision_loss)]
-            (chains + 1.0, looks + legs.len() as f64)
-        });
+        let (chains, looks) =
+            self.legs.iter().filter(|legs| !legs.is_empty()).fold((0.0, 0.0), |(chains, looks), legs| {
+                #[allow(clippy::cast_precision_loss)]
+                (chains + 1.0, looks + legs.len() as f64)
+            });
         if chains > 0.0 { looks / chains } else { 0.0 }
     }
 }

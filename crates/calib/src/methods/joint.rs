@@ -7,7 +7,7 @@
 //! turns the separation.
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
 
-use dataset::{Schedule, Session};
+use dataset::{ModelTerm, Schedule, Session};
 use kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
@@ -15,8 +15,8 @@ use crate::estimate::{
     CalibError, Calibration, Covariance, Method, Mounting, NotObservable, Rejected, drive, nominal,
     refuse_wrapped_counters,
 };
-use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Records, Selection, Thinning};
-use crate::likelihood::{From, NoisePrior, fit_from};
+use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Pass, Records, Selection, Thinning};
+use crate::likelihood::{From, NoisePrior, fit_from, pass_with_innovations};
 use crate::sensitivity::unseen;
 
 /// The method with its settings.
@@ -94,11 +94,10 @@ impl Joint {
         found.look_at_the_mounting();
         found.refit(None)?;
         found.thin()?;
-        if self.nuisances && std::env::var("JNN").is_err() {
+        if self.nuisances {
             found.add_nuisances()?;
         }
         found.hold_what_is_unseen()?;
-        if std::env::var("JDBG").is_ok() { eprintln!("thin {:?} corr {:.2} cols {:?} noise {:?} looks/run {:.1} outliers {}", found.thinning, found.correlation(), found.columns.len(), found.fit.noise.variance.map(|v| 1e3*v.sqrt()), found.selections[0].mean_looks(), found.fit.pass.outliers.len()); }
         Ok(found)
     }
 }
@@ -118,13 +117,18 @@ impl JointFit<'_> {
     }
 
     fn refit(&mut self, from: Option<From>) -> Result<(), CalibError> {
+        self.refit_with(from, &mut [])
+    }
+
+    fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let held = self.unseen.iter().map(|direction| {
-            DVector::from_fn(self.columns.len(), |row, _| direction.get(self.columns[row].index()).copied().unwrap_or(0.0))
+            DVector::from_fn(self.columns.len(), |row, _| {
+                direction.get(self.columns[row].index()).copied().unwrap_or(0.0)
+            })
         });
         let options = FitOptions { held: held.collect(), ..FitOptions::of(&self.columns) };
-        self.fit =
-            fit_from(&self.records, &self.selections, from, &self.prior, &mut [], &options).map_err(refused)?;
+        self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
         Ok(())
     }
 
@@ -250,8 +254,40 @@ impl JointFit<'_> {
         if self.unseen.is_empty() {
             return Ok(());
         }
-        let from = From { model: Model { m_per_rad: self.nominal.m_per_rad, separation_m: self.nominal.separation_m, ..self.fit.model.clone() }, ..self.here() };
+        let from = From {
+            model: Model {
+                m_per_rad: self.nominal.m_per_rad,
+                separation_m: self.nominal.separation_m,
+                ..self.fit.model.clone()
+            },
+            ..self.here()
+        };
         self.refit(Some(from))
+    }
+
+    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of.
+    #[must_use]
+    pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
+        let model = Model { sizes: vec![0.0; parameters], ..self.fit.model.clone() };
+        let Fit { noise, free_headings, .. } = &self.fit;
+        pass_with_innovations(&self.records, &self.selections, &model, noise, free_headings, terms)
+    }
+
+    /// The fit with further terms, their sizes free beside what is free already, on the same looks.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn extended(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, CalibError> {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+        let mut columns = self.columns.clone();
+        columns.retain(|column| !matches!(column, Column::Term(_)));
+        columns.extend((0..parameters).map(Column::Term));
+        let mut from = self.here();
+        from.model.sizes = vec![0.0; parameters];
+        let mut extended = Self { columns, ..self.clone() };
+        extended.refit_with(Some(from), terms)?;
+        Ok(extended)
     }
 
     /// Covariance of the free columns: from the observed information where innovations are white; where they are not, or the scatter of the runs is larger than
@@ -281,7 +317,9 @@ impl JointFit<'_> {
             // Each unit's leverage taken into account: its score without itself in the fit.
             let own = free.transpose() * of.matrix * &free;
             let gradient = free.transpose() * of.gradient;
-            let Some(others) = (DMatrix::identity(free.ncols(), free.ncols()) - &own * &inverse).try_inverse() else { continue };
+            let Some(others) = (DMatrix::identity(free.ncols(), free.ncols()) - &own * &inverse).try_inverse() else {
+                continue;
+            };
             let without = others * gradient;
             meat += &without * without.transpose();
         }
@@ -379,14 +417,15 @@ impl Method for Joint {
         let at = |column: Column| found.columns.iter().position(|of| *of == column);
         let mounting = mounted.then(|| Mounting {
             body_from_sensor: Pose { ..body_from_sensor },
-            covariance: covariance.as_ref().zip(at(Column::MountX)).map(|(covariance, first)| {
-                Matrix3::from_fn(|i, j| covariance[(first + i, first + j)])
-            }),
+            covariance: covariance
+                .as_ref()
+                .zip(at(Column::MountX))
+                .map(|(covariance, first)| Matrix3::from_fn(|i, j| covariance[(first + i, first + j)])),
         });
         Ok(Calibration {
-            covariance: covariance.as_ref().map(|covariance| {
-                Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])
-            }),
+            covariance: covariance
+                .as_ref()
+                .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
             mounting,
             not_observable: found.unseen.iter().map(not_observable).collect(),
             runs_used: found.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
