@@ -24,6 +24,8 @@ use crate::sensitivity::unseen;
 pub struct Joint {
     /// Look for a mounting and a latency of the instrument.
     pub nuisances: bool,
+    /// Take looks farther apart while their errors resemble each other; without, every look counts as independent.
+    pub thin: bool,
 }
 
 /// Innovations are taken for white while no component's correlation with the look before reaches this many standard errors: three components at 1 % together.
@@ -66,7 +68,7 @@ pub struct JointFit<'a> {
 
 impl Joint {
     /// The method as the table of contents offers it.
-    pub const DEFAULT: Self = Self { nuisances: true };
+    pub const DEFAULT: Self = Self { nuisances: true, thin: true };
 
     const NAME: &'static str = "joint";
 
@@ -93,7 +95,9 @@ impl Joint {
         };
         found.look_at_the_mounting();
         found.refit(None)?;
-        found.thin()?;
+        if self.thin {
+            found.thin()?;
+        }
         if self.nuisances {
             found.add_nuisances()?;
         }
