@@ -55,6 +55,21 @@ pub struct Chain<'a> {
 }
 
 impl Chain<'_> {
+    /// The pose of the first look, with its time and the pieces before it, and the time and the pose of the last; `None` where a look has no heading.
+    #[allow(clippy::type_complexity)]
+    pub(crate) fn ends(&self) -> Option<(Pose, (f64, usize), (f64, Pose))> {
+        let pose = |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?));
+        let last = self.looks.last()?;
+        let (start, first) = match self.start {
+            Start::Seen => {
+                let first = self.looks.first()?;
+                (pose(first)?, (first.t_s, first.after))
+            }
+            Start::Origin => (Pose::IDENTITY, (0.0, 0)),
+        };
+        Some((start, first, (last.t_s, pose(last)?)))
+    }
+
     fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
         let pose =
             |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
