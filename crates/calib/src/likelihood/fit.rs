@@ -259,8 +259,9 @@ impl Pace {
 /// A scoring step of the noise; returns the largest component of the whole step.
 fn step_noise(noise: &mut Noise, pace: &mut Pace, found: &Pass, prior: &NoisePrior) -> f64 {
     let pull = prior.pull(noise);
-    let gradient = Vector4::from_fn(|k, _| found.noise_gradient[k] + pull[k].0);
-    let information = Matrix4::from_fn(|i, j| found.noise_information[i][j] + if i == j { pull[i].1 } else { 0.0 });
+    let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+    let information =
+        found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
     let Some(step) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else { return 0.0 };
     let tamed = pace.tamed(step);
     for (variance, by) in noise.variance.iter_mut().zip(tamed.iter()) {

@@ -14,6 +14,7 @@ mod filter;
 mod fit;
 mod model;
 mod noise;
+mod normal;
 mod records;
 mod thinning;
 
