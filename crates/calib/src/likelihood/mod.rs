@@ -17,6 +17,8 @@ mod noise;
 mod normal;
 mod records;
 mod thinning;
+#[cfg(test)]
+mod tests;
 
 pub use evidence::{Evidence, Information};
 pub use filter::{Innovation, Pass};
