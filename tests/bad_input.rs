@@ -231,7 +231,7 @@ fn a_sweep_that_cannot_be_run_is_refused_before_it_runs() {
 fn an_effect_that_needs_steps_says_what_to_set() {
     let temp = tempfile::tempdir().expect("a temporary folder");
     let at = temp.path();
-    let eccentric = "[[effect]]\nkind = \"wheel_eccentricity\"\nwheel = \"left\"\namplitude = 0.01\nphase_rad = 0.0\n\n[[protocol]]";
+    let eccentric = "[[effect]]\nkind = \"wheel_eccentricity\"\nleft_amplitude = 0.01\n\n[[protocol]]";
     fs::write(at.join("s.toml"), paper().replacen("[[protocol]]", eccentric, 1)).expect("written");
     for command in ["simulate", "sweep"] {
         let message = refused(at, &[command, "s.toml", "--out", "new"]);

@@ -24,6 +24,8 @@ pub struct Interval<'r> {
     pub wheel_separation_m: f64,
     /// Angle of each wheel at the start, by its counter, radians: its phase where the log is continuous.
     pub wheel_rad: Wheels<f64>,
+    /// Turn of each wheel in the interval, by its counter, radians.
+    pub turned_rad: Wheels<f64>,
     /// Where the robot is at the start, by the counts and what the instrument saw.
     pub world_from_body: Pose,
     /// How far the centre went in the runs before and in this one, metres: what wears with distance.
@@ -101,7 +103,7 @@ pub trait ModelTerm: Send {
         let _ = run;
     }
 
-    /// Derivative of the interval's motion, in the body's frame at its start (x, y, θ), by each parameter, at zero size. `gradient` is as long as
+    /// Derivative of the interval's motion by each parameter, at zero size: along and across its middle's heading, and its turn (x, y, θ). `gradient` is as long as
     /// [`Self::parameters`] and comes in as zeros.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let _ = (interval, gradient);

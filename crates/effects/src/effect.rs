@@ -1,7 +1,6 @@
 //! What every effect of the catalogue offers.
 
-use kinematics::{DriveGeometry, Side, Wheels};
-use serde::{Deserialize, Serialize};
+use kinematics::DriveGeometry;
 
 use crate::forward::Forward;
 use crate::hypothesis::Hypothesis;
@@ -34,6 +33,26 @@ impl EffectError {
         must_be: &'static str,
     ) -> Result<(), Self> {
         if holds { Ok(()) } else { Err(Self::OutOfRange { id, parameter, value, must_be }) }
+    }
+
+    /// An error unless every value is finite.
+    pub(crate) fn unless_finite<const N: usize>(id: &'static str, sizes: [(&'static str, f64); N]) -> Result<(), Self> {
+        sizes.into_iter().try_for_each(|(name, value)| Self::unless(value.is_finite(), id, name, value, "finite"))
+    }
+
+    /// An error unless every value is finite and 0 or more.
+    pub(crate) fn unless_sizes<const N: usize>(id: &'static str, sizes: [(&'static str, f64); N]) -> Result<(), Self> {
+        let holds = |value: f64| value.is_finite() && value >= 0.0;
+        sizes.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "0 or more"))
+    }
+
+    /// An error unless every value is finite and positive.
+    pub(crate) fn unless_positive<const N: usize>(
+        id: &'static str,
+        sizes: [(&'static str, f64); N],
+    ) -> Result<(), Self> {
+        let holds = |value: f64| value.is_finite() && value > 0.0;
+        sizes.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "positive"))
     }
 }
 
@@ -76,31 +95,5 @@ pub trait PhysicalEffect {
     {
         let _ = sizes;
         None
-    }
-}
-
-/// Which wheels an effect touches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Which {
-    /// The left wheel alone.
-    Left,
-    /// The right wheel alone.
-    Right,
-    /// Both wheels.
-    Both,
-}
-
-impl Which {
-    /// Does it touch this wheel?
-    #[must_use]
-    pub const fn includes(self, side: Side) -> bool {
-        matches!((self, side), (Self::Both, _) | (Self::Left, Side::Left) | (Self::Right, Side::Right))
-    }
-
-    /// `value` for the wheels touched and 0 for the others.
-    #[must_use]
-    pub fn scaled(self, value: f64) -> Wheels<f64> {
-        Wheels::from_sides(|side| if self.includes(side) { value } else { 0.0 })
     }
 }

@@ -4,6 +4,7 @@
 //! stage has filled its own fields and all earlier ones when its hook is called; a hook changes the fields of its stage only. A hook that is
 //! exact only for short steps says so in [`Forward::needs_stepping`], and the closed form then refuses the scenario.
 
+use dataset::RunInfo;
 use kinematics::{Pose, Wheels};
 
 use crate::stream::Stream;
@@ -78,10 +79,27 @@ pub struct SampleClock {
 }
 
 /// Both counters' values as they go into a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readout {
     /// Cumulative counts.
     pub ticks: Wheels<i64>,
+    /// Nominal travel for one of the controller's counts, metres.
+    pub m_per_count: Wheels<f64>,
+    /// Is the row written at all?
+    pub written: bool,
+}
+
+/// A run's place in its session.
+#[derive(Debug)]
+pub struct RunStart<'r> {
+    /// Which run of the session it is, from 0.
+    pub number: u32,
+    /// When it starts on the session's clock, seconds.
+    pub session_s: f64,
+    /// How far the drive's centre went in the runs before, metres.
+    pub session_m: f64,
+    /// What the record will say of the run: covariates go here.
+    pub info: &'r mut RunInfo,
 }
 
 /// What the outside instrument sees of the robot at an instant.
@@ -97,6 +115,8 @@ pub struct Sighting {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(clippy::struct_excessive_bools)] // one a hook
 pub struct Hooks {
+    /// [`Forward::begin_run`].
+    pub begin_run: bool,
     /// [`Forward::start_run`].
     pub start_run: bool,
     /// [`Forward::start_motion`].
@@ -128,6 +148,7 @@ impl Hooks {
 
     const fn each(acts: bool) -> Self {
         Self {
+            begin_run: acts,
             start_run: acts,
             start_motion: acts,
             command: acts,
@@ -147,6 +168,11 @@ pub trait Forward: Send {
     /// Which of the hooks below do anything: all, unless the effect says otherwise.
     fn hooks(&self) -> Hooks {
         Hooks::ALL
+    }
+
+    /// A run begins, at its place in the session; before [`Self::start_run`].
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        let _ = run;
     }
 
     /// Draws what is drawn once a run and keeps the stream for what is drawn later.

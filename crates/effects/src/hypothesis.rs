@@ -4,7 +4,8 @@
 //! or a decay length, is one of a few shapes. Gross faults rewrite the records ([`Hypothesis::Records`]). What only scatters has no mean: the checks of a fit
 //! show it ([`Hypothesis::Scatter`]).
 
-use dataset::{Dataset, ModelTerm};
+use dataset::{Dataset, Interval, ModelTerm, NominalRobot, Run, WheelLog};
+use kinematics::{Pose, Twist, Wheels};
 
 /// How data would show an effect.
 pub enum Hypothesis {
@@ -34,6 +35,12 @@ impl Shape {
     pub fn plain(term: impl ModelTerm + 'static) -> Vec<Self> {
         vec![Self { held: Vec::new(), term: Box::new(term) }]
     }
+
+    /// A term at each of several values of one shape parameter.
+    #[must_use]
+    pub fn over<T: ModelTerm + 'static>(name: &'static str, values: &[f64], term: impl Fn(f64) -> T) -> Vec<Self> {
+        values.iter().map(|&value| Self { held: vec![(name, value)], term: Box::new(term(value)) }).collect()
+    }
 }
 
 /// Records without a fault.
@@ -51,6 +58,47 @@ pub(crate) fn size(sizes: &[(&str, f64)], name: &str) -> Option<f64> {
     sizes.iter().find(|(of, _)| *of == name).map(|(_, size)| *size)
 }
 
+/// A motion in the room, metres along its axes, along and across the middle of an interval.
+pub(crate) fn in_room(interval: &Interval<'_>, [x_m, y_m]: [f64; 2]) -> Pose {
+    let (sin, cos) = (interval.world_from_body.theta_rad + 0.5 * interval.increment().turn_rad).sin_cos();
+    Pose::new(cos * x_m + sin * y_m, cos * y_m - sin * x_m, 0.0)
+}
+
+/// Every run of a dataset with its wheels' record changed.
+///
+/// `columns` takes both wheels' cumulative counts or angles of a run, `twist` the twist of a row where that is all that a robot reports.
+pub(crate) fn rewrite_wheels(
+    dataset: &Dataset,
+    mut columns: impl FnMut(&mut WheelLog),
+    twist: impl Fn(Twist) -> Twist,
+) -> Dataset {
+    let mut records = dataset.clone();
+    for Run { odometry, .. } in &mut records.runs {
+        if let WheelLog::Twist { v_mps, omega_radps } = &mut odometry.wheels {
+            for (v_m_s, omega_rad_s) in v_mps.iter_mut().zip(omega_radps) {
+                let turned = twist(Twist { v_m_s: *v_m_s, omega_rad_s: *omega_rad_s });
+                (*v_m_s, *omega_rad_s) = (turned.v_m_s, turned.omega_rad_s);
+            }
+        } else {
+            columns(&mut odometry.wheels);
+        }
+    }
+    records
+}
+
+/// A twist whose wheels, by the nominal drive, turn otherwise; the twist itself where the drive is not physical.
+pub(crate) fn by_wheels(robot: &NominalRobot, twist: Twist, change: impl Fn(Wheels<f64>) -> Wheels<f64>) -> Twist {
+    robot.geometry().map_or(twist, |geometry| geometry.twist(change(geometry.wheel_speed_m_s(twist))))
+}
+
+/// The middle of several values, or `None` of none.
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    let (low, high) = (values.get(n.checked_sub(1)? / 2)?, values.get(n / 2)?);
+    Some(0.5 * (low + high))
+}
+
 /// What a scatter does to a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sign {
@@ -66,4 +114,6 @@ pub enum Sign {
     ScatterWithTurn,
     /// Errors that grow with the speed at the instant of a look.
     ScatterWithSpeed,
+    /// Errors of looks at a robot that creeps, and of none at a fast one.
+    TailsAtLowSpeed,
 }

@@ -11,8 +11,8 @@ mod forward;
 mod hypothesis;
 mod stream;
 
-pub use effect::{EffectError, PhysicalEffect, Which};
-pub use forward::{Command, Forward, Readout, SampleClock, Sighting, Step};
+pub use effect::{EffectError, PhysicalEffect};
+pub use forward::{Command, Forward, Hooks, Readout, RunStart, SampleClock, Sighting, Step};
 pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
 pub use stream::{Address, Stream, StreamName};
 
@@ -106,13 +106,40 @@ contents! {
     contact_patch_wheelbase::ContactPatchWheelbase,
     backlash::Backlash,
     wheel_eccentricity::WheelEccentricity,
+    load_transfer::LoadTransfer,
+    payload_compression::PayloadCompression,
+    thermal_drift::ThermalDrift,
+    wear::Wear,
+    direction_asymmetry::DirectionAsymmetry,
     slip_speed::SlipSpeed,
     slip_acceleration::SlipAcceleration,
     traction_loss::TractionLoss,
+    stick_slip::StickSlip,
+    bumps::Bumps,
+    turn_rate_wheelbase::TurnRateWheelbase,
+    lateral_skid::LateralSkid,
+    castor_kick::CastorKick,
+    castor_drag::CastorDrag,
+    floor_slope::FloorSlope,
+    carpet_nap::CarpetNap,
+    encoder_cycle::EncoderCycle,
     missed_counts::MissedCounts,
     sampling_skew::SamplingSkew,
+    interval_error::IntervalError,
+    clock_rate::ClockRate,
+    time_unit::TimeUnit,
+    low_speed_truncation::LowSpeedTruncation,
+    reversed_wheel::ReversedWheel,
+    wrong_counts_per_turn::WrongCountsPerTurn,
     quantization::Quantization,
+    dropped_samples::DroppedSamples,
     counter_wrap::CounterWrap,
+    torn_read::TornRead,
+    swapped_wheels::SwappedWheels,
+    truth_latency::TruthLatency,
+    truth_lever_arm::TruthLeverArm,
+    truth_yaw::TruthYaw,
+    truth_correlated_noise::TruthCorrelatedNoise,
     truth_outliers::TruthOutliers,
 }
 

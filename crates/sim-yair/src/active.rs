@@ -1,6 +1,6 @@
 //! The effects at work in a simulated robot, each called at the stages at which it acts and at no other.
 
-use effects::{Command, Forward, Readout, SampleClock, Sighting, Step, StreamName};
+use effects::{Command, Forward, Readout, RunStart, SampleClock, Sighting, Step, StreamName};
 
 /// Effects in the order in which they act.
 pub(crate) struct ActiveEffects {
@@ -11,6 +11,7 @@ pub(crate) struct ActiveEffects {
 /// Who acts at which hook: positions, in order.
 #[derive(Debug, Default)]
 struct Roster {
+    begin_run: Vec<usize>,
     start_run: Vec<usize>,
     start_motion: Vec<usize>,
     command: Vec<usize>,
@@ -45,6 +46,7 @@ impl ActiveEffects {
         for (position, (_, effect)) in effects.iter().enumerate() {
             let hooks = effect.hooks();
             for (acts, roster) in [
+                (hooks.begin_run, &mut at.begin_run),
                 (hooks.start_run, &mut at.start_run),
                 (hooks.start_motion, &mut at.start_motion),
                 (hooks.command, &mut at.command),
@@ -74,6 +76,8 @@ impl ActiveEffects {
     }
 
     calls! {
+        /// A run begins, at its place in the session.
+        begin_run(run: RunStart<'_>);
         /// A motion begins.
         start_motion();
         /// What the wheels are told.

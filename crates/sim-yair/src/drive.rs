@@ -22,6 +22,8 @@ const SAME_INSTANT_S: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(crate) struct DriveSetup {
     pub(crate) counts_per_rad: f64,
+    /// Nominal travel for one count.
+    pub(crate) m_per_count: Wheels<f64>,
     pub(crate) nominal_radius_m: Wheels<f64>,
     pub(crate) true_radius_m: Wheels<f64>,
     pub(crate) wheel_separation_m: f64,
@@ -60,17 +62,22 @@ pub(crate) struct Drive<'a> {
     wheel_angle_rad: Wheels<f64>,
     /// What each contact has gone over the ground, metres.
     ground_m: Wheels<f64>,
+    /// What the drive's centre has gone, forward and backward, metres.
+    way_m: f64,
     sensitivity: Wheels<f64>,
     streams: &'a mut DriveStreams,
     log: Option<LogClock>,
     /// When the next instrument looks by itself.
     next_look_s: f64,
+    /// The instant of the last row, by the true clock.
+    last_row_s: f64,
 }
 
 /// The robot's own log: which row is due and which of its two readings are done.
 struct LogClock {
     interval_s: f64,
     rows: u32,
+    due_s: f64,
     pending: SampleClock,
     read: Wheels<Option<i64>>,
 }
@@ -80,7 +87,7 @@ impl LogClock {
         let t_s = f64::from(rows) * interval_s;
         let mut pending = SampleClock { stamp_s: t_s, read_s: Wheels::both(t_s) };
         effects.clock(&mut pending);
-        Self { interval_s, rows, pending, read: Wheels::both(None) }
+        Self { interval_s, rows, due_s: t_s, pending, read: Wheels::both(None) }
     }
 
     fn next_read_s(&self) -> f64 {
@@ -112,15 +119,22 @@ impl<'a> Drive<'a> {
             world_from_body: start.world_from_body.into(),
             wheel_angle_rad: start.counts.map(|counts| counts / setup.counts_per_rad),
             ground_m: Wheels::both(0.0),
+            way_m: 0.0,
             sensitivity: Wheels::both(1.0),
             streams,
             log,
             next_look_s,
+            last_row_s: f64::NEG_INFINITY,
         }
     }
 
     pub(crate) const fn world_from_body(&self) -> Pose {
         self.world_from_body.pose()
+    }
+
+    /// How long the run has taken, seconds, and how far the drive's centre has gone, metres.
+    pub(crate) const fn so_far(&self) -> (f64, f64) {
+        (self.t_s, self.way_m)
     }
 
     /// Performs one motion and, where the counters have moved on, writes the row of its end.
@@ -270,6 +284,7 @@ impl<'a> Drive<'a> {
         }
         self.ground_m = self.ground_m.zip_with(travel_m, |sum_m, travel_m| sum_m + travel_m);
         let mut increment = Increment::from_travel(travel_m, step.wheel_separation_m);
+        self.way_m += increment.distance_m.abs();
         increment.turn_rad += step.extra_turn_rad;
         let mut world_from_body = self.world_from_body * increment.scattered_arc(along_m, across_m);
         world_from_body.x_m += step.creep_m[0];
@@ -316,34 +331,36 @@ impl<'a> Drive<'a> {
             }
         }
         if let (Some(left), Some(right)) = (log.read.left, log.read.right) {
-            let stamp_s = log.pending.stamp_s;
+            let (due_s, stamp_s) = (log.due_s, log.pending.stamp_s);
             *log = LogClock::schedule(log.interval_s, log.rows + 1, self.effects);
-            if self.row_is_due(stamp_s) {
-                self.write_row(stamp_s, Wheels { left, right });
-            }
+            self.write_row(due_s, stamp_s, Wheels { left, right });
         }
     }
 
-    /// The row of a standstill: both counters rest, so that neither clock nor skew matters.
+    /// The row of a standstill: both counters rest, so that it does not matter when each is read, but only what the clock shows.
     #[inline]
     fn write_standing_row(&mut self) {
-        if self.row_is_due(self.t_s) {
+        if self.t_s > self.last_row_s + SAME_INSTANT_S {
+            let mut sample = SampleClock { stamp_s: self.t_s, read_s: Wheels::both(self.t_s) };
+            self.effects.clock(&mut sample);
             let counts = self.actuator.counts();
-            self.write_row(self.t_s, counts);
+            self.write_row(self.t_s, sample.stamp_s, counts);
         }
     }
 
-    /// Is the last row of another instant?
+    /// The row of an instant, unless the last row is as late.
     #[inline]
-    fn row_is_due(&self, t_s: f64) -> bool {
-        self.run.odometry.t_s.last().is_none_or(|last_s| t_s > last_s + SAME_INSTANT_S)
-    }
-
-    #[inline]
-    fn write_row(&mut self, t_s: f64, counts: Wheels<i64>) {
-        let mut readout = Readout { ticks: counts };
+    fn write_row(&mut self, due_s: f64, stamp_s: f64, counts: Wheels<i64>) {
+        if due_s <= self.last_row_s + SAME_INSTANT_S {
+            return;
+        }
+        self.last_row_s = due_s;
+        let mut readout = Readout { ticks: counts, m_per_count: self.setup.m_per_count, written: true };
         self.effects.readout(&mut readout);
-        self.run.odometry.t_s.push(t_s);
+        if !readout.written {
+            return;
+        }
+        self.run.odometry.t_s.push(stamp_s);
         if let WheelLog::Ticks(ticks) = &mut self.run.odometry.wheels {
             ticks.left.push(readout.ticks.left);
             ticks.right.push(readout.ticks.right);

@@ -1,7 +1,7 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
 use dataset::{MarkedPoint, MotionProgram, NominalRobot, Platform, Run, RunInfo, TruthNoise, WheelLog};
-use effects::{Address, EffectError, Forward, Stream, StreamName};
+use effects::{Address, EffectError, Forward, RunStart, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use scenario::{Engine, Instrument, Scenario};
 
@@ -57,6 +57,14 @@ pub struct SimulatedRobot {
     streams: DriveStreams,
     observers: Vec<Observer>,
     last_ends: (Pose, Pose),
+    session: Session,
+}
+
+/// What has passed since the first run of a trial.
+#[derive(Debug, Clone, Copy, Default)]
+struct Session {
+    t_s: f64,
+    way_m: f64,
 }
 
 impl SimulatedRobot {
@@ -100,6 +108,7 @@ impl SimulatedRobot {
         nominal.ticks_per_rev = nominal.ticks_per_rev.map(|counts| counts / f64::from(counts_per_tick));
         let effects = ActiveEffects::new(effects);
         let address = Address { seed, point: 0, trial, run: 0 };
+        let counts_per_rad = scenario.robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
         let (geometry, nominal_geometry) = (scenario.true_geometry()?, scenario.nominal_geometry()?);
         let robot = Self {
             nominal,
@@ -108,7 +117,8 @@ impl SimulatedRobot {
             engine: scenario.engine,
             placement: scenario.placement,
             setup: DriveSetup {
-                counts_per_rad: scenario.robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU,
+                counts_per_rad,
+                m_per_count: nominal_geometry.m_per_rad().map(|m_per_rad| m_per_rad / counts_per_rad),
                 nominal_radius_m: nominal_geometry.m_per_rad(),
                 true_radius_m: geometry.m_per_rad(),
                 wheel_separation_m: geometry.wheel_separation_m(),
@@ -131,6 +141,7 @@ impl SimulatedRobot {
                 .map(|(position, &instrument)| Observer::new(instrument, position, &address))
                 .collect(),
             last_ends: (Pose::IDENTITY, Pose::IDENTITY),
+            session: Session::default(),
         };
         // The controllers check themselves once, before anything is driven.
         ServoPair::new(&robot.robot, Wheels::both(0.5), 1e-3)?;
@@ -177,7 +188,15 @@ impl SimulatedRobot {
     pub fn drive_plan_into(&mut self, plan: &Plan, run: &mut Run) -> Result<(), SimulationError> {
         // The streams first, all at once: none waits for another's draws.
         let streams = self.address.streams();
+        let number = self.address.run;
         self.address.run += 1;
+        if number == 0 {
+            self.session = Session::default();
+        }
+        empty(run, &plan.program);
+        let Session { t_s: session_s, way_m: session_m } = self.session;
+        run.info.start_s = Some(session_s);
+        self.effects.begin_run(&mut RunStart { number, session_s, session_m, info: &mut run.info });
         self.effects.start_run(|name| streams.stream(name));
         for observer in &mut self.observers {
             observer.restart(|name| streams.stream(name));
@@ -193,7 +212,6 @@ impl SimulatedRobot {
                 Actuator::Stepping(Box::new(ServoPair::new(&self.robot, start.counts, step_s)?))
             }
         };
-        empty(run, &plan.program);
 
         let mut drive = Drive::start(
             &self.setup,
@@ -208,6 +226,9 @@ impl SimulatedRobot {
             drive.perform(motion)?;
         }
         drive.stand();
+        let (t_s, way_m) = drive.so_far();
+        self.session.t_s += t_s;
+        self.session.way_m += way_m;
         self.last_ends = (start.world_from_body, drive.world_from_body());
         Ok(())
     }
@@ -266,6 +287,7 @@ fn empty(run: &mut Run, program: &MotionProgram) {
     }
     run.info.protocol = Some(program.protocol);
     run.info.settings = program.settings;
+    run.info.covariates.clear();
     run.odometry.t_s.clear();
     if !run.odometry.extra.is_empty() {
         run.odometry.extra.clear();

@@ -2,62 +2,108 @@
 //!
 //! Model: the play operator: the wheel rests until the shaft has crossed the gap, then follows at its edge. Signature: each reversal of a wheel loses
 //! the whole gap of travel. Observability: reversals of one wheel; a corner turned on the spot reverses one wheel. Alias: `castor_kick`.
-//! Reference: the play operator, Krasnosel'skii & Pokrovskii 1983.
+//! Reference: the play operator, Krasnosel'skii & Pokrovskii 1983; 0.4 to 2.6 mm at wheels of 50 mm radius, derived from teeth.
 
-use kinematics::{Side, Wheels};
+use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{EffectError, PhysicalEffect, Which};
-use crate::forward::{Forward, Step};
-use crate::hypothesis::Hypothesis;
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::stream::Stream;
 
-/// Play of one wheel or of both.
+/// Gaps that are tried, metres at the tread.
+const WIDTH_M: [f64; 3] = [0.5e-3, 1.0e-3, 2.0e-3];
+
+/// Play of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {
-    /// Which wheels have play.
-    pub wheel: Which,
-    /// Whole width of the gap, radians at the wheel: what a reversal loses.
-    pub gap_rad: f64,
+    /// Whole width of the left gap, metres at the tread: what a reversal loses.
+    #[serde(default)]
+    pub left_gap_m: f64,
+    /// The same of the right gap.
+    #[serde(default)]
+    pub right_gap_m: f64,
 }
 
 impl PhysicalEffect for Backlash {
     fn check(&self) -> Result<(), EffectError> {
-        let holds = self.gap_rad.is_finite() && self.gap_rad >= 0.0;
-        EffectError::unless(holds, "backlash", "gap_rad", self.gap_rad, "0 or more")
+        EffectError::unless_sizes("backlash", [("left_gap_m", self.left_gap_m), ("right_gap_m", self.right_gap_m)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, lead_rad: Wheels::both(0.0) }))
+        let half_gap_m = Wheels { left: 0.5 * self.left_gap_m, right: 0.5 * self.right_gap_m };
+        Some(Box::new(State { half_gap_m, lead_m: Wheels::both(0.0) }))
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Silent
+        Hypothesis::Terms(Shape::over("width_m", &WIDTH_M, |width_m| Term { width_m, lead: Wheels::both(0.0) }))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { left_gap_m: size(sizes, "left_gap_m")?, right_gap_m: size(sizes, "right_gap_m")? })
     }
 }
 
 struct State {
-    size: Backlash,
+    half_gap_m: Wheels<f64>,
     /// How far the shaft is ahead of the wheel, within ± half of the gap.
-    lead_rad: Wheels<f64>,
+    lead_m: Wheels<f64>,
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, wheel: true, ..Hooks::NONE }
+    }
+
     fn start_run(&mut self, mut stream: Stream) {
         // Where in its gap the wheel was left, nobody knows.
-        let half_gap_rad = 0.5 * self.size.gap_rad;
-        self.lead_rad = Wheels::from_sides(|_| stream.uniform_about_zero(half_gap_rad));
+        self.lead_m = Wheels::from_sides(|side| stream.uniform_about_zero(self.half_gap_m[side]));
     }
 
     fn wheel(&mut self, step: &mut Step) {
-        let half_gap_rad = 0.5 * self.size.gap_rad;
         for side in Side::BOTH {
-            if self.size.wheel.includes(side) {
-                let lead_rad = self.lead_rad[side] + step.wheel_rad[side];
-                self.lead_rad[side] = lead_rad.clamp(-half_gap_rad, half_gap_rad);
-                step.wheel_rad[side] = lead_rad - self.lead_rad[side];
+            if self.half_gap_m[side] > 0.0 {
+                let m_per_rad = step.nominal_radius_m[side];
+                let lead_m = self.lead_m[side] + step.wheel_rad[side] * m_per_rad;
+                self.lead_m[side] = lead_m.clamp(-self.half_gap_m[side], self.half_gap_m[side]);
+                step.wheel_rad[side] = (lead_m - self.lead_m[side]) / m_per_rad;
             }
+        }
+    }
+}
+
+/// A gap of the width tried, in its widths: what the wheel does not follow, for each unit of the true gap. Reversals that do not cross it, such as the last
+/// counts before a standstill, cost what they take up.
+struct Term {
+    width_m: f64,
+    /// How far the counter is ahead of the wheel; half-way where a run begins, as nobody knows.
+    lead: Wheels<f64>,
+}
+
+impl ModelTerm for Term {
+    /// Plausible: 2.6 mm, the upper end of what was derived.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[
+            TermParameter { name: "left_gap_m", unit: "m", plausible: 2.6e-3 },
+            TermParameter { name: "right_gap_m", unit: "m", plausible: 2.6e-3 },
+        ]
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        self.lead = Wheels::both(0.0);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        for (side, gradient) in Side::BOTH.into_iter().zip(gradient) {
+            let before = self.lead[side];
+            let free = before + interval.travel_m[side] / self.width_m;
+            self.lead[side] = free.clamp(-0.5, 0.5);
+            let mut lost = Wheels::both(0.0);
+            lost[side] = before - self.lead[side];
+            *gradient = interval.change(lost);
         }
     }
 }
@@ -69,20 +115,23 @@ mod tests {
 
     #[test]
     fn a_reversal_loses_the_gap_and_only_on_its_wheel() {
-        let mut state = State { size: Backlash { wheel: Which::Left, gap_rad: 0.02 }, lead_rad: Wheels::both(0.01) };
+        let half_gap_m = Wheels { left: 0.8e-3, right: 0.0 };
+        let mut state = State { half_gap_m, lead_m: half_gap_m };
+        let gap_rad = 1.6e-3 / 0.08;
         let mut turn = |shaft_rad| {
             let mut step = specimen_step();
             step.wheel_rad = Wheels::both(shaft_rad);
             state.wheel(&mut step);
             step.wheel_rad
         };
-        assert_eq!(turn(1.0).left, 1.0);
+        // Rounding of 0.08 m and back.
+        assert!((turn(1.0).left - 1.0).abs() < 1e-15);
         let back = turn(-1.0);
-        assert!((back.left + 0.98).abs() < 1e-15, "{back:?}");
+        assert!((back.left + 1.0 - gap_rad).abs() < 1e-15, "{back:?}");
         assert_eq!(back.right, -1.0);
-        assert_eq!(turn(-1.0).left, -1.0);
+        assert!((turn(-1.0).left + 1.0).abs() < 1e-15);
         // In small steps the same gap is lost: the wheel rests first.
         let sum: f64 = (0..1000).map(|_| turn(1e-3).left).sum();
-        assert!((sum - 0.98).abs() < 1e-12, "{sum}");
+        assert!((sum - 1.0 + gap_rad).abs() < 1e-12, "{sum}");
     }
 }

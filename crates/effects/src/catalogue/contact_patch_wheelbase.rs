@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Sign};
+use crate::hypothesis::{Hypothesis, Sign, size};
 use crate::stream::Stream;
 
 /// Scatter of the effective wheelbase.
@@ -51,6 +51,12 @@ impl PhysicalEffect for ContactPatchWheelbase {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::ScatterWithTurn])
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        let slow = |name| size(sizes, name).unwrap_or(0.0);
+        let (slow_sigma_m, slow_length_m) = (slow("slow_sigma_m"), slow("slow_length_m"));
+        Some(Self { sigma_m: size(sizes, "sigma_m")?, slow_sigma_m, slow_length_m })
     }
 }
 

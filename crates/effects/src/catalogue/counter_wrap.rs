@@ -1,13 +1,14 @@
 //! `counter_wrap`: the log keeps only the low bits of the counter.
 //!
-//! Model: two's complement of `bits` bits. Signature: single jumps of 2^bits. A gross fault, tried before any fit.
-//! Observability: the record itself. Reference: the HCTL-1100's position register has 24 bits; microcontroller timers have 8, 16 or 32.
+//! Model: two's complement of `bits` bits. Signature: single jumps of 2^bits. A gross fault, tried before any fit: the records without it have the jumps
+//! taken out. Observability: the record itself. Alias: none. Reference: the HCTL-1100's position register has 24 bits; microcontroller timers have 8, 16 or 32.
 
+use dataset::{Dataset, WheelLog, suspected_wrap};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Readout};
-use crate::hypothesis::Hypothesis;
+use crate::forward::{Forward, Hooks, Readout};
+use crate::hypothesis::{Hypothesis, Rewriting, rewrite_wheels, size};
 
 /// Width of the recorded counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,7 +29,12 @@ impl PhysicalEffect for CounterWrap {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Silent
+        Hypothesis::Records(rewritings)
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
+        Some(Self { bits: size(sizes, "bits")? as u32 })
     }
 }
 
@@ -37,9 +43,51 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { readout: true, ..Hooks::NONE }
+    }
+
     fn readout(&mut self, readout: &mut Readout) {
         let unused = 64 - self.size.bits;
         readout.ticks = readout.ticks.map(|ticks| (ticks << unused) >> unused);
+    }
+}
+
+/// The counts unwrapped, for each width whose wrapping some run's counts show.
+fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+    let mut shown: Vec<u8> = Vec::new();
+    for run in &dataset.runs {
+        if let WheelLog::Ticks(ticks) = &run.odometry.wheels {
+            shown.extend([&ticks.left, &ticks.right].into_iter().filter_map(|column| suspected_wrap(column)));
+        }
+    }
+    shown.sort_unstable();
+    shown.dedup();
+    let without = |bits: u8| Rewriting {
+        sizes: vec![("bits", f64::from(bits))],
+        sentence: format!("the log keeps {bits} bits of the counters, which wrap"),
+        records: rewrite_wheels(
+            dataset,
+            |wheels| {
+                if let WheelLog::Ticks(ticks) = wheels {
+                    unwrap(&mut ticks.left, bits);
+                    unwrap(&mut ticks.right, bits);
+                }
+            },
+            |twist| twist,
+        ),
+    };
+    shown.into_iter().map(without).collect()
+}
+
+/// Takes whole turns of the counter out of every increment, to the nearest.
+fn unwrap(ticks: &mut [i64], bits: u8) {
+    let (turn, mut turns) = (1_i64 << bits, 0);
+    for k in 1..ticks.len() {
+        ticks[k] += turns;
+        let jumped = (ticks[k] - ticks[k - 1] + turn / 2).div_euclid(turn) * turn;
+        ticks[k] -= jumped;
+        turns -= jumped;
     }
 }
 
@@ -51,8 +99,16 @@ mod tests {
     #[test]
     fn the_low_bits_are_kept_with_their_sign() {
         let mut state = State { size: CounterWrap { bits: 24 } };
-        let mut readout = Readout { ticks: Wheels { left: (1 << 23) - 1, right: 1 << 23 } };
+        let ticks = Wheels { left: (1 << 23) - 1, right: 1 << 23 };
+        let mut readout = Readout { ticks, m_per_count: Wheels::both(1e-5), written: true };
         state.readout(&mut readout);
         assert_eq!(readout.ticks, Wheels { left: (1 << 23) - 1, right: -(1 << 23) });
+    }
+    #[test]
+    fn unwrapping_gives_the_counts_back() {
+        let counted: Vec<i64> = (0..2000).map(|k| if k < 1000 { 120 * k } else { 120_000 - 70 * (k - 1000) }).collect();
+        let mut shown: Vec<i64> = counted.iter().map(|&count| (count << 48) >> 48).collect();
+        unwrap(&mut shown, 16);
+        assert!(shown == counted);
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, size};
 
 /// Coarseness of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +29,11 @@ impl PhysicalEffect for Quantization {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Silent
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
+        Some(Self { counts_per_tick: size(sizes, "counts_per_tick")? as u32 })
     }
 }
 
@@ -58,7 +63,8 @@ mod tests {
     #[test]
     fn ticks_are_floors_on_both_sides_of_zero() {
         let mut state = State { size: Quantization { counts_per_tick: 80 } };
-        let mut readout = Readout { ticks: Wheels { left: 159, right: -1 } };
+        let ticks = Wheels { left: 159, right: -1 };
+        let mut readout = Readout { ticks, m_per_count: Wheels::both(1e-5), written: true };
         state.readout(&mut readout);
         assert_eq!(readout.ticks, Wheels { left: 1, right: -1 });
     }

@@ -4,24 +4,25 @@
 //! Observability: speed changes on straights. Alias: `slip_acceleration` of one wheel.
 //! Reference: two HCTL-1100 that share no sampling: δ up to one sample time, 0.06 to 2 ms.
 
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, SampleClock};
-use crate::hypothesis::Hypothesis;
+use crate::forward::{Forward, Hooks, SampleClock};
+use crate::hypothesis::{Hypothesis, Shape, size};
 
 /// Delay of the right reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SamplingSkew {
-    /// How much later the right counter is read, seconds.
+    /// How much later the right counter is read, seconds; negative when it is the earlier one.
     pub right_delay_s: f64,
 }
 
 impl PhysicalEffect for SamplingSkew {
     fn check(&self) -> Result<(), EffectError> {
-        let holds = self.right_delay_s.is_finite() && self.right_delay_s >= 0.0;
-        EffectError::unless(holds, "sampling_skew", "right_delay_s", self.right_delay_s, "0 or more")
+        EffectError::unless_finite("sampling_skew", [("right_delay_s", self.right_delay_s)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
@@ -29,7 +30,11 @@ impl PhysicalEffect for SamplingSkew {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Silent
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { right_delay_s: size(sizes, "right_delay_s")? })
     }
 }
 
@@ -38,7 +43,38 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { clock: true, ..Hooks::NONE }
+    }
+
     fn clock(&mut self, sample: &mut SampleClock) {
         sample.read_s.right += self.size.right_delay_s;
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 2 ms, one sample time of a slow controller.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "right_delay_s", unit: "s", plausible: 2e-3 }]
+    }
+
+    /// Of the right wheel's counts, its delay times the speed gained since the interval before came too early.
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let gained_m_s = interval.speed_m_s().right - interval.previous_speed_m_s().right;
+        gradient[0] = interval.change(Wheels { left: 0.0, right: -gained_m_s });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_right_reading_is_late() {
+        let mut sample = SampleClock { stamp_s: 1.0, read_s: Wheels::both(1.0) };
+        State { size: SamplingSkew { right_delay_s: 0.5 } }.clock(&mut sample);
+        assert_eq!(sample, SampleClock { stamp_s: 1.0, read_s: Wheels { left: 1.0, right: 1.5 } });
     }
 }

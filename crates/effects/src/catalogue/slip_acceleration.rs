@@ -4,11 +4,13 @@
 //! Observability: speed changes seen from outside. Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
 //! Reference: tyre slip stiffness; κ = v/(C_s g) with C_s = 20 to 40 gives 1 to 10 ms.
 
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Step};
-use crate::hypothesis::Hypothesis;
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
 
 /// Slip in proportion to acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,7 +30,11 @@ impl PhysicalEffect for SlipAcceleration {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Silent
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { kappa_s: size(sizes, "kappa_s")? })
     }
 }
 
@@ -37,6 +43,10 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { floor: true, ..Hooks::NONE }
+    }
+
     fn floor(&mut self, step: &mut Step) {
         let lost_m = step.contact_acceleration_m_s2().map(|a_m_s2| self.size.kappa_s * a_m_s2 * step.dt_s);
         step.travel_m = step.travel_m.zip_with(lost_m, |travel_m, lost_m| travel_m - lost_m);
@@ -44,6 +54,21 @@ impl Forward for State {
 
     fn needs_stepping(&self) -> Option<&'static str> {
         Some("the closed form starts and stops at once")
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 10 ms, the upper end of what slip stiffness gives.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "kappa_s", unit: "s", plausible: 0.01 }]
+    }
+
+    /// The change of the mean speeds from the interval before: summed over a start and a stop it is nothing, exactly.
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let gained_m_s = interval.speed_m_s().zip_with(interval.previous_speed_m_s(), |now, before| now - before);
+        gradient[0] = interval.change(gained_m_s.map(|gained_m_s| -gained_m_s));
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, Shape, size};
-use crate::forward::{Forward, Step};
+use crate::forward::{Forward, Hooks, Step};
 
 /// Slip in proportion to speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,10 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { floor: true, ..Hooks::NONE }
+    }
+
     fn floor(&mut self, step: &mut Step) {
         let slip = step.contact_speed_m_s().map(|speed_m_s| self.size.slip_s_m * speed_m_s.abs());
         step.travel_m = step.travel_m.zip_with(slip, |travel_m, slip| travel_m * (1.0 - slip));
@@ -57,11 +61,13 @@ struct Term;
 
 impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
+        // Plausible: 1 % at 0.5 m/s, the upper end of the rule of thumb.
         &[TermParameter { name: "slip_s_m", unit: "s/m", plausible: 0.02 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s(), |travel_m, speed_m_s| -travel_m * speed_m_s.abs()));
+        let lost_m = |travel_m: f64, speed_m_s: f64| travel_m * speed_m_s.abs();
+        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s(), lost_m).map(|lost_m| -lost_m));
     }
 }
 

@@ -8,8 +8,8 @@ use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Step};
-use crate::hypothesis::{Hypothesis, Sign};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Sign, size};
 
 /// Standard gravity, m/s² (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -45,6 +45,14 @@ impl PhysicalEffect for TractionLoss {
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::WayJumps])
     }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self {
+            static_friction: size(sizes, "static_friction")?,
+            kinetic_friction: size(sizes, "kinetic_friction")?,
+            stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
+        })
+    }
 }
 
 struct State {
@@ -62,6 +70,10 @@ impl State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_motion: true, floor: true, ..Hooks::NONE }
+    }
+
     fn start_motion(&mut self) {
         self.ground_m_s = Wheels::both(0.0);
         self.sliding = Wheels::both(false);

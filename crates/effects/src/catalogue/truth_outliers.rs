@@ -10,8 +10,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Sighting};
-use crate::hypothesis::{Hypothesis, Sign};
+use crate::forward::{Forward, Hooks, Sighting};
+use crate::hypothesis::{Hypothesis, Sign, size};
 use crate::stream::Stream;
 
 /// Gross errors of the outside instrument.
@@ -45,6 +45,11 @@ impl PhysicalEffect for TruthOutliers {
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::IsolatedLooks])
     }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        let (jump_m, jump_rad) = (size(sizes, "jump_m")?, size(sizes, "jump_rad")?);
+        Some(Self { probability: size(sizes, "probability")?, jump_m, jump_rad })
+    }
 }
 
 struct State {
@@ -53,6 +58,10 @@ struct State {
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, instrument: true, ..Hooks::NONE }
+    }
+
     fn start_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
     }

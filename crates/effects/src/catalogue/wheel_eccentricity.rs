@@ -2,61 +2,120 @@
 //!
 //! Model: rolling radius r(φ) = r (1 + ε sin(φ + φ₀)). Signature: e_dx and e_dθ locked to that wheel's phase, zero over whole turns.
 //! Observability: phase continuity and more than two samples a turn. Alias: `encoder_cycle` with one cycle a turn, exactly.
-//! Reference: geometry of a circular wheel on an offset axis, to first order in the offset.
+//! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a rule of thumb.
 
-use kinematics::{Side, sinc};
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{EffectError, PhysicalEffect, Which};
-use crate::forward::{Forward, Step};
-use crate::hypothesis::Hypothesis;
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
 
-/// Eccentricity of one wheel or of both.
+/// Eccentricity of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelEccentricity {
-    /// Which wheels are eccentric.
-    pub wheel: Which,
-    /// Offset of the axis over the radius (ε).
-    pub amplitude: f64,
-    /// Phase at wheel angle zero (φ₀), radians.
-    pub phase_rad: f64,
+    /// Offset of the left wheel's axis over its radius (ε).
+    #[serde(default)]
+    pub left_amplitude: f64,
+    /// Its phase at wheel angle zero (φ₀), radians.
+    #[serde(default)]
+    pub left_phase_rad: f64,
+    /// Offset of the right wheel's axis over its radius.
+    #[serde(default)]
+    pub right_amplitude: f64,
+    /// Its phase, radians.
+    #[serde(default)]
+    pub right_phase_rad: f64,
 }
 
 impl PhysicalEffect for WheelEccentricity {
     fn check(&self) -> Result<(), EffectError> {
-        let holds = self.amplitude >= 0.0 && self.amplitude < 1.0;
-        EffectError::unless(holds, "wheel_eccentricity", "amplitude", self.amplitude, "in [0, 1)")?;
-        EffectError::unless(self.phase_rad.is_finite(), "wheel_eccentricity", "phase_rad", self.phase_rad, "finite")
+        let id = "wheel_eccentricity";
+        for (name, value) in [("left_amplitude", self.left_amplitude), ("right_amplitude", self.right_amplitude)] {
+            EffectError::unless((0.0..1.0).contains(&value), id, name, value, "in [0, 1)")?;
+        }
+        let phases = [("left_phase_rad", self.left_phase_rad), ("right_phase_rad", self.right_phase_rad)];
+        EffectError::unless_finite(id, phases)
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State {
+            amplitude: Wheels { left: self.left_amplitude, right: self.right_amplitude },
+            phase_rad: Wheels { left: self.left_phase_rad, right: self.right_phase_rad },
+        }))
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Silent
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        let (left_sin, left_cos) = (size(sizes, "left_sin")?, size(sizes, "left_cos")?);
+        let (right_sin, right_cos) = (size(sizes, "right_sin")?, size(sizes, "right_cos")?);
+        Some(Self {
+            left_amplitude: left_sin.hypot(left_cos),
+            left_phase_rad: left_cos.atan2(left_sin),
+            right_amplitude: right_sin.hypot(right_cos),
+            right_phase_rad: right_cos.atan2(right_sin),
+        })
     }
 }
 
 struct State {
-    size: WheelEccentricity,
+    amplitude: Wheels<f64>,
+    phase_rad: Wheels<f64>,
 }
 
 impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { wheel: true, ..Hooks::NONE }
+    }
+
     /// The mean radius over the step, exactly: ∫sin over [φ, φ+Δ] is Δ·sin(φ+Δ/2)·sinc(Δ/2).
     fn wheel(&mut self, step: &mut Step) {
         for side in Side::BOTH {
-            if self.size.wheel.includes(side) {
-                let half_rad = 0.5 * step.wheel_rad[side];
-                let mean_sine = (step.wheel_angle_rad[side] + half_rad + self.size.phase_rad).sin() * sinc(half_rad);
-                step.radius_m[side] *= 1.0 + self.size.amplitude * mean_sine;
-            }
+            let half_rad = 0.5 * step.wheel_rad[side];
+            let mean_sine = (step.wheel_angle_rad[side] + half_rad + self.phase_rad[side]).sin() * sinc(half_rad);
+            step.radius_m[side] *= 1.0 + self.amplitude[side] * mean_sine;
         }
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
         Some("the path bends within a wheel turn")
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 1 %, the upper end of the rule of thumb.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[
+            TermParameter { name: "left_sin", unit: "1", plausible: 0.01 },
+            TermParameter { name: "left_cos", unit: "1", plausible: 0.01 },
+            TermParameter { name: "right_sin", unit: "1", plausible: 0.01 },
+            TermParameter { name: "right_cos", unit: "1", plausible: 0.01 },
+        ]
+    }
+
+    /// From angle to angle, so that whole turns telescope: ∫sin φ dφ = cos φ₁ − cos φ₂, ∫cos φ dφ = sin φ₂ − sin φ₁.
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        for (side, gradient) in Side::BOTH.into_iter().zip(gradient.chunks_exact_mut(2)) {
+            let turned_rad = interval.turned_rad[side];
+            if turned_rad == 0.0 {
+                continue;
+            }
+            let m_per_rad = interval.travel_m[side] / turned_rad;
+            let (sin_before, cos_before) = interval.wheel_rad[side].sin_cos();
+            let (sin, cos) = (interval.wheel_rad[side] + turned_rad).sin_cos();
+            for (gradient, integral) in gradient.iter_mut().zip([cos_before - cos, sin - sin_before]) {
+                let mut travel_m = Wheels::both(0.0);
+                travel_m[side] = m_per_rad * integral;
+                *gradient = interval.change(travel_m);
+            }
+        }
     }
 }
 
@@ -67,7 +126,8 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn travel_m(from_rad: f64, turn_rad: f64, parts: u32) -> f64 {
-        let mut state = State { size: WheelEccentricity { wheel: Which::Right, amplitude: 0.01, phase_rad: 0.4 } };
+        let amplitude = Wheels { left: 0.0, right: 0.01 };
+        let mut state = State { amplitude, phase_rad: Wheels::both(0.4) };
         let part_rad = turn_rad / f64::from(parts);
         (0..parts)
             .map(|part| {

@@ -8,7 +8,7 @@ use kinematics::{DriveGeometry, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, size};
 
 /// Ratio of the diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -34,5 +34,9 @@ impl PhysicalEffect for WheelMismatch {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { right_over_left: size(sizes, "right_over_left")? })
     }
 }

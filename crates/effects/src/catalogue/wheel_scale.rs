@@ -8,7 +8,7 @@ use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, size};
 
 /// Common factor of both diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,5 +31,9 @@ impl PhysicalEffect for WheelScale {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { scale: size(sizes, "scale")? })
     }
 }

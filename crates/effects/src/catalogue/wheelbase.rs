@@ -8,7 +8,7 @@ use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, size};
 
 /// Ratio of the wheelbases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,5 +29,9 @@ impl PhysicalEffect for Wheelbase {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { ratio: size(sizes, "ratio")? })
     }
 }

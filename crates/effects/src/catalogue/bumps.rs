@@ -1,0 +1,125 @@
+//! `bumps`: cables, sills and crumbs that one wheel drives over.
+//!
+//! Model: each wheel meets bumps as a Poisson process along its way; over a bump of height h a wheel of radius r rolls about its edge and loses
+//! 2(r acos(1−h/r) − √(2rh−h²)) of way. Signature: isolated spikes of e_dθ, kurtosis. Observability: many looks. Alias: `traction_loss`.
+//! Reference: Borenstein & Feng 1995, whose test floor has ten cables of 9 to 10 mm; the loss is geometry of a rigid wheel.
+
+use kinematics::{Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::stream::Stream;
+
+/// Bumps on the floor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bumps {
+    /// How many each wheel meets per metre of its way, on average.
+    pub per_m: f64,
+    /// Height of a bump (h), metres.
+    pub height_m: f64,
+}
+
+impl PhysicalEffect for Bumps {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_sizes("bumps", [("per_m", self.per_m), ("height_m", self.height_m)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, stream: None, ahead_m: Wheels::both(f64::INFINITY) }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Scatter(&[Sign::HeadingJumps])
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { per_m: size(sizes, "per_m")?, height_m: size(sizes, "height_m")? })
+    }
+}
+
+struct State {
+    size: Bumps,
+    stream: Option<Stream>,
+    /// Way to the next bump of each wheel, metres.
+    ahead_m: Wheels<f64>,
+}
+
+/// Way that a wheel loses over a bump, metres; one as high as the wheel's axis is a wall, and counts as that high.
+fn lost_m(radius_m: f64, height_m: f64) -> f64 {
+    let height_m = height_m.min(radius_m);
+    2.0 * (radius_m * (1.0 - height_m / radius_m).acos() - (height_m * (2.0 * radius_m - height_m)).sqrt())
+}
+
+/// The way to the next event of a Poisson process.
+fn gap_m(stream: &mut Stream, per_m: f64) -> f64 {
+    -(1.0 - stream.uniform()).ln() / per_m
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, mut stream: Stream) {
+        self.ahead_m = Wheels::from_sides(|_| gap_m(&mut stream, self.size.per_m));
+        self.stream = Some(stream);
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let Some(stream) = &mut self.stream else { return };
+        for side in Side::BOTH {
+            let travel_m = step.travel_m[side];
+            self.ahead_m[side] -= travel_m.abs();
+            while self.ahead_m[side] < 0.0 {
+                self.ahead_m[side] += gap_m(stream, self.size.per_m);
+                step.travel_m[side] -= travel_m.signum() * lost_m(step.radius_m[side], self.size.height_m);
+            }
+        }
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        Some("a bump turns the robot where it lies")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use crate::{Address, StreamName};
+
+    #[test]
+    fn a_bump_costs_what_rolling_about_its_edge_costs() {
+        // To second order (2√2/3) r (h/r)^{3/2}, less a share of order h/r.
+        let r = 0.08_f64;
+        for height_m in [1e-4_f64, 1e-3] {
+            let leading_m = 8.0_f64.sqrt() / 3.0 * r * (height_m / r).powf(1.5);
+            assert!((lost_m(r, height_m) / leading_m - 1.0).abs() < height_m / r);
+        }
+        assert!((lost_m(r, 0.01) - 3.5e-3).abs() < 0.5e-3, "millimetres for UMBmark's cables");
+        assert_eq!(lost_m(r, 0.0), 0.0);
+    }
+
+    #[test]
+    fn wheels_meet_the_stated_number_each() {
+        let size = Bumps { per_m: 2.0, height_m: 0.005 };
+        let mut state = size.forward().expect("acts on the floor");
+        state.start_run(Address { seed: 4, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        let (mut met, way_m) = (Wheels::both(0.0), 5000.0);
+        for _ in 0..50_000 {
+            let mut step = specimen_step();
+            step.travel_m = Wheels::both(-way_m / 50_000.0);
+            let before_m = step.travel_m;
+            state.floor(&mut step);
+            let lost = lost_m(0.08, 0.005);
+            met = Wheels::from_sides(|side| met[side] + (step.travel_m[side] - before_m[side]) / lost);
+        }
+        // A Poisson number of 10 000: five standard deviations are 500. A loss in the wrong direction would count negative.
+        for side in Side::BOTH {
+            assert!((met[side] - 2.0 * way_m).abs() < 5.0 * (2.0 * way_m).sqrt(), "{met:?}");
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! `carpet_nap`: the pile of a carpet leans one way and takes the wheels with it.
+//!
+//! Model: a drift in the room in proportion to the way |Δs|, and a turn towards the nap's direction θ₀, ∝ sin(θ − θ₀) |Δs|.
+//! Signature: constant direction in the room, at any speed. Observability: the same way at several headings; two speeds against `floor_slope`.
+//! Alias: `floor_slope` that goes with the way, exactly. Reference: users' reports, mm/m to cm/m; a rule of thumb.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, sinc};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, in_room, size};
+
+/// Pull of a carpet.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CarpetNap {
+    /// Drift along the room's x per metre of way.
+    pub drift_x: f64,
+    /// Drift along the room's y per metre of way.
+    pub drift_y: f64,
+    /// Turn per metre of way in proportion to sin θ, rad/m.
+    pub yaw_sin_rad_m: f64,
+    /// Turn per metre of way in proportion to cos θ, rad/m.
+    pub yaw_cos_rad_m: f64,
+}
+
+impl PhysicalEffect for CarpetNap {
+    fn check(&self) -> Result<(), EffectError> {
+        let yaw = [("yaw_sin_rad_m", self.yaw_sin_rad_m), ("yaw_cos_rad_m", self.yaw_cos_rad_m)];
+        EffectError::unless_finite("carpet_nap", yaw)?;
+        EffectError::unless_finite("carpet_nap", [("drift_x", self.drift_x), ("drift_y", self.drift_y)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self {
+            drift_x: size(sizes, "drift_x")?,
+            drift_y: size(sizes, "drift_y")?,
+            yaw_sin_rad_m: size(sizes, "yaw_sin_rad_m")?,
+            yaw_cos_rad_m: size(sizes, "yaw_cos_rad_m")?,
+        })
+    }
+}
+
+struct State {
+    size: CarpetNap,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { floor: true, ..Hooks::NONE }
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let CarpetNap { drift_x, drift_y, yaw_sin_rad_m, yaw_cos_rad_m } = self.size;
+        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right).abs();
+        let half_rad = 0.5 * (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
+        let (sin, cos) = (step.world_from_body.theta_rad + half_rad).sin_cos();
+        step.creep_m[0] += drift_x * way_m;
+        step.creep_m[1] += drift_y * way_m;
+        step.extra_turn_rad += (yaw_sin_rad_m * sin + yaw_cos_rad_m * cos) * sinc(half_rad) * way_m;
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        (self.size.yaw_sin_rad_m != 0.0 || self.size.yaw_cos_rad_m != 0.0).then_some("its turn bends the path on the way")
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 1 cm/m, the upper end of what users report, and half a degree a metre.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[
+            TermParameter { name: "drift_x", unit: "1", plausible: 0.01 },
+            TermParameter { name: "drift_y", unit: "1", plausible: 0.01 },
+            TermParameter { name: "yaw_sin_rad_m", unit: "rad/m", plausible: 0.01 },
+            TermParameter { name: "yaw_cos_rad_m", unit: "rad/m", plausible: 0.01 },
+        ]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let increment = interval.increment();
+        let way_m = increment.distance_m.abs();
+        let heading_rad = interval.world_from_body.theta_rad + 0.5 * increment.turn_rad;
+        gradient[0] = in_room(interval, [way_m, 0.0]);
+        gradient[1] = in_room(interval, [0.0, way_m]);
+        gradient[2].theta_rad = way_m * heading_rad.sin();
+        gradient[3].theta_rad = way_m * heading_rad.cos();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use kinematics::Wheels;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn the_nap_pulls_the_same_way_at_every_heading_and_turns_by_it() {
+        let size = CarpetNap { drift_x: 0.002, drift_y: -0.001, yaw_sin_rad_m: 0.03, yaw_cos_rad_m: 0.0 };
+        for (heading_rad, turn_rad) in [(0.0, 0.0), (FRAC_PI_2, 0.03), (-FRAC_PI_2, -0.03)] {
+            let mut step = specimen_step();
+            step.world_from_body.theta_rad = heading_rad;
+            step.travel_m = Wheels::both(-1.0);
+            State { size }.floor(&mut step);
+            assert_eq!(step.creep_m, [0.002, -0.001]);
+            assert!((step.extra_turn_rad - turn_rad).abs() < 1e-17);
+        }
+    }
+}

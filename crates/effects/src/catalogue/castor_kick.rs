@@ -1,0 +1,186 @@
+//! `castor_kick`: after a reversal the castor flips over and pushes the tail aside.
+//!
+//! Model: e_dθ = ±K e^{−s/s₀} per s₀ of way s since the reversal, K in all. The castor leans towards the inside of the last turn and flips over on that
+//! side: the kick has that turn's sense; a castor that never leaned falls to either side. Signature: heading transients after reversals.
+//! Observability: reversals after turns to both sides. Alias: `backlash`, whose loss also comes with reversals. Needs a log finer than s₀.
+//! Reference: the castor's differential equation linearised, ψ' = −sin ψ/trail; 2 to 4 trail lengths, 0.1 to 2° a reversal, a rule of thumb.
+
+use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::stream::Stream;
+
+/// Ways that are tried for a flip, metres: 2 to 4 trails of 15 to 60 mm.
+const DECAY_M: [f64; 4] = [0.03, 0.06, 0.12, 0.24];
+
+/// The kick of a castor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CastorKick {
+    /// Turn that a reversal makes in all, with the sense of the last turn (K), radians.
+    pub kick_rad: f64,
+    /// Way over which it fades by 1/e (s₀), metres.
+    pub decay_m: f64,
+}
+
+impl PhysicalEffect for CastorKick {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite("castor_kick", [("kick_rad", self.kick_rad)])?;
+        EffectError::unless_positive("castor_kick", [("decay_m", self.decay_m)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, leant_rad: 0.0, sense: 0.0, swung_m: 0.0, ahead: None, since_m: None }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::over("decay_m", &DECAY_M, Term::new))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { kick_rad: size(sizes, "kick_rad")?, decay_m: size(sizes, "decay_m")? })
+    }
+}
+
+/// A turn that makes the castor lean: what straight driving wanders by is far less.
+const LEAN_RAD: f64 = 0.1;
+
+/// Way back that is a reversal: the last counts before a standstill are far less.
+const REVERSAL_M: f64 = 1e-3;
+
+struct State {
+    size: CastorKick,
+    leant_rad: f64,
+    /// Of the last turn: 1, −1, or 0 before any.
+    sense: f64,
+    swung_m: f64,
+    ahead: Option<bool>,
+    /// Way since the last reversal, where there was one.
+    since_m: Option<f64>,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, _stream: Stream) {
+        *self = Self { size: self.size, leant_rad: 0.0, sense: 0.0, swung_m: 0.0, ahead: None, since_m: None };
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
+        self.leant_rad += (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
+        if self.leant_rad.abs() > LEAN_RAD {
+            self.sense = self.leant_rad.signum();
+            self.leant_rad = self.sense * LEAN_RAD;
+        }
+        self.swung_m += way_m;
+        if self.swung_m.abs() > 0.5 * REVERSAL_M {
+            let ahead = self.swung_m > 0.0;
+            self.swung_m = 0.5 * REVERSAL_M * self.swung_m.signum();
+            if self.ahead.is_some_and(|before| before != ahead) {
+                self.since_m = Some(0.0);
+            }
+            self.ahead = Some(ahead);
+        }
+        if let Some(since_m) = &mut self.since_m {
+            let left = |way_m: f64| (-way_m / self.size.decay_m).exp();
+            let after_m = *since_m + way_m.abs();
+            step.extra_turn_rad += self.size.kick_rad * self.sense * (left(*since_m) - left(after_m));
+            *since_m = after_m;
+        }
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        Some("the heading changes within the first centimetres of a motion")
+    }
+}
+
+/// By the counts: which way the robot went, where it turned round, and to which side it had turned before.
+struct Term {
+    decay_m: f64,
+    /// Signed way and turn, each held within a band that its reversals must cross.
+    way_m: f64,
+    turn_rad: f64,
+    way_sense: f64,
+    turn_sense: f64,
+    /// What is left of the kick, 1 at the reversal.
+    left: f64,
+}
+
+impl Term {
+    const fn new(decay_m: f64) -> Self {
+        Self { decay_m, way_m: 0.0, turn_rad: 0.0, way_sense: 0.0, turn_sense: 0.0, left: 0.0 }
+    }
+}
+
+/// The side of a band at whose edge a drifting value is held, or the one before while it is inside.
+fn side(value: &mut f64, half_width: f64, before: f64) -> f64 {
+    if value.abs() < half_width {
+        return before;
+    }
+    *value = value.clamp(-half_width, half_width);
+    value.signum()
+}
+
+impl ModelTerm for Term {
+    /// Plausible: 2°, the upper end of the rule of thumb.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "kick_rad", unit: "rad", plausible: 0.035 }]
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        *self = Self::new(self.decay_m);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let increment = interval.increment();
+        self.turn_rad += increment.turn_rad;
+        self.turn_sense = side(&mut self.turn_rad, LEAN_RAD, self.turn_sense);
+        self.way_m += increment.distance_m;
+        let way_sense = side(&mut self.way_m, 0.5 * REVERSAL_M, self.way_sense);
+        if way_sense * self.way_sense < 0.0 {
+            self.left = 1.0;
+        }
+        self.way_sense = way_sense;
+        let faded = self.left * (-increment.distance_m.abs() / self.decay_m).exp();
+        gradient[0].theta_rad = self.turn_sense * (self.left - faded);
+        self.left = faded;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use kinematics::Wheels;
+
+    #[test]
+    fn a_reversal_kicks_once_to_the_side_of_the_last_turn_and_a_new_start_does_not() {
+        let size = CastorKick { kick_rad: 0.02, decay_m: 0.05 };
+        let mut state = size.forward().expect("acts on the floor");
+        let mut drive = |left_m: f64, right_m: f64| -> f64 {
+            (0..1000)
+                .map(|_| {
+                    let mut step = specimen_step();
+                    step.travel_m = Wheels { left: left_m / 1000.0, right: right_m / 1000.0 };
+                    state.floor(&mut step);
+                    step.extra_turn_rad
+                })
+                .sum()
+        };
+        assert_eq!(drive(1.0, 1.0), 0.0);
+        assert_eq!(drive(-1.0, -1.0), 0.0, "it never leaned");
+        assert_eq!(drive(-0.3, 0.3), 0.0, "a turn on the spot is no reversal");
+        let kick_rad = drive(1.0, 1.0);
+        assert!((kick_rad - 0.02).abs() < 0.02 * 1e-6, "20 lengths: e⁻²⁰ is left, {kick_rad}");
+        assert_eq!(drive(0.3, -0.3), 0.0);
+        assert!(drive(1.0, 1.0).abs() < 1e-9, "on it goes, the same way");
+        assert!((drive(-1.0, -1.0) + 0.02).abs() < 0.02 * 1e-6);
+    }
+}

@@ -1,0 +1,81 @@
+//! `clock_rate`: the robot's clock runs fast.
+//!
+//! Model: stamp = (1 + ρ) t from the run's start. Signature: none in a pose by counts, but a time offset that grows: ρ t (v, 0, ω) between what is seen and
+//! what is counted; where speeds are logged instead, a scale. Observability: a robot that moves late in long runs. Alias: `wheel_scale` where speeds are
+//! logged; `truth_latency` over short runs. Reference: resonators and timers, 0.01 to 3 %, as users report.
+
+use dataset::{Look, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, SampleClock};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Rate of the robot's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClockRate {
+    /// How much the robot's clock gains (ρ), seconds a second.
+    pub rate: f64,
+}
+
+impl PhysicalEffect for ClockRate {
+    fn check(&self) -> Result<(), EffectError> {
+        let holds = self.rate.is_finite() && self.rate > -1.0;
+        EffectError::unless(holds, "clock_rate", "rate", self.rate, "more than -1")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { rate: size(sizes, "rate")? })
+    }
+}
+
+struct State {
+    size: ClockRate,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { clock: true, ..Hooks::NONE }
+    }
+
+    fn clock(&mut self, sample: &mut SampleClock) {
+        sample.stamp_s *= 1.0 + self.size.rate;
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 3 %, the upper end of what users report.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "rate", unit: "1", plausible: 0.03 }]
+    }
+
+    /// What the counts say of the instant t by the robot's clock was true ρ t before it: the robot is seen farther on.
+    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(look.t_s * look.twist.v_m_s, 0.0, look.t_s * look.twist.omega_rad_s);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinematics::Wheels;
+
+    #[test]
+    fn stamps_gain_and_readings_do_not() {
+        let mut sample = SampleClock { stamp_s: 2.0, read_s: Wheels::both(2.0) };
+        State { size: ClockRate { rate: 0.01 } }.clock(&mut sample);
+        assert_eq!(sample, SampleClock { stamp_s: 2.02, read_s: Wheels::both(2.0) });
+    }
+}

@@ -1,0 +1,165 @@
+//! `encoder_cycle`: an encoder whose error repeats n times a turn of the wheel.
+//!
+//! Model: shown angle = φ + A sin(nφ + φ₀) per wheel: an eccentric or tilted disc (n = 1, 2), gear teeth, quadrature phases. Signature: e_dx and e_dθ
+//! locked to that wheel's phase, n times a turn. Observability: a continuous log with more than 2n samples a turn. Alias: `wheel_eccentricity` at n = 1, exactly.
+//! Reference: geometry of an eccentric disc, A = e/r_disc over the gear's ratio.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Cycles a turn that are tried; one a turn is an eccentric wheel to any data.
+const CYCLES: [f64; 11] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0];
+
+/// Periodic error of each encoder.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EncoderCycle {
+    /// Cycles in one turn of the wheel (n).
+    pub cycles: u32,
+    /// Amplitude of the left encoder's error (A), radians at the wheel.
+    #[serde(default)]
+    pub left_amplitude_rad: f64,
+    /// Its phase at wheel angle zero (φ₀), radians.
+    #[serde(default)]
+    pub left_phase_rad: f64,
+    /// The right encoder's amplitude, radians at the wheel.
+    #[serde(default)]
+    pub right_amplitude_rad: f64,
+    /// Its phase, radians.
+    #[serde(default)]
+    pub right_phase_rad: f64,
+}
+
+impl PhysicalEffect for EncoderCycle {
+    fn check(&self) -> Result<(), EffectError> {
+        let id = "encoder_cycle";
+        let n = f64::from(self.cycles);
+        EffectError::unless(n >= 1.0, id, "cycles", n, "1 or more")?;
+        let amplitudes =
+            [("left_amplitude_rad", self.left_amplitude_rad), ("right_amplitude_rad", self.right_amplitude_rad)];
+        for (name, value) in amplitudes {
+            let holds = value >= 0.0 && value * n < 1.0;
+            EffectError::unless(holds, id, name, value, "from 0 to less than 1/cycles, so that counts never run back")?;
+        }
+        let phases = [("left_phase_rad", self.left_phase_rad), ("right_phase_rad", self.right_phase_rad)];
+        EffectError::unless_finite(id, phases)
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State {
+            cycles: f64::from(self.cycles),
+            amplitude_rad: Wheels { left: self.left_amplitude_rad, right: self.right_amplitude_rad },
+            phase_rad: Wheels { left: self.left_phase_rad, right: self.right_phase_rad },
+        }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::over("cycles", &CYCLES, |cycles| Term { cycles }))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        let (left_sin, left_cos) = (size(sizes, "left_sin_rad")?, size(sizes, "left_cos_rad")?);
+        let (right_sin, right_cos) = (size(sizes, "right_sin_rad")?, size(sizes, "right_cos_rad")?);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
+        Some(Self {
+            cycles: size(sizes, "cycles")? as u32,
+            left_amplitude_rad: left_sin.hypot(left_cos),
+            left_phase_rad: left_cos.atan2(left_sin),
+            right_amplitude_rad: right_sin.hypot(right_cos),
+            right_phase_rad: right_cos.atan2(right_sin),
+        })
+    }
+}
+
+struct State {
+    cycles: f64,
+    amplitude_rad: Wheels<f64>,
+    phase_rad: Wheels<f64>,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { encoder: true, ..Hooks::NONE }
+    }
+
+    fn encoder(&mut self, step: &mut Step) {
+        for side in Side::BOTH {
+            let shown = |angle_rad: f64| (self.cycles * angle_rad + self.phase_rad[side]).sin();
+            let from_rad = step.wheel_angle_rad[side];
+            let excess = shown(from_rad + step.shaft_rad[side]) - shown(from_rad);
+            step.encoder_rad[side] += self.amplitude_rad[side] * excess;
+        }
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        Some("the path bends within a cycle")
+    }
+}
+
+struct Term {
+    cycles: f64,
+}
+
+impl ModelTerm for Term {
+    /// Plausible: a disc 0.1 mm off its axis at a radius of 10 mm, on the wheel.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[
+            TermParameter { name: "left_sin_rad", unit: "rad", plausible: 0.01 },
+            TermParameter { name: "left_cos_rad", unit: "rad", plausible: 0.01 },
+            TermParameter { name: "right_sin_rad", unit: "rad", plausible: 0.01 },
+            TermParameter { name: "right_cos_rad", unit: "rad", plausible: 0.01 },
+        ]
+    }
+
+    /// What the encoder showed too much was not rolled.
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        for (side, gradient) in Side::BOTH.into_iter().zip(gradient.chunks_exact_mut(2)) {
+            let turned_rad = interval.turned_rad[side];
+            if turned_rad == 0.0 {
+                continue;
+            }
+            let m_per_rad = interval.travel_m[side] / turned_rad;
+            let (sin_before, cos_before) = (self.cycles * interval.wheel_rad[side]).sin_cos();
+            let (sin, cos) = (self.cycles * (interval.wheel_rad[side] + turned_rad)).sin_cos();
+            for (gradient, shown) in gradient.iter_mut().zip([sin - sin_before, cos - cos_before]) {
+                let mut travel_m = Wheels::both(0.0);
+                travel_m[side] = -m_per_rad * shown;
+                *gradient = interval.change(travel_m);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn a_cycle_shows_nothing_when_it_is_whole_and_twice_the_amplitude_at_its_half() {
+        let size = EncoderCycle {
+            cycles: 5,
+            left_amplitude_rad: 0.01,
+            left_phase_rad: 0.0,
+            right_amplitude_rad: 0.0,
+            right_phase_rad: 0.0,
+        };
+        let excess_rad = |from_rad: f64, turned_rad: f64| {
+            let mut step = specimen_step();
+            step.wheel_angle_rad = Wheels::both(from_rad);
+            step.shaft_rad = Wheels::both(turned_rad);
+            step.encoder_rad = step.shaft_rad;
+            size.forward().expect("acts on encoders").encoder(&mut step);
+            assert_eq!(step.encoder_rad.right, turned_rad);
+            step.encoder_rad.left - turned_rad
+        };
+        assert!(excess_rad(0.3, TAU / 5.0).abs() < 1e-15);
+        assert!((excess_rad(-TAU / 20.0, TAU / 10.0) - 0.02).abs() < 1e-15);
+    }
+}

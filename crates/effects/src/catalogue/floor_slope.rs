@@ -1,0 +1,128 @@
+//! `floor_slope`: on a floor that is not level a robot creeps down the fall line.
+//!
+//! Model: a vector in the room per second of motion, or per metre of tread. Signature: e turns with −θ: its direction in the room is constant.
+//! Observability: the same way at two headings; time and way at two speeds. Alias: `carpet_nap` (same heading at two speeds), exactly where the creep
+//! goes with the way. Reference: tyre creep in proportion to side force: weight times slope over stiffness, 0.04 to 0.1 % per degree.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, in_room, size};
+
+/// Creep down a slope.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FloorSlope {
+    /// Along the room's x per second in motion, m/s.
+    pub creep_x_m_s: f64,
+    /// Along the room's y per second in motion, m/s.
+    pub creep_y_m_s: f64,
+    /// Along the room's x per metre of tread.
+    pub slide_x: f64,
+    /// Along the room's y per metre of tread.
+    pub slide_y: f64,
+}
+
+impl PhysicalEffect for FloorSlope {
+    fn check(&self) -> Result<(), EffectError> {
+        let creep = [("creep_x_m_s", self.creep_x_m_s), ("creep_y_m_s", self.creep_y_m_s)];
+        EffectError::unless_finite("floor_slope", creep)?;
+        EffectError::unless_finite("floor_slope", [("slide_x", self.slide_x), ("slide_y", self.slide_y)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        let by = |way| Shape { held: Vec::new(), term: Box::new(Term { way }) };
+        Hypothesis::Terms(vec![by(false), by(true)])
+    }
+
+    /// Creep with time or with the way, by which of them is named.
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        let pair = |x, y| size(sizes, x).zip(size(sizes, y));
+        let (creep, slide) = (pair("creep_x_m_s", "creep_y_m_s"), pair("slide_x", "slide_y"));
+        let ((creep_x_m_s, creep_y_m_s), (slide_x, slide_y)) = match (creep, slide) {
+            (None, None) => return None,
+            (creep, slide) => (creep.unwrap_or_default(), slide.unwrap_or_default()),
+        };
+        Some(Self { creep_x_m_s, creep_y_m_s, slide_x, slide_y })
+    }
+}
+
+struct State {
+    size: FloorSlope,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { floor: true, ..Hooks::NONE }
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let FloorSlope { creep_x_m_s, creep_y_m_s, slide_x, slide_y } = self.size;
+        // At rest friction holds the wheels.
+        let tread_m = 0.5 * (step.travel_m.left.abs() + step.travel_m.right.abs());
+        let moving_s = if tread_m > 0.0 { step.dt_s } else { 0.0 };
+        step.creep_m[0] += creep_x_m_s * moving_s + slide_x * tread_m;
+        step.creep_m[1] += creep_y_m_s * moving_s + slide_y * tread_m;
+    }
+}
+
+struct Term {
+    /// With the way, or else with the time.
+    way: bool,
+}
+
+impl ModelTerm for Term {
+    /// Plausible: 0.1 % a degree on a floor one degree off, at 0.5 m/s.
+    fn parameters(&self) -> &'static [TermParameter] {
+        if self.way {
+            &[
+                TermParameter { name: "slide_x", unit: "1", plausible: 1e-3 },
+                TermParameter { name: "slide_y", unit: "1", plausible: 1e-3 },
+            ]
+        } else {
+            &[
+                TermParameter { name: "creep_x_m_s", unit: "m/s", plausible: 5e-4 },
+                TermParameter { name: "creep_y_m_s", unit: "m/s", plausible: 5e-4 },
+            ]
+        }
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let tread_m = 0.5 * (interval.travel_m.left.abs() + interval.travel_m.right.abs());
+        let amount = match self.way {
+            true => tread_m,
+            false if tread_m > 0.0 => interval.dt_s,
+            false => 0.0,
+        };
+        gradient[0] = in_room(interval, [amount, 0.0]);
+        gradient[1] = in_room(interval, [0.0, amount]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use kinematics::Wheels;
+
+    #[test]
+    fn a_robot_at_rest_stays_and_a_moving_one_creeps_whichever_way_it_drives() {
+        let size = FloorSlope { creep_x_m_s: 1e-3, creep_y_m_s: 0.0, slide_x: 0.0, slide_y: -2e-3 };
+        let creep_m = |travel_m: f64| {
+            let mut step = specimen_step();
+            step.travel_m = Wheels::both(travel_m);
+            State { size }.floor(&mut step);
+            step.creep_m
+        };
+        assert_eq!(creep_m(0.0), [0.0, 0.0]);
+        assert_eq!(creep_m(5e-4), [1e-3 * 1e-3, -2e-3 * 5e-4]);
+        assert_eq!(creep_m(-5e-4), creep_m(5e-4));
+    }
+}

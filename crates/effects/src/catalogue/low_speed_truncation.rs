@@ -1,0 +1,133 @@
+//! `low_speed_truncation`: a firmware that keeps whole units of way in every cycle throws the fractions away.
+//!
+//! Model: of each wheel's way in a cycle only whole units are kept: half a unit is lost a cycle on average, whatever the speed, and all below one.
+//! Signature: the robot goes farther than it counts, by a constant speed: a scale error that vanishes at speed. Observability: two speeds.
+//! Alias: `wheel_scale` at one speed. Assumption of the hypothesis: fractions of all sizes are equally likely, which a speed that is a whole number of
+//! units a cycle breaks. Reference: users' reports of integer odometry; the mean of a uniform fraction.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Readout, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::stream::Stream;
+
+/// Fractions thrown away.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LowSpeedTruncation {
+    /// Way lost per second on average, half a unit a cycle, m/s.
+    pub loss_m_s: f64,
+    /// The firmware's cycle, seconds.
+    pub cycle_s: f64,
+}
+
+/// The cycle of a fitted effect, seconds: data show the loss per second alone.
+const USUAL_CYCLE_S: f64 = 0.02;
+
+impl PhysicalEffect for LowSpeedTruncation {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_sizes("low_speed_truncation", [("loss_m_s", self.loss_m_s)])?;
+        EffectError::unless_positive("low_speed_truncation", [("cycle_s", self.cycle_s)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        let none = Wheels::both(0.0);
+        Some(Box::new(State { size: *self, cycle_ends_s: self.cycle_s, in_cycle_m: none, lost_m: none }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { loss_m_s: size(sizes, "loss_m_s")?, cycle_s: size(sizes, "cycle_s").unwrap_or(USUAL_CYCLE_S) })
+    }
+}
+
+struct State {
+    size: LowSpeedTruncation,
+    cycle_ends_s: f64,
+    in_cycle_m: Wheels<f64>,
+    lost_m: Wheels<f64>,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, encoder: true, readout: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, _stream: Stream) {
+        self.cycle_ends_s = self.size.cycle_s;
+        self.in_cycle_m = Wheels::both(0.0);
+        self.lost_m = Wheels::both(0.0);
+    }
+
+    /// Watches what the counters see; the controllers, which count whole, are not disturbed.
+    fn encoder(&mut self, step: &mut Step) {
+        let unit_m = 2.0 * self.size.loss_m_s * self.size.cycle_s;
+        for side in Side::BOTH {
+            self.in_cycle_m[side] += step.encoder_rad[side] * step.nominal_radius_m[side];
+        }
+        if step.t_s + step.dt_s >= self.cycle_ends_s {
+            self.cycle_ends_s += self.size.cycle_s;
+            let fraction_m = |way_m: f64| if unit_m > 0.0 { way_m % unit_m } else { 0.0 };
+            self.lost_m = self.lost_m.zip_with(self.in_cycle_m, |lost_m, way_m| lost_m + fraction_m(way_m));
+            self.in_cycle_m = Wheels::both(0.0);
+        }
+    }
+
+    fn readout(&mut self, readout: &mut Readout) {
+        for side in Side::BOTH {
+            #[allow(clippy::cast_possible_truncation)] // far under 2⁶³ counts
+            let lost = (self.lost_m[side] / readout.m_per_count[side]).round() as i64;
+            readout.ticks[side] -= lost;
+        }
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        Some("a motion is many of its cycles")
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: half a unit of 0.1 mm in a cycle of 10 ms; users give no figures.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "loss_m_s", unit: "m/s", plausible: 0.005 }]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let sense = |travel_m: f64| if travel_m == 0.0 { 0.0 } else { travel_m.signum() };
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| sense(travel_m) * interval.dt_s));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+
+    #[test]
+    fn whole_units_are_kept_and_fractions_lost_in_both_directions() {
+        // A unit of 2 · 0.05 · 0.02 = 2 mm; 100 cycles of 5 mm forward or backward lose 1 mm each.
+        for sense in [-1.0, 1.0] {
+            let size = LowSpeedTruncation { loss_m_s: 0.05, cycle_s: 0.02 };
+            let mut state = size.forward().expect("acts on the record");
+            for cycle in 0..100 {
+                let mut step = specimen_step();
+                (step.t_s, step.dt_s) = (0.02 * f64::from(cycle), 0.02 + 1e-12);
+                step.encoder_rad = Wheels::both(sense * 0.005 / 0.08);
+                state.encoder(&mut step);
+            }
+            let mut readout = Readout { ticks: Wheels::both(0), m_per_count: Wheels::both(1e-5), written: true };
+            state.readout(&mut readout);
+            #[allow(clippy::cast_possible_truncation)]
+            let expected = -(sense as i64) * 10_000;
+            assert_eq!(readout.ticks, Wheels::both(expected));
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! `reversed_wheel`: a counter counts down when its wheel rolls forward.
+//!
+//! Model: that column's sign is wrong. Signature: of one wheel, straights look like spins and spins like straights; of both, everything runs backward.
+//! A gross fault, tried before any fit: the records without it have the sign restored. Observability: any motion. Alias: `swapped_wheels` on turns alone.
+//! Reference: the two channels of a quadrature encoder exchanged, or a motor mounted the other way round.
+
+use dataset::{Dataset, WheelLog};
+use kinematics::{Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Readout};
+use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
+
+/// Counters that run the other way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReversedWheel {
+    /// Does the left one?
+    #[serde(default)]
+    pub left: bool,
+    /// Does the right one?
+    #[serde(default)]
+    pub right: bool,
+}
+
+impl PhysicalEffect for ReversedWheel {
+    fn check(&self) -> Result<(), EffectError> {
+        Ok(())
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Records(rewritings)
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { left: size(sizes, "left")? != 0.0, right: size(sizes, "right")? != 0.0 })
+    }
+}
+
+struct State {
+    size: ReversedWheel,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { readout: true, ..Hooks::NONE }
+    }
+
+    fn readout(&mut self, readout: &mut Readout) {
+        if self.size.left {
+            readout.ticks.left = -readout.ticks.left;
+        }
+        if self.size.right {
+            readout.ticks.right = -readout.ticks.right;
+        }
+    }
+}
+
+fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+    let forms = [
+        (Wheels { left: true, right: false }, "the left counter runs backward"),
+        (Wheels { left: false, right: true }, "the right counter runs backward"),
+        (Wheels { left: true, right: true }, "both counters run backward"),
+    ];
+    let without = |(reversed, sentence): (Wheels<bool>, &str)| {
+        let sign = reversed.map(|reversed| if reversed { -1.0 } else { 1.0 });
+        let turned = |wheels: &mut WheelLog| {
+            for side in Side::BOTH.into_iter().filter(|side| reversed[*side]) {
+                match wheels {
+                    WheelLog::Ticks(columns) => columns[side].iter_mut().for_each(|ticks| *ticks = -*ticks),
+                    WheelLog::Angles(columns) => columns[side].iter_mut().for_each(|angle| *angle = -*angle),
+                    WheelLog::Twist { .. } => {}
+                }
+            }
+        };
+        let twist = |twist| by_wheels(&dataset.robot, twist, |speed_m_s| speed_m_s.zip_with(sign, |v, sign| sign * v));
+        let flag = |reversed: bool| f64::from(u8::from(reversed));
+        Rewriting {
+            sizes: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
+            sentence: sentence.to_owned(),
+            records: rewrite_wheels(dataset, turned, twist),
+        }
+    };
+    forms.map(without).into()
+}

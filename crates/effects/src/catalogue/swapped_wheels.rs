@@ -1,0 +1,65 @@
+//! `swapped_wheels`: the left counter is logged as the right one and the right one as the left.
+//!
+//! Model: the two columns change places. Signature: every turn has the other sense. A gross fault, tried before any fit: the records without it have the
+//! columns changed back. Observability: any turn. Alias: `reversed_wheel` of both on turns alone. Reference: two plugs that fit each other.
+
+use dataset::{Dataset, WheelLog};
+use kinematics::{Twist, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Readout};
+use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
+
+/// Columns that have changed places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SwappedWheels {
+    /// Have they?
+    pub swapped: bool,
+}
+
+impl PhysicalEffect for SwappedWheels {
+    fn check(&self) -> Result<(), EffectError> {
+        Ok(())
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        self.swapped.then(|| Box::new(State) as Box<dyn Forward>)
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Records(rewritings)
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { swapped: size(sizes, "swapped")? != 0.0 })
+    }
+}
+
+struct State;
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { readout: true, ..Hooks::NONE }
+    }
+
+    fn readout(&mut self, readout: &mut Readout) {
+        let Wheels { left, right } = readout.ticks;
+        readout.ticks = Wheels { left: right, right: left };
+    }
+}
+
+fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+    let changed = |wheels: &mut WheelLog| match wheels {
+        WheelLog::Ticks(Wheels { left, right }) => std::mem::swap(left, right),
+        WheelLog::Angles(Wheels { left, right }) => std::mem::swap(left, right),
+        WheelLog::Twist { .. } => {}
+    };
+    let turned = |twist: Twist| by_wheels(&dataset.robot, twist, |Wheels { left, right }| Wheels { left: right, right: left });
+    vec![Rewriting {
+        sizes: vec![("swapped", 1.0)],
+        sentence: "the left and the right counter are swapped".to_owned(),
+        records: rewrite_wheels(dataset, changed, turned),
+    }]
+}

@@ -1,0 +1,115 @@
+//! `thermal_drift`: tyres warm up and swell from the session's start on.
+//!
+//! Model: k(t) = 1 + α (1 − e^{−t/τ}) on the session's clock, both wheels alike. Signature: a scale that settles.
+//! Observability: runs early and late in a session. Alias: `wear`, at 1.00 while the mean speed is steady: a long pause or a cold restart tells them apart.
+//! Reference: a lumped heat capacity (Newton's law of cooling) and linear expansion; 0.2 % over 10 to 60 minutes for rubber.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, RunStart, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Time constants that are tried, seconds: tyres take from minutes to an hour.
+const TAU_S: [f64; 5] = [150.0, 300.0, 600.0, 1200.0, 3600.0];
+
+/// Growth of the wheels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalDrift {
+    /// Relative growth in the end (α).
+    pub growth: f64,
+    /// Time over which it comes (τ), seconds.
+    pub tau_s: f64,
+}
+
+impl PhysicalEffect for ThermalDrift {
+    fn check(&self) -> Result<(), EffectError> {
+        let id = "thermal_drift";
+        let holds = self.growth.is_finite() && self.growth > -1.0;
+        EffectError::unless(holds, id, "growth", self.growth, "more than -1")?;
+        EffectError::unless_positive(id, [("tau_s", self.tau_s)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, session_s: 0.0 }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::over("tau_s", &TAU_S, |tau_s| Term { tau_s }))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { growth: size(sizes, "growth")?, tau_s: size(sizes, "tau_s")? })
+    }
+}
+
+struct State {
+    size: ThermalDrift,
+    session_s: f64,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+    }
+
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        self.session_s = run.session_s;
+    }
+
+    /// The mean over the step, exactly: e^{−t/τ} (1 − e^{−x})/x with x = Δt/τ.
+    fn wheel(&mut self, step: &mut Step) {
+        let ThermalDrift { growth, tau_s } = self.size;
+        let x = step.dt_s / tau_s;
+        let mean = if x > 0.0 { -(-x).exp_m1() / x } else { 1.0 };
+        let cold = (-(self.session_s + step.t_s) / tau_s).exp() * mean;
+        step.radius_m = step.radius_m.map(|radius_m| radius_m * (1.0 + growth * (1.0 - cold)));
+    }
+}
+
+struct Term {
+    tau_s: f64,
+}
+
+impl ModelTerm for Term {
+    /// Plausible: 0.2 %, derived for rubber.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "growth", unit: "1", plausible: 0.002 }]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let middle_s = interval.session_s() + 0.5 * interval.dt_s;
+        let warm = 1.0 - (-middle_s / self.tau_s).exp();
+        let Wheels { left, right } = interval.travel_m;
+        gradient[0] = interval.change(Wheels { left: warm * left, right: warm * right });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use dataset::RunInfo;
+
+    #[test]
+    fn growth_comes_with_the_sessions_time_however_it_is_cut() {
+        let mut state = State { size: ThermalDrift { growth: 0.002, tau_s: 600.0 }, session_s: 0.0 };
+        let mut info = RunInfo::default();
+        state.begin_run(&mut RunStart { number: 3, session_s: 540.0, session_m: 0.0, info: &mut info });
+        let mut mean_m = |from_s: f64, dt_s: f64| {
+            let mut step = specimen_step();
+            (step.t_s, step.dt_s) = (from_s, dt_s);
+            state.wheel(&mut step);
+            step.radius_m.left
+        };
+        let whole_m = mean_m(0.0, 120.0);
+        let parts_m = (0..120).map(|part| mean_m(f64::from(part), 1.0)).sum::<f64>() / 120.0;
+        assert!((whole_m - parts_m).abs() < 1e-15);
+        // At ten minutes, the time constant, 1 − 1/e has come.
+        let at_tau = 1.0 - (-1.0_f64).exp();
+        assert!((mean_m(60.0, 0.0) / 0.08 - (1.0 + 0.002 * at_tau)).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,126 @@
+//! `torn_read`: a count of several bytes is read while it changes.
+//!
+//! Model: with some probability one counter of a row is off by ± one step of the byte that was torn: 2⁸ or 2¹⁶. Signature: a jump in one sample that is
+//! undone in the next. A gross fault, tried before any fit: the records without it have such samples put back. Observability: the record itself.
+//! Alias: none. Reference: the HCTL-1100's position is three bytes; a counter of 16 or 32 bits behind an 8-bit bus is alike.
+
+use dataset::{Dataset, WheelLog};
+use kinematics::{Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Readout};
+use crate::hypothesis::{Hypothesis, Rewriting, median, size};
+use crate::stream::Stream;
+
+/// Steps of torn bytes, counts.
+const JUMPS: [i64; 2] = [1 << 8, 1 << 16];
+
+/// Torn reads.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TornRead {
+    /// Probability that a counter is torn in a row.
+    pub probability: f64,
+    /// By how much it is then off, counts: 256 or 65536.
+    pub jump_counts: u32,
+}
+
+impl PhysicalEffect for TornRead {
+    fn check(&self) -> Result<(), EffectError> {
+        let (id, probability) = ("torn_read", self.probability);
+        EffectError::unless((0.0..=1.0).contains(&probability), id, "probability", probability, "from 0 to 1")?;
+        let holds = JUMPS.contains(&i64::from(self.jump_counts));
+        EffectError::unless(holds, id, "jump_counts", f64::from(self.jump_counts), "256 or 65536")
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, stream: None }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Records(rewritings)
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
+        let jump_counts = size(sizes, "jump_counts")? as u32;
+        Some(Self { probability: size(sizes, "probability")?, jump_counts })
+    }
+}
+
+struct State {
+    size: TornRead,
+    stream: Option<Stream>,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, readout: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, stream: Stream) {
+        self.stream = Some(stream);
+    }
+
+    fn readout(&mut self, readout: &mut Readout) {
+        let Some(stream) = &mut self.stream else { return };
+        for side in Side::BOTH {
+            let (chance, sense) = (stream.uniform(), stream.uniform());
+            if chance < self.size.probability {
+                let jump = i64::from(self.size.jump_counts);
+                readout.ticks[side] += if sense < 0.5 { jump } else { -jump };
+            }
+        }
+    }
+}
+
+/// How far a sample is from the line between its neighbours, counts.
+fn astray(t_s: &[f64], ticks: &[i64], k: usize) -> f64 {
+    let share = (t_s[k] - t_s[k - 1]) / (t_s[k + 1] - t_s[k - 1]);
+    #[allow(clippy::cast_precision_loss)]
+    let (here, whole) = ((ticks[k] - ticks[k - 1]) as f64, (ticks[k + 1] - ticks[k - 1]) as f64);
+    here - share * whole
+}
+
+/// Puts back the samples of a column that are a jump astray while their neighbours are not, and says how many these were. Where samples are usually astray
+/// by an eighth of a jump, none can be told.
+fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> usize {
+    let inner = 1..ticks.len().saturating_sub(1);
+    let Some(usual) = median(inner.clone().map(|k| astray(t_s, ticks, k).abs()).collect()) else { return 0 };
+    #[allow(clippy::cast_precision_loss)]
+    let step = jump as f64;
+    if usual > step / 8.0 {
+        return 0;
+    }
+    let mut mended = 0;
+    for k in inner {
+        let off = astray(t_s, ticks, k);
+        // A neighbour of a torn sample is half a jump astray.
+        if (off.abs() - step).abs() < step / 4.0 {
+            ticks[k] -= if off > 0.0 { jump } else { -jump };
+            mended += 1;
+        }
+    }
+    mended
+}
+
+fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+    let without = |jump: i64| {
+        let (mut mended, mut samples) = (0, 0);
+        let mut records = dataset.clone();
+        for run in &mut records.runs {
+            if let WheelLog::Ticks(Wheels { left, right }) = &mut run.odometry.wheels {
+                samples += left.len() + right.len();
+                mended += mend(&run.odometry.t_s, left, jump) + mend(&run.odometry.t_s, right, jump);
+            }
+        }
+        #[allow(clippy::cast_precision_loss)]
+        (mended > 0).then(|| Rewriting {
+            sizes: vec![("probability", mended as f64 / samples as f64), ("jump_counts", jump as f64)],
+            sentence: format!("{mended} counts were torn while they were read, off by {jump}"),
+            records,
+        })
+    };
+    JUMPS.into_iter().filter_map(without).collect()
+}

@@ -1,0 +1,85 @@
+//! `truth_latency`: the outside instrument's samples are stamped later than they are true.
+//!
+//! Model: what is stamped t was seen at t − τ. Signature: −τ(v, 0, ω) in a seen pose, −τ(v̇, 0, ω̇) per unit of time in increments: nothing on a circle at
+//! constant speed. Observability: starts, stops and reversals. Alias: `slip_acceleration`, exactly: the same lag of both wheels is a time shift.
+//! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100 ms, in published logs up to 0.3 s.
+
+use dataset::{Look, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Sighting};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Delay of the instrument's stamps.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruthLatency {
+    /// Stamp minus instant (τ), seconds; negative when the stamps are early.
+    pub delay_s: f64,
+}
+
+impl PhysicalEffect for TruthLatency {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite("truth_latency", [("delay_s", self.delay_s)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { delay_s: size(sizes, "delay_s")? })
+    }
+}
+
+struct State {
+    size: TruthLatency,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { instrument: true, ..Hooks::NONE }
+    }
+
+    fn instrument(&mut self, sighting: &mut Sighting) {
+        sighting.t_s += self.size.delay_s;
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 100 ms, the upper end of the rule of thumb; three times that has been published.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "delay_s", unit: "s", plausible: 0.1 }]
+    }
+
+    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(-look.twist.v_m_s, 0.0, -look.twist.omega_rad_s);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dataset::RunInfo;
+    use kinematics::Twist;
+
+    #[test]
+    fn a_late_stamp_shows_the_robot_behind() {
+        let mut state = State { size: TruthLatency { delay_s: 0.05 } };
+        let mut sighting = Sighting { t_s: 1.0, world_from_body: Pose::IDENTITY };
+        state.instrument(&mut sighting);
+        assert_eq!(sighting, Sighting { t_s: 1.05, world_from_body: Pose::IDENTITY });
+        let (run, twist) = (RunInfo::default(), Twist { v_m_s: 0.4, omega_rad_s: -0.2 });
+        let mut gradient = [Pose::IDENTITY];
+        Term.sight(&Look { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
+        assert_eq!(gradient, [Pose::new(-0.4, 0.0, 0.2)]);
+    }
+}

@@ -1,0 +1,90 @@
+//! `truth_lever_arm`: the point that the outside instrument takes for the robot is not the centre of its axle.
+//!
+//! Model: seen pose = true pose ⊕ ℓ with ℓ = (ℓ_x, ℓ_y) in the body's frame. Signature: e_dx = −ℓ_y ω, e_dy = ℓ_x ω in increments.
+//! Observability: turns; a robot that only drives straight shows nothing, since where it starts is not known beforehand. Alias: `lateral_skid` at one
+//! speed. Reference: Censi et al. 2013, the sensor's place on the robot.
+
+use dataset::{Look, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Sighting};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Where the instrument's point is on the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruthLeverArm {
+    /// Ahead of the axle, metres.
+    pub lever_x_m: f64,
+    /// To the left of the centre, metres.
+    pub lever_y_m: f64,
+}
+
+impl PhysicalEffect for TruthLeverArm {
+    fn check(&self) -> Result<(), EffectError> {
+        let sizes = [("lever_x_m", self.lever_x_m), ("lever_y_m", self.lever_y_m)];
+        EffectError::unless_finite("truth_lever_arm", sizes)
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { lever_x_m: size(sizes, "lever_x_m")?, lever_y_m: size(sizes, "lever_y_m")? })
+    }
+}
+
+struct State {
+    size: TruthLeverArm,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { instrument: true, ..Hooks::NONE }
+    }
+
+    fn instrument(&mut self, sighting: &mut Sighting) {
+        let body_from_point = Pose::new(self.size.lever_x_m, self.size.lever_y_m, 0.0);
+        sighting.world_from_body = sighting.world_from_body * body_from_point;
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: centimetres (a rule of thumb).
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[
+            TermParameter { name: "lever_x_m", unit: "m", plausible: 0.05 },
+            TermParameter { name: "lever_y_m", unit: "m", plausible: 0.05 },
+        ]
+    }
+
+    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
+        gradient[0].x_m = 1.0;
+        gradient[1].y_m = 1.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn the_point_turns_with_the_robot() {
+        let mut state = State { size: TruthLeverArm { lever_x_m: 0.1, lever_y_m: 0.02 } };
+        let mut sighting = Sighting { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, FRAC_PI_2) };
+        state.instrument(&mut sighting);
+        let seen = sighting.world_from_body;
+        assert!((seen.x_m - 0.98).abs() < 1e-15 && (seen.y_m - 2.1).abs() < 1e-15, "{seen:?}");
+        assert_eq!(seen.theta_rad, FRAC_PI_2);
+    }
+}

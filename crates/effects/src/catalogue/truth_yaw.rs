@@ -1,0 +1,79 @@
+//! `truth_yaw`: the outside instrument's frame is turned on the robot.
+//!
+//! Model: seen heading = true heading + ℓ_θ. Signature: e_dy = −ℓ_θ v: the robot seems to drive a little sideways.
+//! Observability: any straight way, forward or backward. Alias: equal toe of both wheels is the same thing, on every path: no data tells them apart;
+//! `lateral_skid` at one yaw rate. Reference: Censi et al. 2013, the sensor's orientation on the robot.
+
+use dataset::{Look, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Sighting};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Turn of the instrument's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruthYaw {
+    /// From the robot's heading to the seen one, radians, counter-clockwise.
+    pub yaw_rad: f64,
+}
+
+impl PhysicalEffect for TruthYaw {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite("truth_yaw", [("yaw_rad", self.yaw_rad)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { yaw_rad: size(sizes, "yaw_rad")? })
+    }
+}
+
+struct State {
+    size: TruthYaw,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { instrument: true, ..Hooks::NONE }
+    }
+
+    fn instrument(&mut self, sighting: &mut Sighting) {
+        sighting.world_from_body.theta_rad += self.size.yaw_rad;
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 2°, the upper end of what mounting by eye leaves.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "yaw_rad", unit: "rad", plausible: 0.035 }]
+    }
+
+    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
+        gradient[0].theta_rad = 1.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_heading_is_seen_turned() {
+        let mut state = State { size: TruthYaw { yaw_rad: -0.02 } };
+        let mut sighting = Sighting { t_s: 1.0, world_from_body: Pose::new(1.0, 2.0, 0.5) };
+        state.instrument(&mut sighting);
+        assert_eq!(sighting.world_from_body, Pose::new(1.0, 2.0, 0.48));
+    }
+}

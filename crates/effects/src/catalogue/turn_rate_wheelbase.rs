@@ -1,0 +1,93 @@
+//! `turn_rate_wheelbase`: the faster a robot turns, the farther apart its wheels seem to touch.
+//!
+//! Model: b_eff = b (1 + β|ω|). Signature: e_dθ = −β ω|ω|. Observability: turns at two yaw rates.
+//! Alias: `load_transfer` (0.98 on circles), `slip_speed` in spins, `castor_drag`; `wheelbase` at one yaw rate.
+//! Reference: a rule of thumb, 0.1 to 3 %; users report a wheel separation multiplier that depends on the yaw rate.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Wheelbase that grows with the yaw rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurnRateWheelbase {
+    /// Relative growth per rad/s (β), seconds.
+    pub beta_s: f64,
+}
+
+impl PhysicalEffect for TurnRateWheelbase {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite("turn_rate_wheelbase", [("beta_s", self.beta_s)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { beta_s: size(sizes, "beta_s")? })
+    }
+}
+
+struct State {
+    size: TurnRateWheelbase,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { floor: true, ..Hooks::NONE }
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let speed_m_s = step.contact_speed_m_s();
+        let omega_rad_s = (speed_m_s.right - speed_m_s.left) / step.wheel_separation_m;
+        step.wheel_separation_m *= 1.0 + self.size.beta_s * omega_rad_s.abs();
+    }
+
+    fn depends_on_speed(&self) -> bool {
+        self.size.beta_s != 0.0
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 3 % at 1 rad/s, the upper end of the rule of thumb.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "beta_s", unit: "s", plausible: 0.03 }]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if interval.dt_s > 0.0 {
+            let turn_rad = interval.increment().turn_rad;
+            gradient[0].theta_rad = -turn_rad * turn_rad.abs() / interval.dt_s;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+
+    #[test]
+    fn both_senses_of_turning_widen_alike() {
+        let mut state = State { size: TurnRateWheelbase { beta_s: 0.02 } };
+        for sense in [-1.0, 1.0] {
+            let mut step = specimen_step();
+            let before_m = step.wheel_separation_m;
+            step.rate_rad_s.right = sense * 0.5 * before_m / 0.08;
+            state.floor(&mut step);
+            assert!((step.wheel_separation_m / before_m - (1.0 + 0.02 * 0.5)).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! `wear`: tyres lose a little of their radius with every metre.
+//!
+//! Model: k = 1 − w s with the way s since the session's start, both wheels alike. Signature: a scale that falls steadily.
+//! Observability: very long sessions. Alias: `thermal_drift`, at 1.00 while the mean speed is steady: a long pause tells them apart.
+//! Reference: Archard 1953, wear in proportion to the way; negligible within a session.
+
+use dataset::{Interval, ModelTerm, TermParameter};
+use kinematics::{Pose, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, RunStart, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// Loss of radius with the way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wear {
+    /// Relative loss of both radii per metre (w), 1/m.
+    pub loss_per_m: f64,
+}
+
+impl PhysicalEffect for Wear {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite("wear", [("loss_per_m", self.loss_per_m)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self, way_m: 0.0 }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { loss_per_m: size(sizes, "loss_per_m")? })
+    }
+}
+
+struct State {
+    size: Wear,
+    way_m: f64,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+    }
+
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        self.way_m = run.session_m;
+    }
+
+    /// Linear in the way, so the middle of the step is its mean.
+    fn wheel(&mut self, step: &mut Step) {
+        let rolled_m = step.wheel_rad.zip_with(step.radius_m, |rad, radius_m| rad * radius_m);
+        let ahead_m = 0.5 * (rolled_m.left + rolled_m.right).abs();
+        let left_over = 1.0 - self.size.loss_per_m * (self.way_m + 0.5 * ahead_m);
+        self.way_m += ahead_m;
+        step.radius_m = step.radius_m.map(|radius_m| radius_m * left_over);
+    }
+}
+
+struct Term;
+
+impl ModelTerm for Term {
+    /// Plausible: 1 mm of a 100 mm radius in 10 km; the catalogue calls it negligible within a session.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "loss_per_m", unit: "1/m", plausible: 1e-6 }]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let way_m = interval.session_m + 0.5 * interval.increment().distance_m.abs();
+        let Wheels { left, right } = interval.travel_m;
+        gradient[0] = interval.change(Wheels { left: -left * way_m, right: -right * way_m });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+    use dataset::RunInfo;
+
+    #[test]
+    fn the_way_counts_in_both_directions_and_over_runs() {
+        let mut state = State { size: Wear { loss_per_m: 1e-3 }, way_m: 0.0 };
+        let mut info = RunInfo::default();
+        state.begin_run(&mut RunStart { number: 1, session_s: 0.0, session_m: 10.0, info: &mut info });
+        for (turned_m, factor) in [(2.0, 1.0 - 1e-3 * 11.0), (-2.0, 1.0 - 1e-3 * 13.0)] {
+            let mut step = specimen_step();
+            step.wheel_rad = Wheels::both(turned_m / 0.08);
+            state.wheel(&mut step);
+            assert!((step.radius_m.left / 0.08 - factor).abs() < 1e-15);
+        }
+    }
+}

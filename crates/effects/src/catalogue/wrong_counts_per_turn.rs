@@ -1,0 +1,158 @@
+//! `wrong_counts_per_turn`: a counter makes another number of counts of a turn than the robot believes.
+//!
+//! Model: logged = factor × counts: two or four of one edge, a gear left out, radians for turns, millimetres for inches. Signature: every way and every
+//! turn is off by that factor. A gross fault, tried before any fit: the records without it believe the factor that the ways measured outside show,
+//! where that is far from one. Observability: any way measured outside, or turns. Alias: `wheel_scale`, whose sizes are per cents.
+//! Reference: quadrature decoding ×1, ×2, ×4; the units that people mix.
+
+use dataset::{Dataset, RunView, WheelLog};
+use kinematics::{Pose, Rule, Twist, Wheels, sinc};
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, Readout};
+use crate::hypothesis::{Hypothesis, Rewriting, median, rewrite_wheels, size};
+
+/// Factors by which people err.
+const FACTORS: [(f64, &str); 14] = [
+    (2.0, "decoded twice as finely"),
+    (4.0, "decoded four times as finely"),
+    (0.5, "decoded half as finely"),
+    (0.25, "decoded a quarter as finely"),
+    (std::f64::consts::TAU, "radians for turns"),
+    (1.0 / std::f64::consts::TAU, "turns for radians"),
+    (180.0 / std::f64::consts::PI, "degrees for radians"),
+    (std::f64::consts::PI / 180.0, "radians for degrees"),
+    (25.4, "millimetres for inches"),
+    (1.0 / 25.4, "inches for millimetres"),
+    (10.0, "a decimal point"),
+    (0.1, "a decimal point"),
+    (1000.0, "millimetres for metres"),
+    (0.001, "metres for millimetres"),
+];
+
+/// How near an estimate must come to a factor of the list, as a share: wheels are out by less, and the list is not that dense.
+const SNAPS_WITHIN: f64 = 0.12;
+
+/// Nearer to one than this share is no gross fault.
+const INNOCENT: f64 = 0.3;
+
+/// Shortest way that is compared, metres, and shortest turn, radians: far above what instruments err.
+const COMPARED: [f64; 2] = [0.2, 0.5];
+
+/// Counts of a turn, logged over believed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WrongCountsPerTurn {
+    /// Logged over believed counts of a turn.
+    pub factor: f64,
+}
+
+impl PhysicalEffect for WrongCountsPerTurn {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_positive("wrong_counts_per_turn", [("factor", self.factor)])
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        Some(Box::new(State { size: *self }))
+    }
+
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Records(rewritings)
+    }
+
+    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { factor: size(sizes, "factor")? })
+    }
+}
+
+struct State {
+    size: WrongCountsPerTurn,
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { readout: true, ..Hooks::NONE }
+    }
+
+    fn readout(&mut self, readout: &mut Readout) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // counts of a run are far under 2⁵³
+        let logged = |counts: i64| (counts as f64 * self.size.factor).floor() as i64;
+        readout.ticks = readout.ticks.map(logged);
+    }
+}
+
+/// Counted over seen amounts between looks that are far enough apart: of the way, and of the turn.
+fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
+    let geometry = dataset.robot.geometry().ok()?;
+    // The way and the turn by the counts at every row; ways of single wheels add up where the robot spins, so both are signed sums.
+    let mut track: Vec<(f64, [f64; 2])> = Vec::new();
+    let (mut amounts, mut before) = ([0.0; 2], None::<Pose>);
+    run.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |t_s, pose| {
+        let step = before.map_or(Pose::IDENTITY, |before| before.to(pose));
+        let chord_m = step.x_m.hypot(step.y_m);
+        // An arc is longer than its chord by the sinc of half its turn.
+        amounts[0] += chord_m / sinc(0.5 * step.theta_rad).abs().max(0.1);
+        amounts[1] += step.theta_rad;
+        before = Some(pose);
+        track.push((t_s, amounts));
+    });
+    let at = |t_s: f64| {
+        let after = track.partition_point(|(row_s, _)| *row_s < t_s);
+        let (to_s, to) = track.get(after)?;
+        let (from_s, from) = track.get(after.saturating_sub(1))?;
+        let share = if to_s > from_s { (t_s - from_s) / (to_s - from_s) } else { 0.0 };
+        Some([0, 1].map(|k| from[k] + share * (to[k] - from[k])))
+    };
+    let mut found = [Vec::new(), Vec::new()];
+    let mut anchors: [Option<(Pose, [f64; 2])>; 2] = [None; 2];
+    for (t_s, seen) in run.observed_poses() {
+        let Some(counted) = at(t_s) else { continue };
+        for k in 0..2 {
+            let Some((anchor, start)) = anchors[k] else {
+                anchors[k] = Some((seen, counted));
+                continue;
+            };
+            let moved = [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
+            if moved[k] > COMPARED[k] {
+                found[k].push((counted[k] - start[k]).abs() / moved[k]);
+                anchors[k] = Some((seen, counted));
+            }
+        }
+    }
+    Some(found)
+}
+
+/// Logged over true counts, by the ways; by the turns where no way was long enough. Absent where the middle one of all is no gross fault.
+fn estimate(dataset: &Dataset) -> Option<f64> {
+    let mut all = [Vec::new(), Vec::new()];
+    for run in &dataset.session().runs {
+        let Some(found) = ratios(dataset, run) else { continue };
+        all.iter_mut().zip(found).for_each(|(all, found)| all.extend(found));
+    }
+    let [ways, turns] = all.map(median);
+    let factor = ways.or(turns).filter(|factor| *factor > 0.0 && factor.is_finite())?;
+    (factor.ln().abs() > INNOCENT.ln_1p()).then_some(factor)
+}
+
+fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+    let Some(estimate) = estimate(dataset) else { return Vec::new() };
+    let off = |factor: f64| (estimate / factor).ln().abs();
+    let known = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).filter(|(factor, _)| off(*factor) < SNAPS_WITHIN);
+    let (factor, reason) = known.map_or((estimate, "a gear?"), |(factor, reason)| (*factor, *reason));
+    let scaled = |wheels: &mut WheelLog| {
+        if let WheelLog::Angles(Wheels { left, right }) = wheels {
+            left.iter_mut().chain(right).for_each(|angle| *angle /= factor);
+        }
+    };
+    let twist = |twist: Twist| Twist { v_m_s: twist.v_m_s / factor, ..twist };
+    let mut records = rewrite_wheels(dataset, scaled, twist);
+    if let Some(ticks_per_rev) = &mut records.robot.ticks_per_rev {
+        *ticks_per_rev *= factor;
+    }
+    vec![Rewriting {
+        sizes: vec![("factor", factor)],
+        sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
+        records,
+    }]
+}
