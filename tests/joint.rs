@@ -62,7 +62,11 @@ fn lengths(geometry: &DriveGeometry) -> [f64; 3] {
 }
 
 fn off(found: &Calibration, truth: &DriveGeometry) -> f64 {
-    lengths(&found.geometry).iter().zip(lengths(truth)).map(|(found, truth)| (found / truth - 1.0).abs()).fold(0.0, f64::max)
+    lengths(&found.geometry)
+        .iter()
+        .zip(lengths(truth))
+        .map(|(found, truth)| (found / truth - 1.0).abs())
+        .fold(0.0, f64::max)
 }
 
 fn calibrated(dataset: &Dataset) -> Calibration {
@@ -70,7 +74,7 @@ fn calibrated(dataset: &Dataset) -> Calibration {
 }
 
 fn keep_ends(truth: &mut Vec<TruthSample>) {
-    let ends = [truth.first().cloned(), truth.last().cloned()];
+    let ends = [truth.first().copied(), truth.last().copied()];
     *truth = ends.into_iter().flatten().collect();
 }
 
@@ -86,7 +90,13 @@ fn every_kind_of_truth_gives_the_robot_back() {
     let mut positions = dense.clone();
     for run in &mut sparse.runs {
         let last = run.truth.len() - 1;
-        run.truth = run.truth.iter().enumerate().filter(|(k, _)| k % 37 == 0 || *k == last).map(|(_, s)| s.clone()).collect();
+        run.truth = run
+            .truth
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| k % 37 == 0 || *k == last)
+            .map(|(_, sample)| *sample)
+            .collect();
     }
     ends.runs.iter_mut().for_each(|run| keep_ends(&mut run.truth));
     for run in &mut positions.runs {
@@ -197,7 +207,10 @@ fn published_optiodom_sessions_are_met_or_beaten() {
         let joint = found.methods.iter().find(|method| method.method == "joint").expect("compared");
         assert_eq!(joint.kinds.len(), 1, "{kind}");
         let means = |kind: &calib::KindMean| {
-            (1e3 * kind.mean_final_position_m.expect("ends"), kind.mean_final_heading_rad.expect("headings").to_degrees())
+            (
+                1e3 * kind.mean_final_position_m.expect("ends"),
+                kind.mean_final_heading_rad.expect("headings").to_degrees(),
+            )
         };
         let (mm, deg) = means(&joint.kinds[0]);
         assert!(mm <= most_mm && deg <= most_deg, "{kind}: {mm:.3} mm of {most_mm:.3}, {deg:.4} deg of {most_deg:.4}");
@@ -229,7 +242,10 @@ fn published_khepera_lies_within_the_intervals() {
             let sigma = estimate.sigma.expect("many displacements");
             assert!((estimate.value - theirs).abs() < 1.96 * sigma, "{name} {key}: {estimate:?} {theirs}");
             // An interval that is worth something: half a per cent of a length, half a millimetre of a place.
-            assert!(1.96 * sigma < if key.starts_with("l_x") || key.starts_with("l_y") { 5e-4 } else { 0.01 * theirs }, "{name} {key}: {sigma}");
+            assert!(
+                1.96 * sigma < if key.starts_with("l_x") || key.starts_with("l_y") { 5e-4 } else { 0.01 * theirs },
+                "{name} {key}: {sigma}"
+            );
         }
     }
 }

@@ -372,6 +372,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             previous_dt_s: previous.dt_s,
             wheel_separation_m: self.model.separation_m,
             wheel_rad: self.wheel_rad,
+            turned_rad: piece.wheel_rad,
             world_from_body: self.pose * before,
             session_m: self.session_m,
             run: self.chain.info,

@@ -16,9 +16,9 @@ mod model;
 mod noise;
 mod normal;
 mod records;
-mod thinning;
 #[cfg(test)]
 mod tests;
+mod thinning;
 
 pub use evidence::{Evidence, Information};
 pub use filter::{Innovation, Pass};

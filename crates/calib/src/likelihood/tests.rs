@@ -30,11 +30,15 @@ fn dataset(with_headings: bool) -> Dataset {
                 let (left, right) = (LEFT_RAD[k], RIGHT_RAD[k]);
                 angles.left.push(angles.left[k] + left);
                 angles.right.push(angles.right[k] + right);
-                pose = pose * Increment::from_travel(Wheels { left: 0.0811 * left, right: 0.0797 * right }, 0.366).arc();
+                pose =
+                    pose * Increment::from_travel(Wheels { left: 0.0811 * left, right: 0.0797 * right }, 0.366).arc();
             }
         }
-        let odometry =
-            Odometry { t_s: (0..=12).map(f64::from).collect(), wheels: WheelLog::Angles(angles), ..Odometry::default() };
+        let odometry = Odometry {
+            t_s: (0..=12).map(f64::from).collect(),
+            wheels: WheelLog::Angles(angles),
+            ..Odometry::default()
+        };
         let info = RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() };
         Run { info, odometry, truth, ..Run::default() }
     };
@@ -92,7 +96,8 @@ fn model() -> Model {
 const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5] };
 
 fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], want: Want) -> Pass {
-    let model = &Model { sizes: if model.sizes.is_empty() { vec![0.0; 2] } else { model.sizes.clone() }, ..model.clone() };
+    let model =
+        &Model { sizes: if model.sizes.is_empty() { vec![0.0; 2] } else { model.sizes.clone() }, ..model.clone() };
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
     pass(&records, &selections, model, noise, headings, &mut [Box::new(Term)], want)
