@@ -79,7 +79,10 @@ impl<'s, 'a> MarkReader<'s, 'a> {
     }
 
     /// The runs of one protocol, each with its wheels' turns and its marks, where both were measured.
-    fn runs(&self, protocol: Protocol) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
+    fn runs(
+        &self,
+        protocol: Protocol,
+    ) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
         let runs = self.session.runs.iter().filter(move |run| run.info().protocol == Some(protocol));
         runs.filter_map(|run| {
             let wheel_rad = run.wheel_turn_rad(self.session.robot)?;
@@ -95,11 +98,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
             // Poses: the contacts themselves are the marks.
             return Ok(run.observed_ends().map(|(start, end)| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
-                Marks {
-                    start: contacts.map(|p| start * p),
-                    end: contacts.map(|p| end * p),
-                    outside_m: Wheels::both(0.0),
-                }
+                Marks { start: contacts.map(|p| start * p), end: contacts.map(|p| end * p), outside_m: Wheels::both(0.0) }
             }));
         }
         let Some(outermost) = self.outermost else { return Ok(None) };
@@ -112,14 +111,9 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         }
         let start = outermost.map(|(point, _)| readings.iter().find(|reading| reading.point == point));
         let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
-        let both =
-            |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
+        let both = |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
         let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
-        Ok(Some(Marks {
-            start,
-            end,
-            outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m },
-        }))
+        Ok(Some(Marks { start, end, outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m } }))
     }
 }
 
@@ -212,10 +206,7 @@ impl Direct {
 }
 
 /// The values that are kept.
-fn kept<'v>(
-    values: impl Iterator<Item = f64> + Clone + 'v,
-    keep: &'v [bool],
-) -> impl Iterator<Item = f64> + Clone + 'v {
+fn kept<'v>(values: impl Iterator<Item = f64> + Clone + 'v, keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
     values.zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| value)
 }
 
@@ -260,13 +251,13 @@ impl Method for Direct {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way"
-                    .to_owned(),
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way".to_owned(),
             });
         };
 
-        let slope =
-            Wheels::from_sides(|side| mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
+        let slope = Wheels::from_sides(|side| {
+            mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0)
+        });
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
         Ok(Calibration {
@@ -307,10 +298,7 @@ mod tests {
     fn marks_after(increment: Increment, outside_m: Wheels<f64>) -> Marks {
         let half_m = 0.5 * 0.363;
         let start_pose = Pose::new(0.3, -0.2, 0.8);
-        let body = Wheels {
-            left: Point::new(0.0, half_m + outside_m.left),
-            right: Point::new(0.0, -half_m - outside_m.right),
-        };
+        let body = Wheels { left: Point::new(0.0, half_m + outside_m.left), right: Point::new(0.0, -half_m - outside_m.right) };
         let end_pose = start_pose * increment.arc();
         Marks { start: body.map(|p| start_pose * p), end: body.map(|p| end_pose * p), outside_m }
     }
@@ -324,8 +312,7 @@ mod tests {
                 let marks = marks_after(increment, outside_m);
                 let measured_rad = marks.turn_rad(0.0);
                 assert!((measured_rad - turn_rad).abs() < 1e-14);
-                let arc_m =
-                    Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
+                let arc_m = Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
                 for side in Side::BOTH {
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * distance_m.signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };

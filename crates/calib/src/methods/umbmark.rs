@@ -72,8 +72,7 @@ impl Method for Umbmark {
         let mut side_m = None;
         for session in sessions {
             for run in &session.runs {
-                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol))
-                else {
+                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol)) else {
                     continue;
                 };
                 let Some((world_from_start, world_from_end)) = run.observed_ends() else { continue };
@@ -82,16 +81,12 @@ impl Method for Umbmark {
                 };
                 #[allow(clippy::float_cmp)] // settings, not measurements
                 if *side_m.get_or_insert(run_side_m) != run_side_m {
-                    return Err(Self::not_applicable(
-                        "its squares must all have the same side_m; calibrate them apart",
-                    ));
+                    return Err(Self::not_applicable("its squares must all have the same side_m; calibrate them apart"));
                 }
                 // In the start's frame the odometry starts at the origin and the first leg points along +x.
                 let seen = world_from_start.to(world_from_end);
                 let mut reckoned = None;
-                run.dead_reckon(session.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, |_, pose| {
-                    reckoned = Some(pose)
-                });
+                run.dead_reckon(session.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, |_, pose| reckoned = Some(pose));
                 if let Some(reckoned) = reckoned {
                     errors.push((seen.x_m - reckoned.x_m, seen.y_m - reckoned.y_m));
                 }
@@ -149,10 +144,9 @@ fn corner_errors(form: Form, side_m: f64, cw: Direction, ccw: Direction) -> Corn
         Form::Y => (cw.y_m, ccw.y_m, -1.0),
     };
     let four = -4.0 * side_m;
-    let variances = cw
-        .mean_variance()
-        .zip(ccw.mean_variance())
-        .map(|(cw_var, ccw_var)| ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four)));
+    let variances = cw.mean_variance().zip(ccw.mean_variance()).map(|(cw_var, ccw_var)| {
+        ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four))
+    });
     CornerErrors {
         alpha_rad: (cw.mean + sign * ccw.mean) / four,
         beta_rad: (cw.mean - sign * ccw.mean) / four,
