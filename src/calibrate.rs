@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Method, or `all` for each one that applies.
-    #[arg(long, default_value = "direct", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
+    #[arg(long, default_value = "joint", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
     method: String,
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
     #[arg(long, value_name = "FILE")]

@@ -5,11 +5,12 @@
 
 use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::evidence::Evidence;
 use super::model::{Column, Model};
 use super::noise::Noise;
+use super::normal::Sums;
 use super::records::{Chain, Piece, Records, Start};
 use super::thinning::{Leg, Selection, carry};
 
@@ -41,6 +42,24 @@ pub(crate) struct Want {
     pub(crate) no_gate: bool,
 }
 
+/// Score of the cost by the logarithms of the variances, and its information.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoiseScore {
+    pub(crate) gradient: Vector4<f64>,
+    pub(crate) information: Matrix4<f64>,
+}
+
+impl NoiseScore {
+    fn zero() -> Self {
+        Self { gradient: Vector4::zeros(), information: Matrix4::zeros() }
+    }
+
+    fn add(&mut self, other: &Self, weight: f64) {
+        self.gradient += weight * other.gradient;
+        self.information += weight * other.information;
+    }
+}
+
 /// The result of a pass.
 #[derive(Debug, Clone)]
 pub struct Pass {
@@ -50,22 +69,20 @@ pub struct Pass {
     pub innovations: Vec<Vec<Innovation>>,
     /// Looks left out as outliers in the first phase: chain and look.
     pub outliers: Vec<(usize, usize)>,
-    /// Score of the cost by the logarithms of the variances, and its information.
-    pub(crate) noise_gradient: [f64; NOISES],
-    pub(crate) noise_information: [[f64; NOISES]; NOISES],
+    /// Score of the cost by the logarithms of the variances.
+    pub(crate) noise: NoiseScore,
     /// How the free headings of chains without one follow a step of the parameters: chain, step at rest, and by each column.
     pub(crate) headings: Vec<(usize, f64, Vec<f64>)>,
 }
 
 impl Pass {
     /// Of no run.
-    pub(crate) const fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         Self {
             runs: Vec::new(),
             innovations: Vec::new(),
             outliers: Vec::new(),
-            noise_gradient: [0.0; NOISES],
-            noise_information: [[0.0; NOISES]; NOISES],
+            noise: NoiseScore::zero(),
             headings: Vec::new(),
         }
     }
@@ -100,7 +117,7 @@ pub(crate) fn pass(
             }
             let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
             filter.run(legs, free_headings[number]);
-            let Filter { sums, outliers, innovations: of_chain, noise_gradient, noise_information, .. } = filter;
+            let Filter { sums, outliers, innovations: of_chain, noise_score: of_noise, .. } = filter;
             innovations.extend(of_chain);
             if phase == 0 {
                 result.outliers.extend(outliers.into_iter().map(|look| (number, look)));
@@ -110,76 +127,13 @@ pub(crate) fn pass(
                 result.headings.push((number, rest, by));
             }
             result.runs[position].add(&evidence, weight);
-            for a in 0..NOISES {
-                result.noise_gradient[a] += weight * noise_gradient[a];
-                for b in 0..NOISES {
-                    result.noise_information[a][b] += weight * noise_information[a][b];
-                }
-            }
+            result.noise.add(&of_noise, weight);
         }
         if want.innovations {
             result.innovations.push(innovations);
         }
     }
     result
-}
-
-/// Normal equation of one chain, its free heading last.
-struct Sums {
-    columns: usize,
-    information: Vec<f64>,
-    gradient: Vec<f64>,
-    chi_square: f64,
-    log_det: f64,
-    count: f64,
-    free: bool,
-}
-
-impl Sums {
-    fn add(&mut self, j: &[f64], v: f64, s: f64) {
-        let per_s = 1.0 / s;
-        for (row, &a) in j.iter().enumerate() {
-            let scaled = a * per_s;
-            if scaled != 0.0 {
-                self.gradient[row] += scaled * v;
-                let out = &mut self.information[row * self.columns..row * self.columns + row + 1];
-                out.iter_mut().zip(j).for_each(|(out, b)| *out += scaled * b);
-            }
-        }
-        self.chi_square += v * v * per_s;
-        self.log_det += s.ln();
-        self.count += 1.0;
-    }
-
-    /// The evidence with the free heading at its best, and how that follows the others: at rest, and by each column.
-    fn eliminated(&self, run: (usize, usize), columns: usize) -> (Evidence, Option<(f64, Vec<f64>)>) {
-        let mut evidence = Evidence::new(run, columns);
-        for row in 0..columns {
-            evidence.gradient[row] = self.gradient[row];
-            for column in 0..=row {
-                let value = self.information[row * self.columns + column];
-                evidence.information[(row, column)] = value;
-                evidence.information[(column, row)] = value;
-            }
-        }
-        (evidence.chi_square, evidence.log_det, evidence.count) = (self.chi_square, self.log_det, self.count);
-        let last = &self.information[columns * self.columns..];
-        if !self.free || last[columns] <= 0.0 {
-            return (evidence, None);
-        }
-        let (own, gradient) = (last[columns], self.gradient[columns]);
-        let by: Vec<f64> = last[..columns].iter().map(|cross| -cross / own).collect();
-        for row in 0..columns {
-            evidence.gradient[row] += by[row] * gradient;
-            for column in 0..columns {
-                evidence.information[(row, column)] += by[row] * last[column];
-            }
-        }
-        evidence.chi_square -= gradient * gradient / own;
-        evidence.log_det += own.ln();
-        evidence.count -= 1.0;
-        (evidence, Some((-gradient / own, by)))
-    }
 }
 
 struct Filter<'f, 'a> {
@@ -202,8 +156,7 @@ struct Filter<'f, 'a> {
     sums: Sums,
     innovations: Vec<Innovation>,
     outliers: Vec<usize>,
-    noise_gradient: [f64; NOISES],
-    noise_information: [[f64; NOISES]; NOISES],
+    noise_score: NoiseScore,
     j: Vec<f64>,
 }
 
@@ -242,19 +195,10 @@ impl<'f, 'a> Filter<'f, 'a> {
             wheel_rad: chain.wheel_rad,
             previous: None,
             gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
-            sums: Sums {
-                columns: all,
-                information: vec![0.0; all * all],
-                gradient: vec![0.0; all],
-                chi_square: 0.0,
-                log_det: 0.0,
-                count: 0.0,
-                free: false,
-            },
+            sums: Sums::new(columns),
             innovations: Vec::new(),
             outliers: Vec::new(),
-            noise_gradient: [0.0; NOISES],
-            noise_information: [[0.0; NOISES]; NOISES],
+            noise_score: NoiseScore::zero(),
             j: vec![0.0; all],
         }
     }
@@ -575,12 +519,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             let cross = gain_by * gain.transpose() * s;
             self.covariance_by[a] -= cross + cross.transpose() + gain * gain.transpose() * s_by[a];
         }
-        for a in 0..NOISES {
-            self.noise_gradient[a] += 0.5 * s_by[a] / s * (1.0 - v * v / s) + v * v_by[a] / s;
-            for b in 0..NOISES {
-                self.noise_information[a][b] += 0.5 * s_by[a] * s_by[b] / (s * s) + v_by[a] * v_by[b] / s;
-            }
-        }
+        let (s_by, v_by) = (Vector4::from(s_by) / s, Vector4::from(v_by));
+        self.noise_score.gradient += s_by * (0.5 * (1.0 - v * v / s)) + v_by * (v / s);
+        self.noise_score.information += s_by * s_by.transpose() * 0.5 + v_by * v_by.transpose() / s;
     }
 }
 

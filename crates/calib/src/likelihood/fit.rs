@@ -16,6 +16,8 @@ const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 /// A step this small, squared and over its variance, changes nothing that a print shows.
 const SETTLED: f64 = 1e-8;
 const NOISE_SETTLED: f64 = 1e-4;
+/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
+const LEAST_SIGMA: f64 = 1e-6;
 const LARGEST_NOISE_STEP: f64 = 1.5;
 /// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
 const DAMPING: f64 = 1e-7;
@@ -148,7 +150,7 @@ pub(crate) fn fit_from(
             }
             let middle = squares.len() / 2;
             let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6));
+            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
         }
     }
     let want = Want { noise_score: true, ..Want::default() };
@@ -259,14 +261,18 @@ impl Pace {
 /// A scoring step of the noise; returns the largest component of the whole step.
 fn step_noise(noise: &mut Noise, pace: &mut Pace, found: &Pass, prior: &NoisePrior) -> f64 {
     let pull = prior.pull(noise);
-    let gradient = Vector4::from_fn(|k, _| found.noise_gradient[k] + pull[k].0);
-    let information = Matrix4::from_fn(|i, j| found.noise_information[i][j] + if i == j { pull[i].1 } else { 0.0 });
+    let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+    let information =
+        found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
     let Some(step) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else { return 0.0 };
     let tamed = pace.tamed(step);
+    let before = *noise;
     for (variance, by) in noise.variance.iter_mut().zip(tamed.iter()) {
-        *variance *= by.exp();
+        *variance = (*variance * by.exp()).max(LEAST_SIGMA * LEAST_SIGMA);
     }
-    step.amax()
+    // What stands at its floor does not move.
+    let moving = (0..4).filter(|&k| noise.variance[k] != before.variance[k]);
+    moving.map(|k| step[k].abs()).fold(0.0, f64::max)
 }
 
 /// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.

@@ -14,7 +14,10 @@ mod filter;
 mod fit;
 mod model;
 mod noise;
+mod normal;
 mod records;
+#[cfg(test)]
+mod tests;
 mod thinning;
 
 pub use evidence::{Evidence, Information};

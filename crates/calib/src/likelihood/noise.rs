@@ -76,7 +76,8 @@ impl Noise {
         self.variance[component as usize].sqrt()
     }
 
-    pub(crate) fn scaled(&self, factor: f64) -> Self {
-        Self { variance: self.variance.map(|variance| variance * factor) }
+    /// All larger by a factor, and none less than `least`.
+    pub(crate) fn scaled(&self, factor: f64, least: f64) -> Self {
+        Self { variance: self.variance.map(|variance| (variance * factor).max(least)) }
     }
 }

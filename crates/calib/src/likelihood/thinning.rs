@@ -67,10 +67,8 @@ impl Selection {
             first = of.end;
             let share = |of: usize| block * of / blocks..(block + 1) * of / blocks;
             if run.len() >= blocks {
-                let part = share(run.len());
-                for chain in of.start + part.start..of.start + part.end {
-                    legs[chain].clone_from(&self.legs[chain]);
-                }
+                let part = of.start + share(run.len()).start..of.start + share(run.len()).end;
+                legs[part.clone()].clone_from_slice(&self.legs[part]);
             } else {
                 for chain in of {
                     legs[chain] = self.legs[chain][share(self.legs[chain].len())].to_vec();

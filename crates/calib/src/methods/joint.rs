@@ -41,6 +41,8 @@ const TURNED_ASIDE_RAD: f64 = 0.2;
 /// With fewer runs, they are cut into blocks to be held out.
 const LEAST_RUNS: usize = 6;
 const FOLDS: usize = 6;
+/// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
+const SCATTER_OF_RUNS: usize = 20;
 /// A nuisance must gain by so many standard errors on what was held out.
 const GAIN_IN_SIGMAS: f64 = 2.0;
 
@@ -297,8 +299,8 @@ impl JointFit<'_> {
         Ok(extended)
     }
 
-    /// Covariance of the free columns: from the observed information where innovations are white; where they are not, or the scatter of the runs is larger than
-    /// the information says, corrected by that scatter (the sandwich over runs).
+    /// Covariance of the free columns: from the observed information where runs are few and innovations white, else corrected for what the model gets wrong by the
+    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account).
     #[must_use]
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let information = self.fit.information(&self.columns)?;
@@ -309,15 +311,13 @@ impl JointFit<'_> {
         };
         let (_, inverse) = reduced.solve()?;
         let model_based = &free * &inverse * free.transpose();
-        if self.thinning == Thinning::NONE {
-            return Some(model_based);
-        }
         let units = self.units();
-        #[allow(clippy::cast_precision_loss)]
-        let (count, parameters) = (units.len() as f64, free.ncols() as f64);
-        if count <= parameters + 1.0 {
+        let enough = if self.thinning == Thinning::NONE { SCATTER_OF_RUNS } else { free.ncols() + 2 };
+        if units.len() < enough {
             return Some(model_based);
         }
+        #[allow(clippy::cast_precision_loss)]
+        let count = units.len() as f64;
         let mut meat = DMatrix::zeros(free.ncols(), free.ncols());
         for unit in &units {
             let of = unit.of(&self.columns);
