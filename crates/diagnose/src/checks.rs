@@ -21,6 +21,10 @@ pub(crate) const CHECKS_LEVEL: f64 = 0.01;
 const LAGS: usize = 5;
 /// A look off by this much is an outlier with a chance of 1e-5.
 const OUTLIER_CHANCE: f64 = 1e-5;
+/// The look after an outlier fits unless its chance is below this.
+const BACK_AGAIN: f64 = 0.01;
+/// An innovation this large, in standard deviations, comes from the tail.
+const LARGE: f64 = 3.0;
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
@@ -34,7 +38,8 @@ pub(crate) struct Checked {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Outliers {
     pub(crate) isolated: usize,
-    pub(crate) in_a_row: usize,
+    /// Those after which the robot is seen where the outlier was.
+    pub(crate) staying: usize,
     pub(crate) looks: usize,
     pub(crate) p_value: f64,
 }
@@ -98,7 +103,7 @@ pub(crate) fn check(model: &Extended<'_>) -> Checked {
     tails(fit, &mut add);
     let outliers = outliers(fit);
     #[allow(clippy::cast_precision_loss)]
-    add("outliers", (outliers.isolated + outliers.in_a_row) as f64, outliers.p_value);
+    add("outliers", (outliers.isolated + outliers.staying) as f64, outliers.p_value);
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
@@ -205,14 +210,21 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
     ((1.0 - 2.0 / (9.0 * a)) - ((1.0 - 2.0 / a) / low.abs()).cbrt() * low.signum()) / (2.0 / (9.0 * a)).sqrt()
 }
 
+/// Looks far off, and what follows large innovations: after a jump of the robot the next looks are off the same way, as the filter has followed only in part;
+/// after an error of one look they are off the other way, or not at all where the look was left out.
 fn outliers(fit: &JointFit<'_>) -> Outliers {
     let mut found = Outliers { looks: innovations(fit, 0).len(), ..Outliers::default() };
     let far = &fit.fit.pass.outliers;
+    let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     for (position, &(chain, look)) in far.iter().enumerate() {
-        // Looks of one phase may leave gaps between them; neighbours in the list of one chain and next in time are in a row.
-        let near = |other: Option<&(usize, usize)>| other.is_some_and(|&(c, l)| c == chain && l.abs_diff(look) == 1);
-        if near(far.get(position + 1)) || near(position.checked_sub(1).and_then(|before| far.get(before))) {
-            found.in_a_row += 1;
+        // Thinned looks have gaps between them: the next that was taken is the neighbour.
+        let next = phase.partition_point(|innovation| (innovation.chain, innovation.look) <= (chain, look));
+        let after = phase[next..].iter().take(3).filter(|innovation| innovation.chain == chain);
+        let (square, values) = after.fold((0.0, 0.0), |(sum, n), innovation| (sum + innovation.z.powi(2), n + 1.0));
+        let followed = far.get(position + 1).is_some_and(|&(c, l)| c == chain && l == look + 1);
+        let follows = position.checked_sub(1).is_some_and(|before| far[before].0 == chain && far[before].1 + 1 == look);
+        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < BACK_AGAIN) {
+            found.staying += 1;
         } else {
             found.isolated += 1;
         }
@@ -222,6 +234,18 @@ fn outliers(fit: &JointFit<'_>) -> Outliers {
     // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
     found
+}
+
+/// What follows large innovations of a component: the mean of the next, in the direction of the large one, in standard errors. Positive after what stays,
+/// negative after errors of single looks.
+pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> f64 {
+    let series = innovations(fit, component);
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for pair in series.windows(2).filter(|pair| pair[0].chain == pair[1].chain && pair[0].z.abs() > LARGE) {
+        sum += pair[1].z * pair[0].z.signum();
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count.sqrt() } else { 0.0 }
 }
 
 /// Score tests of every question, all in one pass.

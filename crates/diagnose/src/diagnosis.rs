@@ -12,7 +12,7 @@ use scenario::Scenario;
 
 use crate::blind::blind;
 use crate::candidate::{Choice, mean_terms};
-use crate::checks::{Checked, check};
+use crate::checks::{Checked, check, what_follows};
 use crate::document::{Document, Finding, Gain, Value, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, sessions};
@@ -183,18 +183,46 @@ fn is_scatter(finding: &Finding) -> bool {
 /// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
 const SCATTER_LEVEL: f64 = 1e-3;
 
+/// What follows large errors is told from chance at this many standard errors.
+const FOLLOWS: f64 = 2.6;
+
 /// Scatter that failed checks show.
 fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     let mut findings = Vec::new();
     let outliers = asked.checked.outliers;
-    if outliers.p_value < SCATTER_LEVEL && outliers.isolated > outliers.in_a_row {
+    let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
+    let far = outliers.isolated + outliers.staying;
+    if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
-        let share = outliers.isolated as f64 / (outliers.looks + outliers.isolated) as f64;
+        let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
-        let what = format!("{} of {} looks of the instrument lie far off and the next are back", outliers.isolated, outliers.looks);
+        let of = outliers.looks + far;
+        let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
         let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
         findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
+    } else {
+        // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
+        let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
+        let kurtosis = |name: &str| asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic);
+        let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
+        let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
+        let jump = heaviest.and_then(|(name, component, sign)| {
+            let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;
+            Some((p_value, what_follows(&asked.found.model.fit, component), sign))
+        });
+        if let Some((p_value, follows, sign)) = jump {
+            let stays = naming::with_sign(sign, &options.without);
+            let errs = naming::with_sign(Sign::IsolatedLooks, &options.without);
+            let (ids, what) = if follows > FOLLOWS {
+                (stays, "single large errors that stay: the robot jumped")
+            } else if follows < -FOLLOWS {
+                (errs, "single large errors of the instrument, undone in the next look")
+            } else {
+                ([stays, errs].concat(), "errors have a heavier tail than normal ones, and what follows them does not say whose they are")
+            };
+            findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
+        }
     }
     if let Some((coefficient, sigmas)) = asked.correlated
         && coefficient > 0.0

@@ -14,8 +14,12 @@ const GAIN: f64 = 20.0;
 /// Wheels are known to a few per cent; the separation, to which skid steering adds, less well.
 const WHEEL_SD: f64 = 0.05;
 const SEPARATION_SD: f64 = 0.3;
+/// Swapped wheels are, to the likelihood, reversed ones under an instrument that looks backward; an instrument mostly looks ahead.
+const MOUNT_SD_RAD: f64 = 0.3;
 /// A wheel noise, m/√m, beyond which counts hardly follow the robot.
 const WHEEL_SIGMA: f64 = 0.01;
+/// The same of turns, rad/√rad.
+const TURN_SIGMA: f64 = 0.05;
 /// A share of looks that do not fit beyond which something is wrong with the records.
 const OUTLIERS: f64 = 0.01;
 
@@ -70,6 +74,7 @@ fn implausible(fit: &JointFit<'_>) -> f64 {
     off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_SD)
         + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_SD)
         + off(model.separation_m, nominal.separation_m, SEPARATION_SD)
+        + 0.5 * (model.body_from_sensor.theta_rad / MOUNT_SD_RAD).powi(2)
 }
 
 /// Does a base fit look like a robot whose counts follow it?
@@ -82,6 +87,7 @@ fn is_sound(fit: &JointFit<'_>) -> bool {
         && near(model.m_per_rad.right, nominal.m_per_rad.right, 2.0 * WHEEL_SD)
         && near(model.separation_m, nominal.separation_m, 1.5 * SEPARATION_SD)
         && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Wheel) < WHEEL_SIGMA
+        && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Turn) < TURN_SIGMA
         && outliers < OUTLIERS
         && fit.fit.converged
 }

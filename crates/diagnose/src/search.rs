@@ -4,6 +4,7 @@ use calib::methods::joint::JointFit;
 use nalgebra::DVector;
 
 use crate::candidate::{Choice, terms};
+use crate::gain::gain;
 use crate::scan::{Projection, Scored, inverse, principal, scan, total};
 use crate::statistics::{of_trials, p_of_statistic};
 
@@ -81,7 +82,6 @@ pub(crate) struct Found<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Test {
     pub(crate) statistic: f64,
-    pub(crate) dimensions: usize,
     pub(crate) p_value: f64,
     /// Value and standard deviation of each parameter.
     pub(crate) sizes: Vec<(f64, f64)>,
@@ -102,8 +102,7 @@ pub(crate) fn count(fit: &JointFit<'_>) -> f64 {
 /// Log of the chance of the data under a fitted choice over that without it, the others staying: its likelihood times how well its sizes agree with what
 /// is plausible.
 pub(crate) fn log_odds(base_cost: f64, extended: &Extended<'_>, count: f64, choice: usize) -> f64 {
-    let Some((test, directions)) = examine(extended, choice) else { return f64::NEG_INFINITY };
-    let _ = test;
+    let Some((_, directions)) = examine(extended, choice) else { return f64::NEG_INFINITY };
     base_cost - cost(&extended.fit, count)
         + directions
             .iter()
@@ -135,7 +134,6 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
     let test = Test {
         statistic,
-        dimensions: directions.len(),
         p_value: p_of_statistic(statistic, directions.len(), freedom),
         sizes: sizes.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
     };
@@ -223,6 +221,13 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         let (_, extended) = found.swap_remove(0);
         // A size that the refit does not confirm was an accident of the score.
         if examine(&extended, place).is_none_or(|(test, _)| test.p_value * tests > SCAN_LEVEL) {
+            break;
+        }
+        // Nor is a term that predicts unseen runs worse than none.
+        if gain(&model, &extended).is_ok_and(|gain| {
+            let score = gain.log_score_per_observation;
+            score.low + score.high <= 0.0
+        }) {
             break;
         }
         model = extended;
