@@ -1,4 +1,6 @@
-//! `yair calibrate DATASET... [--method M] [--out FILE]`
+//! `yair calibrate DATASET... [--method M] [--out FILE]`, and `--online`
+
+mod follow;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,6 +23,9 @@ pub(crate) struct Arguments {
     /// Method, or `all` for each one that applies.
     #[arg(long, default_value = "joint", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
     method: String,
+    /// Follow the parameters through the logs as the robot would on line, a look after the other, and say when they have settled.
+    #[arg(long, conflicts_with_all = ["method", "out"])]
+    online: bool,
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -37,6 +42,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     refuse_wrapped_counters(&sessions)?;
+    if arguments.online {
+        return follow::run(&sessions, terminal);
+    }
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
     let outcomes: Vec<_> = chosen.iter().map(|method| (method.name(), method.calibrate(&sessions))).collect();
