@@ -17,7 +17,7 @@ use crate::document::{Document, Finding, Gain, Value, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, sessions};
 use crate::naming;
-use crate::search::{Extended, Found, examine, search};
+use crate::search::{Extended, Found, evidence, examine, reach, search};
 use crate::statistics::p_of_z;
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
@@ -117,6 +117,23 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
             asked.base = thinned;
         }
     }
+    // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
+    let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
+    if !asked.found.model.choices.is_empty()
+        && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
+    {
+        let named = evidence(&alone.fit, &asked.found.model);
+        #[allow(clippy::cast_precision_loss)]
+        let unnamed = evidence(&alone.fit, &sparse.model) - (sparse.trials as f64).ln();
+        if unnamed > named + reach(named) {
+            asked.found.model = alone;
+            asked.found.names.clear();
+            asked.found.tests.clear();
+            asked.checked = check(&sparse.model);
+            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+            return asked;
+        }
+    }
     let goes_with_something = asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name));
     if goes_with_something
         && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
@@ -145,7 +162,7 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
     }
     findings.extend(scatter(&asked, options));
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let explained = asked.sparse.is_some() || findings.iter().any(|finding| is_scatter(finding));
+    let explained = asked.sparse.is_some() || findings.iter().any(is_scatter);
     if !explained {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }

@@ -92,11 +92,14 @@ fn is_sound(fit: &JointFit<'_>) -> bool {
         && fit.fit.converged
 }
 
+/// A form of a fault: its sizes, what it is, and the records without it.
+type Form = (Vec<(&'static str, f64)>, String, Vec<Dataset>);
+
 /// The same rewriting of all sessions, by its sizes; a session in which it is impossible stays as it is.
 fn together(
     datasets: &[Dataset],
     rewritings: fn(&Dataset) -> Vec<Rewriting>,
-) -> Vec<(Vec<(&'static str, f64)>, String, Vec<Dataset>)> {
+) -> Vec<Form> {
     let each: Vec<Vec<Rewriting>> = datasets.iter().map(rewritings).collect();
     let mut forms: Vec<(Vec<(&'static str, f64)>, String)> = Vec::new();
     for rewriting in each.iter().flatten() {

@@ -8,7 +8,7 @@ use crate::candidate::Choice;
 use crate::checks::Checked;
 use crate::document::{Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{Extended, Found, Name, Test};
+use crate::search::{Extended, Found, LEAST_REACH, Name, Test, reach};
 use crate::statistics::{of_trials, z_of_p};
 
 /// The parameters of a choice as found.
@@ -49,7 +49,8 @@ pub(crate) fn of_search(found: &Found<'_>) -> Vec<Finding> {
 
 fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
-    let weights: f64 = names.iter().map(|name| (name.log_odds - top).exp()).sum();
+    // Where a name explains thousands, its form is not known well enough for the last of them to count in full.
+    let weights: f64 = names.iter().map(|name| ((name.log_odds - top) * LEAST_REACH / reach(top)).exp()).sum();
     let p_value = of_trials(test.p_value, trials);
     let parameters = parameters(choice, &test.sizes);
     let ids: Vec<String> = names.iter().map(|name| name.choice.id().to_owned()).collect();
@@ -81,6 +82,7 @@ pub(crate) fn of_sparse(model: &Extended<'_>, test: &Test, p_value: f64, trials:
     let (coefficient, sigma) = *test.sizes.first()?;
     let covariates: Vec<String> = sparse.covariates.iter().map(crate::sparse::Covariate::name).collect();
     let channel = sparse.channel.name();
+    let covariates = if covariates.is_empty() { vec!["1".to_owned()] } else { covariates };
     let sentence = format!(
         "not in the catalogue: {channel}, grows with {} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried",
         covariates.join(" · ")
@@ -153,10 +155,12 @@ pub(crate) fn of_scatter(
     parameters: BTreeMap<String, Value>,
     what: &str,
 ) -> Option<Finding> {
+    let ids = if ids.is_empty() { &["unlisted"] } else { ids };
     let first = ids.first()?;
     #[allow(clippy::cast_precision_loss)]
     let probability = 1.0 / ids.len() as f64;
     let sentence = match ids {
+        ["unlisted"] => format!("not in the catalogue: {what}"),
         [id] => format!("{id}: {what}"),
         ids => format!("one of {}; this data cannot tell which: {what}", ids.join(", ")),
     };

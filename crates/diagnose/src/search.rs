@@ -17,7 +17,43 @@ const RIVAL_SHARE: f64 = 0.5;
 /// Most rivals that are refitted.
 const MOST_RIVALS: usize = 6;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
-pub(crate) const REACH: f64 = 3.0;
+pub(crate) const LEAST_REACH: f64 = 3.0;
+/// A hypothesis describes its effect to a tenth of its size or so, and errs by the square of that in what it explains.
+const FORM_ERROR: f64 = 0.01;
+
+/// How much less likely than the best a name may make the data and still be told.
+pub(crate) fn reach(best: f64) -> f64 {
+    LEAST_REACH.max(FORM_ERROR * best)
+}
+
+/// Log of the chance of the data under a model over that under its base.
+pub(crate) fn evidence(base: &JointFit<'_>, model: &Extended<'_>) -> f64 {
+    let most = count(base).max(count(&model.fit));
+    let weights = (0..model.choices.len()).filter_map(|choice| examine(model, choice)).map(|(_, own)| weight(&own));
+    cost(base, most) - cost(&model.fit, most) + weights.sum::<f64>()
+}
+
+/// How well sizes agree with what is plausible, and what their freedom costs.
+fn weight(directions: &[(f64, f64)]) -> f64 {
+    let of = |(value, size): &(f64, f64)| -0.5 * size * size * value / (1.0 + value) - 0.5 * (1.0 + value).ln();
+    directions.iter().map(of).sum()
+}
+
+/// Whether a choice's sizes make an effect that can be: a share that is lost is no gain. What is within its error of nothing counts as nothing.
+fn is_physical(extended: &Extended<'_>, place: usize) -> bool {
+    let Choice::Effect { id, .. } = &extended.choices[place] else { return true };
+    let Some((test, _)) = examine(extended, place) else { return false };
+    let choice = &extended.choices[place];
+    let fitted = choice.parameters().iter().zip(&test.sizes);
+    let sizes: Vec<(&str, f64)> = fitted
+        .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
+        .chain(choice.held())
+        .collect();
+    effects::effect_of_sizes(id, &sizes).is_some_and(|effect| effect.physical().check().is_ok())
+}
+
+/// A size within so many standard deviations of nothing may be nothing.
+const IN_ERROR: f64 = 3.0;
 
 /// One candidate of an effect: its best shape, with its chance after paying for all shapes.
 #[derive(Debug, Clone)]
@@ -103,11 +139,7 @@ pub(crate) fn count(fit: &JointFit<'_>) -> f64 {
 /// is plausible.
 pub(crate) fn log_odds(base_cost: f64, extended: &Extended<'_>, count: f64, choice: usize) -> f64 {
     let Some((_, directions)) = examine(extended, choice) else { return f64::NEG_INFINITY };
-    base_cost - cost(&extended.fit, count)
-        + directions
-            .iter()
-            .map(|(value, size)| -0.5 * size * size * value / (1.0 + value) - 0.5 * (1.0 + value).ln())
-            .sum::<f64>()
+    base_cost - cost(&extended.fit, count) + weight(&directions)
 }
 
 /// The test of a choice in its fitted model, and along its principal directions in units of the plausible: information and size.
@@ -166,7 +198,8 @@ fn rivals<'a>(
         .filter_map(|entry| {
             let mut choices = without.choices.clone();
             choices.insert(place, entry.scored.choice.clone());
-            Some((entry.scored.choice.clone(), refit(base, choices)?))
+            let extended = refit(base, choices)?;
+            is_physical(&extended, place).then(|| (entry.scored.choice.clone(), extended))
         })
         .collect();
     let most = fits.iter().map(|(_, extended)| count(&extended.fit)).fold(count(&without.fit), f64::max);
@@ -260,7 +293,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
             continue;
         }
         let top = found[0].0.log_odds;
-        names.push(found.iter().filter(|(name, _)| name.log_odds > top - REACH).map(|(name, _)| name.clone()).collect());
+        names.push(found.iter().filter(|(name, _)| name.log_odds > top - reach(top)).map(|(name, _)| name.clone()).collect());
         model = found.swap_remove(0).1;
         place += 1;
     }

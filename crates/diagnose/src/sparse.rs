@@ -3,7 +3,7 @@
 //! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised because a threshold on raw coefficients depends on
 //! units. Every product vanishes at standstill.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
 use kinematics::{Pose, Side};
 
 /// Which increment a term adds to.
@@ -15,16 +15,28 @@ pub(crate) enum Channel {
     Across,
     /// The heading.
     Yaw,
+    /// What the instrument sees, ahead of the robot.
+    SeenAlong,
+    /// What the instrument sees, to the left of the robot.
+    SeenAcross,
+    /// The heading that the instrument sees.
+    SeenHeading,
 }
 
 impl Channel {
+    /// Of the motion.
     pub(crate) const ALL: [Self; 3] = [Self::Along, Self::Across, Self::Yaw];
+    /// Of the instrument.
+    pub(crate) const SEEN: [Self; 3] = [Self::SeenAlong, Self::SeenAcross, Self::SeenHeading];
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Along => "along",
             Self::Across => "across",
             Self::Yaw => "yaw",
+            Self::SeenAlong => "seen_along",
+            Self::SeenAcross => "seen_across",
+            Self::SeenHeading => "seen_heading",
         }
     }
 }
@@ -123,9 +135,17 @@ struct Term {
 const ALONG: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m/s", plausible: 0.02 }];
 const YAW: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad/s", plausible: 0.02 }];
 
+const SEEN: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m", plausible: 0.02 }];
+const SEEN_HEADING: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad", plausible: 0.02 }];
+
 impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
-        if self.of.channel == Channel::Yaw { &YAW } else { &ALONG }
+        match self.of.channel {
+            Channel::Along | Channel::Across => &ALONG,
+            Channel::Yaw => &YAW,
+            Channel::SeenAlong | Channel::SeenAcross => &SEEN,
+            Channel::SeenHeading => &SEEN_HEADING,
+        }
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -133,7 +153,7 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s <= 0.0 {
+        if interval.dt_s <= 0.0 || Channel::SEEN.contains(&self.of.channel) {
             return;
         }
         let increment = interval.increment();
@@ -187,7 +207,28 @@ impl ModelTerm for Term {
         gradient[0] = match self.of.channel {
             Channel::Along => Pose::new(size, 0.0, 0.0),
             Channel::Across => Pose::new(0.0, size, 0.0),
-            Channel::Yaw => Pose::new(0.0, 0.0, size),
+            _ => Pose::new(0.0, 0.0, size),
+        };
+    }
+
+    /// The instrument's library knows twist and heading alone.
+    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+        let (v, omega, heading_rad) = (look.twist.v_m_s, look.twist.omega_rad_s, look.world_from_body.theta_rad);
+        let value = |covariate: &Covariate| match covariate {
+            Covariate::Speed => v,
+            Covariate::AbsSpeed => v.abs(),
+            Covariate::YawRate => omega,
+            Covariate::AbsYawRate => omega.abs(),
+            Covariate::CosHeading => heading_rad.cos(),
+            Covariate::SinHeading => heading_rad.sin(),
+            _ => 0.0,
+        };
+        let size: f64 = self.of.covariates.iter().map(value).product();
+        gradient[0] = match self.of.channel {
+            Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
+            Channel::SeenAcross => Pose::new(0.0, size, 0.0),
+            Channel::SeenHeading => Pose::new(0.0, 0.0, size),
+            _ => return,
         };
     }
 }

@@ -65,12 +65,14 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         products.push(vec![CosPhase(side)]);
         products.push(vec![SinPhase(side)]);
     }
-    products
-        .into_iter()
-        .flat_map(|covariates| {
-            Channel::ALL.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
-        })
-        .collect()
+    let moved = products.into_iter().flat_map(|covariates| {
+        Channel::ALL.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+    });
+    let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading]];
+    let seen = seen.into_iter().flat_map(|covariates| {
+        Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+    });
+    moved.chain(seen).collect()
 }
 
 /// The best sparse term beside a model.

@@ -191,7 +191,7 @@ fn basis(options: &FitOptions) -> DMatrix<f64> {
     let eigen = (&held * held.transpose()).symmetric_eigen();
     let free: Vec<_> =
         (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-    DMatrix::from_columns(&free)
+    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
 }
 
 /// A damped Gauss–Newton step of the mean; returns its squared length over its variance.

@@ -345,7 +345,7 @@ impl JointFit<'_> {
         let eigen = (&held * held.transpose()).symmetric_eigen();
         let free: Vec<_> =
             (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-        DMatrix::from_columns(&free)
+        if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
     }
 }
 
