@@ -5,7 +5,8 @@ mod support;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use calib::methods::joint::Joint;
+use calib::likelihood::Column;
+use calib::methods::joint::{Joint, RISE_95};
 use calib::{Calibration, Method, Parameter, compare};
 use dataset::import::importer;
 use dataset::{Dataset, Displacement, Schedule, TruthSample};
@@ -168,6 +169,26 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
     }
     let (mix, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 5);
     assert!(calibrated(&mix).not_observable.is_empty());
+}
+
+/// Where thousands of looks make the cost a parabola, the interval at 95 % is 1.96 σ to each side: it is allowed 2 %, as σ is that of the information at the
+/// minimum and the cost's own curvature changes a little on the way. An interval of one σ, or of 1.64, would not pass.
+#[test]
+fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
+    let (dataset, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 6);
+    let sessions = [dataset.session()];
+    let fit = Joint::DEFAULT.fit(&sessions).expect("looks");
+    let (_, covariance) = fit.fit.information(&fit.columns).and_then(|information| information.solve()).expect("seen");
+    for (row, column) in Column::GEOMETRY.into_iter().enumerate() {
+        let (low, high) = fit.profile(column, RISE_95).expect("a profile");
+        let expected = 1.96 * covariance[(row, row)].sqrt();
+        assert!(
+            (high / expected - 1.0).abs() < 0.02 && (low / expected + 1.0).abs() < 0.02,
+            "{column:?}: {low} {high} {expected}"
+        );
+    }
+    let refused = fit.profile(Column::Latency, RISE_95).expect_err("not fitted").to_string();
+    assert!(refused.contains("Latency"), "{refused}");
 }
 
 /// 1000 trials of each case: RMSE²/bound has a standard error of √(2/1000) = 4.5 %, a coverage of 0.7 %, a ratio of RMSEs of two cases 3.2 %. At 4 of

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use dataset::{Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, WheelLog};
-use effects::{Command, Forward, Readout, SampleClock, Sighting, Step};
+use effects::{Command, Forward, Readout, RunStart, SampleClock, Sighting, Step};
 use kinematics::Pose;
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
@@ -180,5 +180,36 @@ fn motion_capture_looks_at_its_rate_stamps_late_and_rides_its_lever() {
             (last.x_m - 0.1 - moved.x_m).abs() < SETTLED_M && turn_rad.abs() < 2.0 * SETTLED_M / 0.363,
             "{engine:?}"
         );
+    }
+}
+
+/// It writes into the record what it is told of the session.
+struct Diary;
+
+impl Forward for Diary {
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        let said = [("number", f64::from(run.number)), ("session_s", run.session_s), ("session_m", run.session_m)];
+        run.info.covariates = said.map(|(name, value)| (name.to_owned(), value)).into();
+    }
+}
+
+#[test]
+fn a_run_knows_its_place_in_the_session_and_a_new_trial_is_a_new_session() {
+    let mut robot = SimulatedRobot::with_more_effects(&scenario(ENGINES[0]), 3, 0, vec![("diary", Box::new(Diary))])
+        .expect("simulates");
+    let settings = ProtocolSettings::default();
+    let motions = vec![Motion::Straight { length_m: -LENGTH_M }, Motion::Pause { duration_s: 1.0 }];
+    let program = MotionProgram { id: "run".to_owned(), protocol: Protocol::Free, settings, motions };
+    let mut run = Run::default();
+    let run_s = LENGTH_M / 0.25 + 1.0;
+    for (trial, number) in [(0, 0.0), (0, 1.0), (0, 2.0), (1, 0.0), (1, 1.0)] {
+        if number == 0.0 {
+            robot.restart(trial);
+        }
+        robot.drive_into(&program, &mut run).expect("drives");
+        let of = |name: &str| run.info.covariates[name];
+        // Whole counts of 12.5 µm a run.
+        assert_eq!((of("number"), run.info.start_s), (number, Some(of("session_s"))));
+        assert!((of("session_s") - number * run_s).abs() < 1e-3 && (of("session_m") - number * LENGTH_M).abs() < 1e-4);
     }
 }

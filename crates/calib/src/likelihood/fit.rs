@@ -30,6 +30,8 @@ pub struct FitOptions {
     pub columns: Vec<Column>,
     /// Directions of the free columns along which nothing moves: rows over the columns.
     pub held: Vec<DVector<f64>>,
+    /// The noise stays as it is.
+    pub noise_held: bool,
     /// Most steps.
     pub max_steps: usize,
 }
@@ -38,7 +40,7 @@ impl FitOptions {
     /// Fits some columns.
     #[must_use]
     pub fn of(columns: &[Column]) -> Self {
-        Self { columns: columns.to_vec(), held: Vec::new(), max_steps: 60 }
+        Self { columns: columns.to_vec(), held: Vec::new(), noise_held: false, max_steps: 60 }
     }
 }
 
@@ -153,12 +155,12 @@ pub(crate) fn fit_from(
             noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
         }
     }
-    let want = Want { noise_score: true, ..Want::default() };
+    let want = Want { noise_score: !options.noise_held, ..Want::default() };
     let (mut converged, mut pace) = (false, Pace::default());
     for _ in 0..options.max_steps {
         let found = pass(records, selections, &model, &noise, &headings, terms, want);
         let moved = step(&mut model, &mut headings, &found, options, &basis)?;
-        let noise_moved = step_noise(&mut noise, &mut pace, &found, prior);
+        let noise_moved = if options.noise_held { 0.0 } else { step_noise(&mut noise, &mut pace, &found, prior) };
         if moved < SETTLED && noise_moved < NOISE_SETTLED {
             converged = true;
             break;

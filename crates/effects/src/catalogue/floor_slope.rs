@@ -71,6 +71,11 @@ impl Forward for State {
         step.creep_m[0] += creep_x_m_s * moving_s + slide_x * tread_m;
         step.creep_m[1] += creep_y_m_s * moving_s + slide_y * tread_m;
     }
+
+    /// Through the time that ramps take.
+    fn depends_on_speed(&self) -> bool {
+        self.size.creep_x_m_s != 0.0 || self.size.creep_y_m_s != 0.0
+    }
 }
 
 struct Term {

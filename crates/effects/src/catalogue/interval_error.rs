@@ -5,6 +5,8 @@
 //! Observability: a moving robot and an irregular log; looks between the rows blur it. Alias: wheel noise, but for the slope against ξ.
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes; milliseconds.
 
+use std::collections::VecDeque;
+
 use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
@@ -39,7 +41,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term { lengths_s: Vec::new() }))
+        Hypothesis::Terms(Shape::plain(Term::default()))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -69,11 +71,36 @@ impl Forward for State {
     }
 }
 
-/// Intervals from which the usual one is taken: enough for a median, few enough to sort every time.
-const REMEMBERED: usize = 64;
+/// Rows from which the beat is taken: the last ones, so many that their own jitter tells little, and at least so many that it is a beat.
+const ROWS: std::ops::RangeInclusive<usize> = 8..=64;
 
+/// A row that is farther from its beat than this share of it is no jitter: the log has missed its beat, and a new one begins.
+const MISSED: f64 = 0.45;
+
+/// The regular beat behind the rows: a line through the last rows' times over the numbers of their beats.
+#[derive(Default)]
 struct Term {
-    lengths_s: Vec<f64>,
+    rows: VecDeque<(f64, f64)>,
+    /// How late the last row was by its beat; 0 while there is none.
+    late_s: f64,
+}
+
+impl Term {
+    /// When beat 0 is and the time between two beats, where rows enough are known.
+    fn line(&self) -> Option<(f64, f64)> {
+        if self.rows.len() < *ROWS.start() {
+            return None;
+        }
+        #[allow(clippy::cast_precision_loss)]
+        let n = self.rows.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| self.rows.iter().map(of).sum::<f64>() / n;
+        let (beat, time_s) = (mean(|row| row.0), mean(|row| row.1));
+        let (square, product) = self.rows.iter().fold((0.0, 0.0), |(square, product), row| {
+            (square + (row.0 - beat).powi(2), product + (row.0 - beat) * (row.1 - time_s))
+        });
+        let between_s = product / square;
+        Some((time_s - between_s * beat, between_s))
+    }
 }
 
 impl ModelTerm for Term {
@@ -83,19 +110,36 @@ impl ModelTerm for Term {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.lengths_s.clear();
+        *self = Self::default();
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if self.lengths_s.len() < REMEMBERED {
-            self.lengths_s.push(interval.dt_s);
+        let (row_s, line) = (interval.t_s + interval.dt_s, self.line());
+        let Some(&(last, last_s)) = self.rows.back() else {
+            self.rows.extend([(0.0, interval.t_s), (1.0, row_s)]);
+            return;
+        };
+        let gaps_s = || self.rows.iter().zip(self.rows.range(1..)).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).collect();
+        let Some(between_s) = line.map(|(_, between_s)| between_s).or_else(|| median(gaps_s())) else { return };
+        let beats = ((row_s - last_s) / between_s).round();
+        if beats < 1.0 {
+            return; // Between two beats: the row of a standstill.
         }
-        let Some(usual_s) = median(self.lengths_s.clone()) else { return };
-        let excess_s = interval.dt_s - usual_s;
-        // Half as long or half as long again is a gap or a row out of turn, and no jitter.
-        if interval.dt_s > 0.0 && excess_s.abs() < 0.5 * usual_s {
-            let share = excess_s / interval.dt_s;
+        let late_s = line.map(|(zero_s, between_s)| row_s - zero_s - (last + beats) * between_s);
+        if late_s.is_some_and(|late_s| late_s.abs() > MISSED * between_s) {
+            *self = Self { rows: VecDeque::from([(-1.0, row_s - between_s), (0.0, row_s)]), late_s: 0.0 };
+            return;
+        }
+        if let Some(late_s) = late_s {
+            // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
+            // logged, speeds would average too low.
+            let share = (late_s - self.late_s) / (beats * between_s);
             gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
+        }
+        self.late_s = late_s.unwrap_or(0.0);
+        self.rows.push_back((last + beats, row_s));
+        if self.rows.len() > *ROWS.end() {
+            self.rows.pop_front();
         }
     }
 }

@@ -68,6 +68,11 @@ impl Forward for State {
         let cold = (-(self.session_s + step.t_s) / tau_s).exp() * mean;
         step.radius_m = step.radius_m.map(|radius_m| radius_m * (1.0 + growth * (1.0 - cold)));
     }
+
+    /// Through the time that ramps take.
+    fn depends_on_speed(&self) -> bool {
+        self.size.growth != 0.0
+    }
 }
 
 struct Term {

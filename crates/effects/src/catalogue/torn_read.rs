@@ -75,32 +75,43 @@ impl Forward for State {
     }
 }
 
-/// How far a sample is from the line between its neighbours, counts.
-fn astray(t_s: &[f64], ticks: &[i64], k: usize) -> f64 {
-    let share = (t_s[k] - t_s[k - 1]) / (t_s[k + 1] - t_s[k - 1]);
-    #[allow(clippy::cast_precision_loss)]
-    let (here, whole) = ((ticks[k] - ticks[k - 1]) as f64, (ticks[k + 1] - ticks[k - 1]) as f64);
-    here - share * whole
-}
+/// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median stands most of them.
+const AROUND: usize = 4;
 
-/// Puts back the samples of a column that are a jump astray while their neighbours are not, and says how many these were. Where samples are usually astray
-/// by an eighth of a jump, none can be told.
+/// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
+/// their neighbours, and jumps that are not undone, are none of this fault.
 fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> usize {
-    let inner = 1..ticks.len().saturating_sub(1);
-    let Some(usual) = median(inner.clone().map(|k| astray(t_s, ticks, k).abs()).collect()) else { return 0 };
     #[allow(clippy::cast_precision_loss)]
     let step = jump as f64;
-    if usual > step / 8.0 {
+    #[allow(clippy::cast_precision_loss)]
+    let increment = |k: usize| (ticks[k + 1] - ticks[k]) as f64;
+    let last = ticks.len().saturating_sub(1);
+    let out_of_line = |k: usize| {
+        let near = k.saturating_sub(AROUND)..(k + AROUND + 1).min(last);
+        let rate = median(near.map(|near| increment(near) / (t_s[near + 1] - t_s[near])).collect()).unwrap_or(0.0);
+        increment(k) - rate * (t_s[k + 1] - t_s[k])
+    };
+    let all: Vec<f64> = (0..last).map(out_of_line).collect();
+    if median(all.iter().map(|off| off.abs()).collect()).is_none_or(|usual| usual > step / 8.0) {
+        return 0;
+    }
+    let mut astray = vec![0.0];
+    for off in all {
+        let jumps = (off / step).round();
+        let jumps = if (off - jumps * step).abs() < step / 4.0 { jumps } else { 0.0 };
+        astray.push(astray[astray.len() - 1] + jumps);
+    }
+    // The first sample may be the torn one.
+    let usual = median(astray.clone()).unwrap_or(0.0);
+    if astray.iter().any(|jumps| (jumps - usual).abs() > 1.0) {
         return 0;
     }
     let mut mended = 0;
-    for k in inner {
-        let off = astray(t_s, ticks, k);
-        // A neighbour of a torn sample is half a jump astray.
-        if (off.abs() - step).abs() < step / 4.0 {
-            ticks[k] -= if off > 0.0 { jump } else { -jump };
-            mended += 1;
-        }
+    for (count, jumps) in ticks.iter_mut().zip(astray) {
+        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
+        let off = (jumps - usual) as i64;
+        *count -= off * jump;
+        mended += usize::from(off != 0);
     }
     mended
 }

@@ -7,6 +7,8 @@
 //! turns the separation.
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
 
+mod profile;
+
 use dataset::{ModelTerm, Schedule, Session};
 use kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
@@ -18,6 +20,8 @@ use crate::estimate::{
 use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Pass, Records, Selection, Thinning};
 use crate::likelihood::{From, NoisePrior, fit_from, pass_with_innovations};
 use crate::sensitivity::unseen;
+
+pub use profile::RISE_95;
 
 /// The method with its settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,14 +132,18 @@ impl JointFit<'_> {
 
     fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
-        let held = self.unseen.iter().map(|direction| {
-            DVector::from_fn(self.columns.len(), |row, _| {
-                direction.get(self.columns[row].index()).copied().unwrap_or(0.0)
-            })
-        });
-        let options = FitOptions { held: held.collect(), ..FitOptions::of(&self.columns) };
+        let options = FitOptions { held: self.held(), ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
         Ok(())
+    }
+
+    /// The directions of the free columns that stay nominal.
+    fn held(&self) -> Vec<DVector<f64>> {
+        let along = |direction: &DVector<f64>, column: &Column| direction.get(column.index()).copied().unwrap_or(0.0);
+        let of = |direction| {
+            DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| along(direction, column)))
+        };
+        self.unseen.iter().map(of).collect()
     }
 
     fn here(&self) -> From {
