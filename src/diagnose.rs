@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Args;
 use ::diagnose::{Diagnosis, Document, Options};
+use clap::Args;
 
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};

@@ -51,16 +51,19 @@ impl JointFit<'_> {
                 let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, model.separation_m);
                 Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
             };
-            let seen_from =
-                |terms: &mut [Box<dyn ModelTerm>], t_s: f64, body: Pose, piece: Option<&Piece>, gradient: &mut [Pose]| {
-                    let twist = piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, twist);
-                    let look = Look { t_s, world_from_body: body, twist, run: chain.info };
-                    gradient.fill(Pose::IDENTITY);
-                    each(terms, gradient, |term, own| term.sight(&look, own));
-                    let off = weighed(gradient, &model.sizes);
-                    let late = Increment { distance_m: twist.v_m_s, turn_rad: twist.omega_rad_s };
-                    (off, Pose::new(-late.distance_m * model.latency_s, 0.0, -late.turn_rad * model.latency_s))
-                };
+            let seen_from = |terms: &mut [Box<dyn ModelTerm>],
+                             t_s: f64,
+                             body: Pose,
+                             piece: Option<&Piece>,
+                             gradient: &mut [Pose]| {
+                let twist = piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, twist);
+                let look = Look { t_s, world_from_body: body, twist, run: chain.info };
+                gradient.fill(Pose::IDENTITY);
+                each(terms, gradient, |term, own| term.sight(&look, own));
+                let off = weighed(gradient, &model.sizes);
+                let late = Increment { distance_m: twist.v_m_s, turn_rad: twist.omega_rad_s };
+                (off, Pose::new(-late.distance_m * model.latency_s, 0.0, -late.turn_rad * model.latency_s))
+            };
             // Where the drive's centre stands at the first look, to first order in what the terms add to it.
             let mounted = start * model.body_from_sensor.inverse();
             let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
@@ -140,6 +143,10 @@ fn each(
 
 fn weighed(gradient: &[Pose], sizes: &[f64]) -> Pose {
     gradient.iter().zip(sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
-        Pose::new(sum.x_m + size * gradient.x_m, sum.y_m + size * gradient.y_m, sum.theta_rad + size * gradient.theta_rad)
+        Pose::new(
+            sum.x_m + size * gradient.x_m,
+            sum.y_m + size * gradient.y_m,
+            sum.theta_rad + size * gradient.theta_rad,
+        )
     })
 }

@@ -39,11 +39,8 @@ pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice]) -> (Vec<Blind>, 
                 } else {
                     format!("{} from {size:.2e} {} on would have shown", parameter.name, parameter.unit)
                 };
-                let smallest = Smallest {
-                    value: size,
-                    unit: parameter.unit.to_owned(),
-                    parameter: parameter.name.to_owned(),
-                };
+                let smallest =
+                    Smallest { value: size, unit: parameter.unit.to_owned(), parameter: parameter.name.to_owned() };
                 (Blind { id: id.to_owned(), why, smallest_detectable: Some(smallest) }, size / parameter.plausible)
             }
             _ => {

@@ -34,7 +34,9 @@ impl Choice {
     /// Its held shape parameters.
     pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
         match self {
-            Self::Effect { id, shape } => shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default(),
+            Self::Effect { id, shape } => {
+                shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default()
+            }
             Self::Sparse(_) => Vec::new(),
         }
     }

@@ -15,7 +15,7 @@ use crate::candidate::{Choice, mean_terms};
 use crate::checks::{Checked, check, what_follows};
 use crate::document::{Document, Finding, Gain, Value, Verdict};
 use crate::gain::gain;
-use crate::gross::{Fault, fault, sessions};
+use crate::gross::{Fault, fault, left_out, sessions};
 use crate::naming;
 use crate::search::{Extended, Found, evidence, examine, reach, search};
 use crate::statistics::p_of_z;
@@ -38,6 +38,14 @@ pub enum DiagnoseError {
         /// The id.
         id: String,
     },
+    /// The base model does not follow the robot, and no gross fault explains it.
+    #[error(
+        "the calibrated model leaves out {percent:.0} % of the looks, and no gross fault explains it: there is nothing to build on; add runs with looks on the way"
+    )]
+    NothingFollows {
+        /// Share of looks left out.
+        percent: f64,
+    },
     /// There is no base fit.
     #[error("no calibrated model to ask: {0}")]
     NoFit(#[from] CalibError),
@@ -55,6 +63,9 @@ pub struct Diagnosis {
 /// Looks whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
 const CORRELATED: f64 = 0.05;
 const CORRELATED_SIGMAS: f64 = 4.0;
+
+/// A model that leaves out more of the looks is none.
+const MOST_LEFT_OUT: f64 = 0.5;
 
 const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false };
 const THINNED: Joint = Joint { nuisances: false, thin: true };
@@ -75,7 +86,14 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
             let base = ALL_LOOKS.fit(&rewritten)?;
             Ok(continued(&found.records, base, Some(&found), options))
         }
-        None => Ok(continued(datasets, first?, None, options)),
+        None => {
+            let first = first?;
+            let share = left_out(&first);
+            if share > MOST_LEFT_OUT {
+                return Err(DiagnoseError::NothingFollows { percent: 100.0 * share });
+            }
+            Ok(continued(datasets, first, None, options))
+        }
     }
 }
 
@@ -135,9 +153,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
         }
     }
     let goes_with_something = asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name));
-    if goes_with_something
-        && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
-    {
+    if goes_with_something && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL) {
         asked.checked = check(&sparse.model);
         asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
     }
@@ -146,7 +162,9 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
 
 /// Whether a check asks what residuals go with, not how they scatter.
 fn is_covariate(name: &str) -> bool {
-    !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start)) && name != "outliers" && name != "run_to_run"
+    !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
+        && name != "outliers"
+        && name != "run_to_run"
 }
 
 fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, options: &Options) -> Diagnosis {
@@ -170,8 +188,10 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
     let (sensitivity, blind_to) = blind(model, &catalogue);
     let verdict = verdict(&findings);
     let extended = crate::scenario_of::scenario_of(datasets, model, &findings);
-    let names: Vec<String> =
-        datasets.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
+    let names: Vec<String> = datasets
+        .iter()
+        .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
+        .collect();
     let document = Document {
         dataset: Names::of(names.clone()),
         verdict,
@@ -200,6 +220,8 @@ fn is_scatter(finding: &Finding) -> bool {
 /// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
 const SCATTER_LEVEL: f64 = 1e-3;
 
+/// With more, it is the model that is off, and not the looks.
+const MOST_OUTLIERS: f64 = 0.2;
 /// What follows large errors is told from chance at this many standard errors.
 const FOLLOWS: f64 = 2.6;
 
@@ -209,6 +231,11 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     let outliers = asked.checked.outliers;
     let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
     let far = outliers.isolated + outliers.staying;
+    #[allow(clippy::cast_precision_loss)]
+    if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
+        // The model does not follow the robot at all: that has no name.
+        return findings;
+    }
     if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
@@ -221,7 +248,9 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     } else {
         // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
         let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
-        let kurtosis = |name: &str| asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic);
+        let kurtosis = |name: &str| {
+            asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
+        };
         let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(name, component, sign)| {
@@ -236,7 +265,10 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             } else if follows < -FOLLOWS {
                 (errs, "single large errors of the instrument, undone in the next look")
             } else {
-                ([stays, errs].concat(), "errors have a heavier tail than normal ones, and what follows them does not say whose they are")
+                (
+                    [stays, errs].concat(),
+                    "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
+                )
             };
             findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
         }
@@ -244,7 +276,9 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     if let Some((coefficient, sigmas)) = asked.correlated
         && coefficient > 0.0
     {
-        let what = format!("looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it");
+        let what = format!(
+            "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
+        );
         let ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
         findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
     }
@@ -284,7 +318,9 @@ fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> Stri
     match verdict {
         Verdict::Consistent => "the calibrated model explains what was measured".to_owned(),
         Verdict::Named => format!("found: {}{gains}", names.join(", ")),
-        Verdict::Ambiguous => format!("found, with names that this data cannot tell apart: {}{gains}", names.join("; ")),
+        Verdict::Ambiguous => {
+            format!("found, with names that this data cannot tell apart: {}{gains}", names.join("; "))
+        }
         Verdict::Unlisted => format!("found, and not all of it has a name: {}{gains}", names.join(", ")),
     }
 }
@@ -292,7 +328,8 @@ fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> Stri
 /// The calibration with what was found in the model.
 fn calibration(datasets: &[Dataset], fit: &JointFit<'_>) -> Result<Calibration, CalibError> {
     let model = &fit.fit.model;
-    let not_physical = |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
+    let not_physical =
+        |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
     let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
         .map_err(not_physical)?;
     let diameter_m = geometry.wheel_diameter_m();

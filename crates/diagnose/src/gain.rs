@@ -93,10 +93,7 @@ fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// Every unit's cost under a fit to the other folds, and its run's dead reckoning under that fit.
-fn held_out(
-    fit: &JointFit<'_>,
-    terms: &mut [Box<dyn ModelTerm>],
-) -> Result<(Vec<Unit>, Vec<EndError>), String> {
+fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
     let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
     let (units, blocks) = if runs >= LEAST_RUNS {
         (fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
@@ -125,19 +122,15 @@ fn held_out(
         fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
         for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
-            scored.push(Unit {
-                cost: unit.cost_after(&fit.columns, &step),
-                count: unit.count,
-                run: unit.run,
-                fold,
-            });
+            scored.push(Unit { cost: unit.cost_after(&fit.columns, &step), count: unit.count, run: unit.run, fold });
         }
     }
     let mut ends = Vec::new();
     for (fold, model) in models.iter().enumerate() {
         let all = fit.reckoned(model, terms);
         // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a part of it.
-        let held = |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
+        let held =
+            |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
         ends.extend(all.into_iter().filter(|end| held(end.run)));
     }
     ends.sort_by_key(|end| end.run);

@@ -89,8 +89,7 @@ impl Projection {
         let own = DMatrix::from_fn(columns.len(), columns.len(), |i, j| evidence.information[(columns[i], columns[j])]);
         let gradient = DVector::from_fn(columns.len(), |i, _| evidence.gradient[columns[i]]);
         let information = &own - &cross * &self.inverse * cross.transpose();
-        let share =
-            (0..columns.len()).map(|k| if own[(k, k)] > 0.0 { information[(k, k)] / own[(k, k)] } else { 0.0 });
+        let share = (0..columns.len()).map(|k| if own[(k, k)] > 0.0 { information[(k, k)] / own[(k, k)] } else { 0.0 });
         Projected { share: share.collect(), gradient: gradient - &cross * &self.inverse * &self.gradient, information }
     }
 }
@@ -99,9 +98,7 @@ impl Projection {
 pub(crate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     let size = matrix.diagonal().map(|diagonal| diagonal.max(f64::MIN_POSITIVE).sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        matrix[(i, j)] / (size[i] * size[j]) + if i == j { 1e-12 } else { 0.0 }
-    });
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (size[i] * size[j]) + if i == j { 1e-12 } else { 0.0 });
     let inverse = scaled.cholesky()?.inverse();
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (size[i] * size[j])))
 }
@@ -113,9 +110,8 @@ pub(crate) fn principal(
     parameters: &[TermParameter],
 ) -> Vec<(f64, f64)> {
     let plausible = DVector::from_fn(parameters.len(), |k, _| parameters[k].plausible);
-    let scaled = DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
-        information[(i, j)] * plausible[i] * plausible[j]
-    });
+    let scaled =
+        DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| information[(i, j)] * plausible[i] * plausible[j]);
     let scaled_gradient = gradient.component_mul(&plausible);
     let eigen = scaled.symmetric_eigen();
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()

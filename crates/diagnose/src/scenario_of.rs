@@ -17,7 +17,11 @@ const LEAST_COUNTS: f64 = 40_000.0;
 const READ_STANDING_S: f64 = 2.0;
 
 /// The scenario, or why it cannot be written.
-pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>, findings: &[Finding]) -> Result<Scenario, String> {
+pub(crate) fn scenario_of(
+    datasets: &[Dataset],
+    model: &Extended<'_>,
+    findings: &[Finding],
+) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
     let fit = &model.fit.fit;
@@ -30,7 +34,8 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>, findings: 
     robot.encoder.gear_ratio = counts * per_tick / (scenario::QUADRATURE_DECODING * robot.encoder.lines_per_rev);
     let pace = Pace::of(datasets, model);
     robot.cruise_speed_m_s = pace.speed_m_s;
-    let stated = first.points.iter().map(|point| Mark { id: point.id.clone(), x_m: point.body.x_m, y_m: point.body.y_m });
+    let stated =
+        first.points.iter().map(|point| Mark { id: point.id.clone(), x_m: point.body.x_m, y_m: point.body.y_m });
     robot.points = stated.collect();
     let sigma_xy_m = fit.noise.sigma(NoiseComponent::LookPosition);
     let sigma_theta_rad = fit.noise.sigma(NoiseComponent::LookHeading);
@@ -80,10 +85,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>, findings: 
         seed: 1,
         engine: Engine::Stepping { step_s: 0.001 },
         robot,
-        noise: Noise {
-            wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel),
-            sensitivity_sigma: 0.0,
-        },
+        noise: Noise { wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel), sensitivity_sigma: 0.0 },
         placement: Placement { half_width_m: 0.05, half_width_rad: 0.02 },
         budget: None,
         log: (pace.between_rows_s < READ_STANDING_S).then_some(Log { interval_s: pace.between_rows_s }),
@@ -131,7 +133,9 @@ impl Pace {
             for run in &dataset.runs {
                 rows.extend(run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]));
                 let m_per_count = match &run.odometry.wheels {
-                    WheelLog::Ticks(_) => dataset.robot.ticks_per_rev.and_then(|ticks| geometry.m_per_count(ticks).ok()),
+                    WheelLog::Ticks(_) => {
+                        dataset.robot.ticks_per_rev.and_then(|ticks| geometry.m_per_count(ticks).ok())
+                    }
                     _ => None,
                 };
                 if let (WheelLog::Ticks(ticks), Some(m_per_count)) = (&run.odometry.wheels, m_per_count) {

@@ -238,9 +238,10 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         }
         #[allow(clippy::cast_precision_loss)]
         let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
-        let Some(best) = entries.iter().min_by(|a, b| {
-            a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic))
-        }) else {
+        let Some(best) = entries
+            .iter()
+            .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))
+        else {
             break;
         };
         if best.p_value * tests > SCAN_LEVEL {
@@ -293,7 +294,9 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
             continue;
         }
         let top = found[0].0.log_odds;
-        names.push(found.iter().filter(|(name, _)| name.log_odds > top - reach(top)).map(|(name, _)| name.clone()).collect());
+        names.push(
+            found.iter().filter(|(name, _)| name.log_odds > top - reach(top)).map(|(name, _)| name.clone()).collect(),
+        );
         model = found.swap_remove(0).1;
         place += 1;
     }

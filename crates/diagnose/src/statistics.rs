@@ -71,7 +71,10 @@ mod tests {
         // One dimension with many degrees of freedom is a squared normal variable.
         assert!((p_of_statistic(1.959_964_f64.powi(2), 1, 1e7) - 0.05).abs() < 1e-6);
         assert!((p_of_chi_square(3.841_459, 1.0) - 0.05).abs() < 1e-6);
-        assert!(p_of_statistic(10.0, 1, 5.0) > p_of_statistic(10.0, 1, 500.0), "few values know little of the variance");
+        assert!(
+            p_of_statistic(10.0, 1, 5.0) > p_of_statistic(10.0, 1, 500.0),
+            "few values know little of the variance"
+        );
     }
 
     #[test]

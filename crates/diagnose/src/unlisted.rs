@@ -95,7 +95,8 @@ pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) 
             choices.push(scored.choice);
             let extended = refit(base, choices)?;
             let earned = gain(model, &extended).ok()?;
-            (earned.log_score_per_observation.low > 0.0).then_some((earned.log_score_per_observation.extended, extended))
+            (earned.log_score_per_observation.low > 0.0)
+                .then_some((earned.log_score_per_observation.extended, extended))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, extended)| SparseFound { model: extended, p_value, trials })
