@@ -117,24 +117,6 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
     let found = search(&base, catalogue);
     let checked = check(&found.model);
     let mut asked = Asked { base, found, checked, sparse: None, correlated: None };
-    if !is_white(&asked.checked) {
-        // Looks that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
-        // apart they are independent, and what stands out then may be believed.
-        let explains = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
-            .map(|sparse| (check(&sparse.model), sparse))
-            .filter(|(checked, _)| is_white(checked));
-        if let Some((checked, sparse)) = explains {
-            asked.checked = checked;
-            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
-            return asked;
-        }
-        if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
-            asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue);
-            asked.checked = check(&asked.found.model);
-            asked.base = thinned;
-        }
-    }
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
     let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
     if !asked.found.model.choices.is_empty()
@@ -150,6 +132,24 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
             asked.checked = check(&sparse.model);
             asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
             return asked;
+        }
+    }
+    if !is_white(&asked.checked) {
+        // Looks that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
+        // apart they are independent, and what stands out then may be believed.
+        let explains = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
+            .map(|sparse| (check(&sparse.model), sparse))
+            .filter(|(checked, sparse)| is_white(checked) || sparse.certain);
+        if let Some((checked, sparse)) = explains {
+            asked.checked = checked;
+            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+            return asked;
+        }
+        if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
+            asked.correlated = Some(asked.checked.correlation);
+            asked.found = search(&thinned, catalogue);
+            asked.checked = check(&asked.found.model);
+            asked.base = thinned;
         }
     }
     let goes_with_something = asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name));
@@ -279,7 +279,11 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         let what = format!(
             "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
         );
-        let ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
+        let mut ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
+        // Where something else is found too, it may be that this is the rest of it.
+        if !ids.is_empty() && !asked.found.model.choices.is_empty() {
+            ids.push("unlisted");
+        }
         findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
     }
     findings
