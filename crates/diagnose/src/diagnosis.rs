@@ -236,6 +236,10 @@ fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
+    if asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name)) {
+        // Large errors that go with what was driven are no scatter.
+        return findings;
+    }
     if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
