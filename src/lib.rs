@@ -16,8 +16,8 @@
 //! ```
 
 pub use ::bench;
-pub use calib;
 pub use ::diagnose;
+pub use calib;
 pub use dataset;
 pub use effects;
 pub use kinematics;

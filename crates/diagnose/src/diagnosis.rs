@@ -180,7 +180,8 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
     }
     findings.extend(scatter(&asked, options));
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let explained = asked.sparse.is_some() || findings.iter().any(is_scatter);
+    let explained =
+        asked.sparse.is_some() || findings.iter().any(|finding| is_scatter(finding) || finding.id == "unlisted");
     if !explained {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
