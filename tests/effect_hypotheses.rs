@@ -300,17 +300,17 @@ fn a_hypothesis_predicts_what_its_forward_face_does_and_no_other_size_does() {
         let turned =
             (0..sizes.len()).map(|turned| at(&|k| if k == turned { -1.0 } else { 1.0 })).fold(f64::INFINITY, f64::min);
         let alone = missed(&nothing, term, &sizes, watch);
-        println!(
-            "{:24} whole {whole:.2e} right {right:.2e} allowed {allowed:.2e} half {half:.2e} turned {turned:.2e} alone {alone:.2e}",
+        let found = format!(
+            "{}: {right:.1e} of {whole:.1e}, half {half:.1e}, turned {turned:.1e}, faultless {alone:.1e}",
             case.id
         );
         // These two act on what the record says of the run, and a faultless record says nothing.
         let silent = ["payload_compression", "interval_error"].contains(&case.id);
         if right > allowed || half < allowed || turned < allowed || (alone < allowed) != silent {
-            complaints.push(case.id);
+            complaints.push(found);
         }
     }
-    assert_eq!(complaints, Vec::<&str>::new());
+    assert!(complaints.is_empty(), "{complaints:#?}");
 }
 
 #[test]
@@ -342,8 +342,10 @@ fn plausible_sizes_of_every_shape_make_a_physical_effect_that_says_the_same_size
     assert!(effects::effect_of_sizes("motor_ripple", &[]).is_none());
 }
 
-/// A gross fault as a scenario has it, and how far its best rewriting may be from the faultless log, radians of a wheel, with the reason.
-const GROSS: &[(&str, &[(&str, f64)], f64)] = &[
+/// A gross fault by its sizes, and how far its best rewriting may be from the faultless log, radians of a wheel, with the reason.
+type Gross = (&'static str, &'static [(&'static str, f64)], f64);
+
+const GROSS: &[Gross] = &[
     ("swapped_wheels", &[("swapped", 1.0)], 0.0),
     ("reversed_wheel", &[("left", 1.0), ("right", 0.0)], 0.0),
     ("reversed_wheel", &[("left", 0.0), ("right", 1.0)], 0.0),
