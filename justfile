@@ -1,4 +1,4 @@
-# The checks of .ci/run one by one: same names, same commands.
+# The checks of .ci/run one by one: same names, same commands. `documents` alone is no check.
 
 # Everything, as CI runs it
 ci:
@@ -31,3 +31,7 @@ doc:
 # Do the benches compile?
 bench:
     cargo bench --workspace --no-run
+
+# Run the commands of the documents and paste what they print, docs/methods.md's tables of all methods included
+documents:
+    env YAIR_UPDATE_DOCS=1 cargo test --test architecture the_documents_show_what_the_commands_print

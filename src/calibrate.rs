@@ -1,8 +1,12 @@
-//! `yair calibrate DATASET... [--method M] [--out FILE]`
+//! `yair calibrate DATASET... [--method M] [--out FILE]`, and `--online`
+
+mod follow;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use calib::likelihood::Column;
+use calib::methods::joint::{Joint, RISE_95};
 use calib::{CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -19,8 +23,14 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Method, or `all` for each one that applies.
-    #[arg(long, default_value = "direct", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
+    #[arg(long, default_value = "joint", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
     method: String,
+    /// Find the 95 % interval of each parameter of `joint` from the likelihood's own rise, which need not be symmetric.
+    #[arg(long, conflicts_with = "online")]
+    profile: bool,
+    /// Follow the parameters through the logs as the robot would on line, a look after the other, and say when they have settled.
+    #[arg(long, conflicts_with_all = ["method", "out"])]
+    online: bool,
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -29,7 +39,7 @@ pub(crate) struct Arguments {
 const ALL: &str = "all";
 
 fn methods() -> String {
-    let lines: Vec<_> = METHODS.iter().map(|method| format!("  {:10} {}", method.name(), method.about())).collect();
+    let lines: Vec<_> = METHODS.iter().map(|method| format!("  {:16} {}", method.name(), method.about())).collect();
     format!("Methods:\n{}", lines.join("\n"))
 }
 
@@ -37,13 +47,19 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     refuse_wrapped_counters(&sessions)?;
+    if arguments.online {
+        return follow::run(&sessions, terminal);
+    }
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
     let outcomes: Vec<_> = chosen.iter().map(|method| (method.name(), method.calibrate(&sessions))).collect();
-    let report = CalibrationReport {
+    let mut report = CalibrationReport {
         dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
         methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome, sessions[0].robot)).collect(),
     };
+    if arguments.profile {
+        add_profiles(&mut report, &sessions)?;
+    }
     // One method asked for by name and not applicable is a failure; the JSON still says so in its place.
     let refused = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().err());
     let nothing_found = outcomes.iter().all(|(_, outcome)| outcome.is_err());
@@ -60,21 +76,66 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
+/// Profile intervals of what `joint` fits, in the report's own parameters.
+fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Result<(), Failure> {
+    let joint =
+        report.methods.iter_mut().find(|method| method.method == Joint::DEFAULT.name() && method.error.is_none());
+    let Some(joint) = joint else {
+        return Err("--profile needs the method joint (or all), and that it applies".to_owned().into());
+    };
+    let found = Joint::DEFAULT.fit(sessions).map_err(|error| error.to_string())?;
+    for (column, keys) in [
+        (Column::LeftWheel, &["left_wheel_diameter_m", "left_m_per_tick"][..]),
+        (Column::RightWheel, &["right_wheel_diameter_m", "right_m_per_tick"]),
+        (Column::Separation, &["wheel_separation_m"]),
+        (Column::MountX, &["sensor_x_m"]),
+        (Column::MountY, &["sensor_y_m"]),
+        (Column::MountTheta, &["sensor_theta_rad"]),
+    ] {
+        let present = keys.iter().any(|key| joint.parameters.contains_key(*key));
+        if !present || !found.columns.contains(&column) {
+            continue;
+        }
+        let (low, high) = found.profile(column, RISE_95).map_err(|error| error.to_string())?;
+        for key in keys {
+            if let Some(value) = joint.parameters.get_mut(*key) {
+                // The steps of lengths are relative, those of the mounting are added.
+                let at = |by: f64| {
+                    if Column::GEOMETRY.contains(&column) { value.value * by.exp() } else { value.value + by }
+                };
+                value.interval_95 = Some([at(low), at(high)]);
+            }
+        }
+    }
+    Ok(())
+}
+
 fn show(report: &CalibrationReport, sessions: &[Session<'_>], terminal: &Terminal) -> Result<(), Failure> {
     let robot = sessions[0].robot;
     let runs: usize = sessions.iter().map(|session| session.runs.len()).sum();
-    let mut table = table(&["method", "parameter", "nominal", "value", "sigma", "unit"], 2);
+    let profiled =
+        report.methods.iter().flat_map(|method| method.parameters.values()).any(|value| value.interval_95.is_some());
+    let mut headers = vec!["method", "parameter", "nominal", "value", "sigma", "unit"];
+    if profiled {
+        headers.splice(5..5, ["95 % from", "to"]);
+    }
+    let mut table = table(&headers, 2);
     for method in &report.methods {
         for (key, value) in &method.parameters {
-            let decimals = decimals(value.sigma.map(|sigma| 1e3 * sigma));
-            table.add_row([
+            let (scale, unit) = if key.ends_with("_rad") { (180.0 / std::f64::consts::PI, "deg") } else { (1e3, "mm") };
+            let decimals = decimals(value.sigma.map(|sigma| scale * sigma));
+            let mut row = vec![
                 method.method.clone(),
                 key.clone(),
-                cell(nominal(robot, key), 1e3, decimals),
-                cell(Some(value.value), 1e3, decimals),
-                cell(value.sigma, 1e3, decimals),
-                "mm".to_owned(),
-            ]);
+                cell(nominal(robot, key), scale, decimals),
+                cell(Some(value.value), scale, decimals),
+                cell(value.sigma, scale, decimals),
+            ];
+            if profiled {
+                row.extend([0, 1].map(|end| cell(value.interval_95.map(|interval| interval[end]), scale, decimals)));
+            }
+            row.push(unit.to_owned());
+            table.add_row(row);
         }
     }
     terminal.say(&table.to_string())?;

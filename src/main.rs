@@ -1,12 +1,14 @@
 //! The `yair` command: one file a subcommand, and the only code that knows the terminal.
 
 mod calibrate;
+mod compare;
 mod evaluate;
 mod import;
 mod merge;
 mod reproduce;
 mod simulate;
 mod sweep;
+mod sweep_summary;
 mod sweep_table;
 mod terminal;
 
@@ -36,6 +38,7 @@ enum Command {
     Import(import::Arguments),
     Calibrate(calibrate::Arguments),
     Evaluate(evaluate::Arguments),
+    Compare(compare::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
     Reproduce(reproduce::Arguments),
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
+        Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
         Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),

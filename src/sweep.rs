@@ -1,4 +1,4 @@
-//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N] [--resume] [--rows] [--out DIR] [--check BASELINE [--update]]`
+//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N] [--resume] [--rows] [--out DIR] [--summary] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,8 +11,8 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
-use crate::sweep_table;
 use crate::terminal::{Failure, Terminal, table};
+use crate::{sweep_summary, sweep_table};
 
 /// Monte-Carlo: bias, spread, coverage and efficiency of every method over a scenario's design.
 #[derive(Args)]
@@ -43,6 +43,9 @@ pub(crate) struct Arguments {
     /// Write sweep.json, sweep.csv and a picture into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Print a row a method and a column a point: RMSE and, with a validation path, drift.
+    #[arg(long)]
+    summary: bool,
     /// Compare with a stored sweep; exit 3 when any number has moved.
     #[arg(long, value_name = "BASELINE", conflicts_with = "shard")]
     check: Option<PathBuf>,
@@ -141,7 +144,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             if let Some(out) = out {
                 bench::write_results(&plan, &result, arguments.rows, out)?;
             }
-            sweep_table::show(&result, terminal)?;
+            if arguments.summary {
+                sweep_summary::show(&result, terminal)?;
+            } else {
+                sweep_table::show(&result, terminal)?;
+            }
             let trials: u64 = result.points.iter().map(|point| point.trials).sum();
             terminal.remark(&format!("{trials} trials in {elapsed_s:.1} s"));
             let check = match (&arguments.check, baseline) {

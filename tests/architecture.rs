@@ -50,10 +50,11 @@ fn files(folder: &str) -> Vec<PathBuf> {
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
             let path = entry.expect("readable").path();
+            // A file, too: `.git` of a second worktree.
             let left_out = ["target", ".git"].iter().any(|name| path == root().join(name));
             if path.is_dir() && !left_out {
                 folders.push(path);
-            } else if path.is_file() {
+            } else if path.is_file() && !left_out {
                 found.push(path);
             }
         }
@@ -234,7 +235,7 @@ fn the_readme_the_justfile_and_ci_run_the_same_commands() {
         .filter(|line| !line.starts_with([' ', '#']))
         .filter_map(|line| line.strip_suffix(':'))
         .collect();
-    let expected: BTreeSet<&str> = steps.iter().map(|(name, _)| name.as_str()).chain(["ci"]).collect();
+    let expected: BTreeSet<&str> = steps.iter().map(|(name, _)| name.as_str()).chain(["ci", "documents"]).collect();
     assert_eq!(recipes, expected);
 }
 
@@ -298,14 +299,56 @@ fn a_pasted_output_with_another_digit_does_not_agree() {
     }
 }
 
+/// The documents whose commands are run.
+const DOCUMENTS: [&str; 4] = ["README.md", "docs/calibration.md", "docs/methods.md", "docs/bench.md"];
+
+/// A pasted output as it should be: what is printed, with the same left out at … as before. What comes after … is found by its first line that is printed once, or else is as long as it was.
+fn refreshed(pasted: &[String], real: &str) -> Vec<String> {
+    let real: Vec<String> = real.lines().map(|line| line.trim_end().to_owned()).collect();
+    let (timing, pasted): (Vec<_>, Vec<_>) = pasted.iter().cloned().partition(|line| line.contains(" trials in "));
+    let mut fresh = match pasted.iter().position(|line| line.starts_with('…')) {
+        None => real,
+        Some(gap) => {
+            let tail = &pasted[gap + 1..];
+            let found = tail.iter().enumerate().find_map(|(after, line)| {
+                let mut places = (0..real.len()).filter(|place| real[*place] == *line);
+                let place = places.next().filter(|_| places.next().is_none())?;
+                place.checked_sub(after)
+            });
+            let head = gap.min(real.len());
+            let begins = found.unwrap_or(real.len().saturating_sub(tail.len())).max(head);
+            [&real[..head], &pasted[gap..=gap], &real[begins..]].concat()
+        }
+    };
+    fresh.extend(timing);
+    fresh
+}
+
+#[test]
+fn a_refreshed_output_agrees_and_keeps_what_it_leaves_out() {
+    let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
+    let real = "a\nb\nc\nd\n";
+    for (pasted, expected) in [
+        ("a\nx", "a\nb\nc\nd"),
+        ("x\n… more\nc\n9 trials in 1 s", "a\n… more\nc\nd\n9 trials in 1 s"),
+        ("a\n… more\nx", "a\n… more\nd"),
+    ] {
+        let fresh = refreshed(&lines(pasted), real);
+        assert_eq!(fresh, lines(expected));
+        assert!(agrees(&fresh, real).is_ok() && agrees(&lines(pasted), real).is_err());
+    }
+}
+
 /// Every `sh` block that is followed by a `text` block: its `yair` commands print that text. And every picture `docs/bench-NAME.svg` is the one that the sweep
-/// of NAME draws.
+/// of NAME draws. With YAIR_UPDATE_DOCS=1 texts and pictures are written anew.
 #[test]
 fn the_documents_show_what_the_commands_print() {
+    let update = std::env::var("YAIR_UPDATE_DOCS").is_ok_and(|value| value == "1");
     let mut compared = 0;
-    for document in ["README.md", "docs/calibration.md", "docs/bench.md"] {
+    for document in DOCUMENTS {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut printed = None;
+        let mut written = text(document);
         for (language, lines) in blocks(&text(document)) {
             let ours = |line: &&String| line.starts_with("yair ") || line.starts_with("cargo run --release -- ");
             match language.as_str() {
@@ -315,7 +358,10 @@ fn the_documents_show_what_the_commands_print() {
                 }
                 "text" => {
                     if let Some(printed) = printed.take().filter(|printed| !printed.is_empty()) {
-                        if let Err(difference) = agrees(&lines, &printed) {
+                        let block = |lines: &[String]| format!("```text\n{}\n```", lines.join("\n"));
+                        if update {
+                            written = written.replacen(&block(&lines), &block(&refreshed(&lines, &printed)), 1);
+                        } else if let Err(difference) = agrees(&lines, &printed) {
                             panic!("{document}: {difference}\nall that was printed:\n{printed}");
                         }
                         compared += 1;
@@ -328,11 +374,17 @@ fn the_documents_show_what_the_commands_print() {
             let stem = picture.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let Some(name) = stem.strip_prefix("bench-").filter(|_| document == "docs/bench.md") else { continue };
             let drawn = fs::read(folder.path().join(name).join("sweep.svg")).expect("the document draws it");
+            if update {
+                fs::write(&picture, &drawn).expect("written");
+            }
             assert!(drawn == fs::read(&picture).expect("read"), "{stem}.svg is not what {document}'s command draws");
             compared += 1;
         }
+        if update {
+            fs::write(root().join(document), written).expect("written");
+        }
     }
-    assert!(compared >= 7, "the README's sweep and round trip, the bench's tables and pictures were compared");
+    assert!(compared >= 8, "the README's sweep and round trip, the bench's tables and pictures, the methods' table");
 }
 
 /// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.
@@ -428,6 +480,10 @@ fn every_method_is_documented_and_every_link_leads_somewhere() {
     let document = text("docs/calibration.md");
     for method in calib::METHODS {
         assert!(document.contains(&format!("\n## `{}`", method.name())), "docs/calibration.md lacks {}", method.name());
+    }
+    let which = text("docs/methods.md");
+    for method in calib::METHODS {
+        assert!(which.contains(&format!("\n| `{}` |", method.name())), "docs/methods.md lacks {}", method.name());
     }
     for file in files("").into_iter().filter(|file| file.extension().is_some_and(|extension| extension == "md")) {
         for target in text(&file).split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()) {

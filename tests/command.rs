@@ -177,14 +177,14 @@ fn calibrate_and_evaluate_keep_their_contract() {
         }
     }
 
+    // A method that did not apply left nothing in the file.
+    let applied = list(&found, "methods").iter().filter(|method| method.get("parameters").is_some()).count();
+
     succeed(at, &["calibrate", "set", "--method", "direct", "--out", "direct.toml"]);
     let found = document(at, &["evaluate", "set", "--calibration", "found.toml", "--calibration", "direct.toml"]);
     has_keys(&found, &["dataset", "calibrations"]);
     let calibrations = list(&found, "calibrations");
-    assert_eq!(
-        (&calibrations[0]["name"], &calibrations[methods.len() + 1]["name"]),
-        (&"nominal".into(), &"direct".into())
-    );
+    assert_eq!((&calibrations[0]["name"], &calibrations[applied + 1]["name"]), (&"nominal".into(), &"direct".into()));
     for calibration in calibrations {
         has_keys(calibration, SUMMARY_KEYS);
         has_keys(calibration, DRIFT_KEYS);

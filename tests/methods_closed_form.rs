@@ -426,7 +426,7 @@ fn final_headings(dataset: &Dataset) -> ([f64; 2], f64) {
         let (start, end) = run.observed_ends().expect("poses");
         let mut reckoned_rad = 0.0;
         run.dead_reckon(&dataset.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, |_, pose| {
-            reckoned_rad = pose.theta_rad
+            reckoned_rad = pose.theta_rad;
         });
         let way = usize::from(run.info().protocol == Some(Protocol::SquareCcw));
         sums[way] += wrap_to_pi(end.theta_rad - start.theta_rad - reckoned_rad);

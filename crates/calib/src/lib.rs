@@ -3,9 +3,11 @@
 //! A method takes borrowed sessions of one robot and returns values with covariance, what it rejected and what the data cannot show. It links neither
 //! the simulator nor the effects: what it is not given, it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
+mod compare;
 mod drift;
 mod drive;
 mod estimate;
+pub mod likelihood;
 mod looks;
 mod report;
 mod robust;
@@ -14,6 +16,9 @@ mod wheel_track;
 
 pub mod methods;
 
+pub use compare::{
+    ComparedMethod, ComparedSession, Comparison, KindMean, Pair, Refusal, TooFewSessions, compare, path_kind,
+};
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{

@@ -18,6 +18,11 @@ pub(crate) struct Spacing {
     pub(crate) every_rad: f64,
 }
 
+impl Spacing {
+    /// From the first look within the log to the last one.
+    pub(crate) const ENDS: Self = Self { every_m: f64::INFINITY, every_rad: f64::INFINITY };
+}
+
 /// A later look.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Look {
@@ -161,8 +166,7 @@ mod tests {
         // 19.75 rad over 0.25 m on wheels of 1/2π m radius.
         assert!((turned / std::f64::consts::TAU * 1.0 / 0.25 - 19.75).abs() < 1e-12);
         // From end to end.
-        let whole = Spacing { every_m: f64::INFINITY, every_rad: f64::INFINITY };
-        assert_eq!(Looks::of_all("test", &[dataset.session()], whole).expect("poses").0[0].later.len(), 1);
+        assert_eq!(Looks::of_all("test", &[dataset.session()], Spacing::ENDS).expect("poses").0[0].later.len(), 1);
     }
 
     #[test]

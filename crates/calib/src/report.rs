@@ -108,6 +108,9 @@ pub struct ReportedValue {
     /// Why there is no sigma.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_why_null: Option<String>,
+    /// Ends of the profile interval at 95 %, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -120,8 +123,8 @@ enum ValueOrNumber {
 impl From<ValueOrNumber> for ReportedValue {
     fn from(from: ValueOrNumber) -> Self {
         match from {
-            ValueOrNumber::Number(value) => Self { value, sigma: None, sigma_why_null: None },
-            ValueOrNumber::Value { value, sigma } => Self { value, sigma, sigma_why_null: None },
+            ValueOrNumber::Number(value) => Self { value, sigma: None, sigma_why_null: None, interval_95: None },
+            ValueOrNumber::Value { value, sigma } => Self { value, sigma, sigma_why_null: None, interval_95: None },
         }
     }
 }
@@ -166,6 +169,7 @@ impl MethodReport {
             value: estimate.value,
             sigma: estimate.sigma,
             sigma_why_null: estimate.sigma.is_none().then(|| "too few runs to show a scatter".to_owned()),
+            interval_95: None,
         };
         Self {
             parameters: calibration
@@ -311,7 +315,7 @@ mod tests {
     use super::*;
 
     fn report() -> CalibrationReport {
-        let value = |value, sigma| ReportedValue { value, sigma, sigma_why_null: None };
+        let value = |value, sigma| ReportedValue { value, sigma, sigma_why_null: None, interval_95: None };
         CalibrationReport {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {

@@ -6,6 +6,8 @@
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
+use crate::likelihood::Piece;
+
 /// An instant may miss a row by the rounding of its file.
 const SAME_INSTANT_S: f64 = 1e-9;
 
@@ -79,6 +81,16 @@ impl<'a> WheelTrack<'a> {
         self.steps(from_s, to_s).is_some()
     }
 
+    /// The wheels' angles at the rows, radians since the first.
+    pub(crate) fn turns(&self) -> &Wheels<Vec<f64>> {
+        &self.turn_rad
+    }
+
+    /// A reader that goes through the log once.
+    pub(crate) fn cursor(&self) -> Cursor<'_, 'a> {
+        Cursor { track: self, row: 0 }
+    }
+
     fn row_rad(&self, row: usize) -> Wheels<f64> {
         Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
     }
@@ -96,6 +108,64 @@ impl<'a> WheelTrack<'a> {
         let next_s = *self.t_s.get(row + 1)?;
         let share = since_s / (next_s - self.t_s[row]);
         Some(self.row_rad(row).zip_with(self.row_rad(row + 1), |a, b| a + share * (b - a)))
+    }
+}
+
+/// Reads a track in the order of time, in time that grows with its rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Cursor<'t, 'a> {
+    track: &'t WheelTrack<'a>,
+    /// The last row at or before the last instant asked for.
+    row: usize,
+}
+
+impl Cursor<'_, '_> {
+    /// Goes to the last row at or before an instant; false where the log does not span it.
+    fn seek(&mut self, t_s: f64) -> bool {
+        let rows_s = self.track.t_s;
+        if t_s + SAME_INSTANT_S < rows_s[0] {
+            return false;
+        }
+        if rows_s[self.row] > t_s + SAME_INSTANT_S {
+            self.row = 0;
+        }
+        while self.row + 1 < rows_s.len() && rows_s[self.row + 1] <= t_s + SAME_INSTANT_S {
+            self.row += 1;
+        }
+        self.row + 1 < rows_s.len() || t_s <= rows_s[self.row] + SAME_INSTANT_S
+    }
+
+    /// Turns of the wheels at an instant since the first row, radians.
+    pub(crate) fn angle_rad(&mut self, t_s: f64) -> Option<Wheels<f64>> {
+        if !self.seek(t_s) {
+            return None;
+        }
+        self.track.turn_at(self.row, t_s)
+    }
+
+    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is appended, where the log does not reach from one to the
+    /// other without a gap.
+    pub(crate) fn pieces(&mut self, from_s: f64, to_s: f64, pieces: &mut Vec<Piece>) -> bool {
+        let before = pieces.len();
+        let Some(mut angle) = self.angle_rad(from_s) else { return false };
+        let (mut at_s, mut row) = (from_s, self.row);
+        let Some(end) = self.angle_rad(to_s).filter(|_| to_s > from_s) else { return false };
+        let mut push = |t_s: f64, next: Wheels<f64>| {
+            let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
+            pieces.push(Piece { t_s: at_s, dt_s: t_s - at_s, wheel_rad });
+            (at_s, angle) = (t_s, next);
+        };
+        let rows_s = self.track.t_s;
+        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
+            row += 1;
+            push(rows_s[row], self.track.row_rad(row));
+        }
+        push(to_s, end);
+        if self.track.continuous || pieces.len() - before == 1 {
+            return true;
+        }
+        pieces.truncate(before);
+        false
     }
 }
 

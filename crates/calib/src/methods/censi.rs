@@ -14,10 +14,10 @@ use std::f64::consts::FRAC_PI_2;
 use dataset::{RunView, Schedule, Session};
 use kinematics::{Increment, Pose, Wheels, unwrap_near, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector3};
-use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Mounting, Parameter, Rejected, drive, nominal};
 use crate::looks::{Look, Looks, Spacing};
+use crate::robust::left_of_variance;
 use crate::sensitivity::{Lengths, Reckoned};
 use crate::wheel_track::WheelTrack;
 
@@ -112,7 +112,11 @@ impl CensiFit {
     #[must_use]
     pub fn residual(&self, excursion: &Excursion) -> Vector3<f64> {
         let (predicted, seen) = (self.predicted(excursion), excursion.sensor_from_later);
-        Vector3::new(predicted.x_m - seen.x_m, predicted.y_m - seen.y_m, wrap_to_pi(predicted.theta_rad - seen.theta_rad))
+        Vector3::new(
+            predicted.x_m - seen.x_m,
+            predicted.y_m - seen.y_m,
+            wrap_to_pi(predicted.theta_rad - seen.theta_rad),
+        )
     }
 
     /// ∂[`Self::predicted`]/∂(left radius, right radius, separation, ℓ_x, ℓ_y, ℓ_θ).
@@ -293,7 +297,8 @@ pub fn solutions<'e>(excursions: &mut (dyn Iterator<Item = &'e Excursion> + '_))
     let unseen = CalibError::Unobservable {
         method: Censi::NAME,
         parameter: Parameter::SensorX,
-        why: "between two looks the robot turns by nothing or by whole turns only; add looks after quarter turns".to_owned(),
+        why: "between two looks the robot turns by nothing or by whole turns only; add looks after quarter turns"
+            .to_owned(),
     };
     if eigenvalues.min() * LARGEST_PLACE_CONDITION <= eigenvalues.max() {
         return Err(unseen);
@@ -350,21 +355,6 @@ fn excited(normal: &Matrix2<f64>) -> Result<(), CalibError> {
     Err(CalibError::Unobservable { method: Censi::NAME, parameter: Parameter::WheelSeparation, why })
 }
 
-/// What is left of the variance of a normal error whose largest share was dropped: along one axis, and of each of two axes by their distance.
-fn left_of_variance(dropped: (f64, f64)) -> (f64, f64) {
-    let (in_plane, along) = dropped;
-    // A distance: 1 − c²/2·e^(−c²/2)/(1 − e^(−c²/2)) with e^(−c²/2) the dropped share.
-    let plane = if in_plane > 0.0 { 1.0 + in_plane * in_plane.ln() / (1.0 - in_plane) } else { 1.0 };
-    let axis = if along > 0.0 {
-        let normal = Normal::standard();
-        let cut = normal.inverse_cdf(1.0 - 0.5 * along);
-        1.0 - 2.0 * cut * normal.pdf(cut) / (1.0 - along)
-    } else {
-        1.0
-    };
-    (plane, axis)
-}
-
 impl Method for Censi {
     fn name(&self) -> &'static str {
         Self::NAME
@@ -397,7 +387,10 @@ impl Method for Censi {
         let runs_rejected = by_run
             .iter()
             .filter(|(_, (_, lost))| *lost > 0)
-            .map(|(run, (all, lost))| Rejected { run: (*run).to_owned(), why: format!("{lost} of {all} displacements are among the worst") })
+            .map(|(run, (all, lost))| Rejected {
+                run: (*run).to_owned(),
+                why: format!("{lost} of {all} displacements are among the worst"),
+            })
             .collect();
 
         let covariance = covariance(&fit, &excursions, &kept, dropped);
@@ -556,30 +549,6 @@ mod tests {
         let normal = |ratio: f64| Matrix2::from_diagonal(&Vector2::new(1.0, ratio));
         assert!(excited(&normal(1.0 / (0.999 * LARGEST_CONDITION))).is_ok());
         assert!(excited(&normal(1.0 / (1.001 * LARGEST_CONDITION))).is_err());
-    }
-
-    #[test]
-    fn trimming_leaves_the_variance_that_the_tails_do_not_have() {
-        // By the midpoint rule over the density that is left.
-        for dropped in [0.0, 0.01, 0.04, 0.3] {
-            let (plane, axis) = left_of_variance((dropped, dropped));
-            let cut = |tail: &dyn Fn(f64) -> f64| (0..60_000).map(|k| 1e-4 * f64::from(k)).find(|c| tail(*c) <= dropped).unwrap_or(6.0);
-            let normal = Normal::standard();
-            let density = |c: f64| normal.pdf(c);
-            let integral = |upto: f64, of: &dyn Fn(f64) -> f64| {
-                let steps = 20_000;
-                let h = upto / f64::from(steps);
-                (0..steps).map(|k| of(h * (f64::from(k) + 0.5)) * h).sum::<f64>()
-            };
-            let axis_cut = cut(&|c| 2.0 * normal.sf(c));
-            let expected = integral(axis_cut, &|z| z * z * density(z)) / integral(axis_cut, &density);
-            // The cut is found to 1e-4, and z² φ(z) is under 0.3.
-            assert!((axis - expected).abs() < 2e-4, "{dropped}: {axis} {expected}");
-            let plane_cut = cut(&|c| (-0.5 * c * c).exp());
-            let distance = |r: f64| r * (-0.5 * r * r).exp();
-            let expected = 0.5 * integral(plane_cut, &|r| r * r * distance(r)) / integral(plane_cut, &distance);
-            assert!((plane - expected).abs() < 2e-4, "{dropped}: {plane} {expected}");
-        }
     }
 
     #[test]

@@ -10,11 +10,12 @@
 //! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves out a wheel, is not offered.
 
 use dataset::{NominalRobot, Protocol, RunView, Schedule, Session};
-use kinematics::{Pose, Wheels, unwrap_near};
+use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
+use crate::looks::{Look, Looks, Spacing};
 use crate::robust::Summary;
 use crate::sensitivity::{Lengths, Reckoned};
 use crate::wheel_track::WheelTrack;
@@ -154,10 +155,13 @@ fn covariance(step: &Step1, spins: &[Spin], at: &Lengths) -> Option<Matrix3<f64>
     Some(inverse * own * inverse.transpose())
 }
 
-/// How the wheels turned over a whole run, row by row, radians; `None` where the log has gaps.
-fn whole(run: &RunView<'_>, robot: &NominalRobot) -> Option<Vec<Wheels<f64>>> {
-    let t_s = &run.odometry().t_s;
-    WheelTrack::of(run, robot)?.steps(*t_s.first()?, *t_s.last()?)
+/// The first and the last look at a run within its log, and how the wheels turned in between, row by row; `None` without two.
+///
+/// The wheels are taken at the looks' instants: an instrument that stops looking before the log ends has not seen what they turned since.
+fn whole(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<(Pose, Look)> {
+    let looks = Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
+    let Looks { start, mut later, .. } = looks;
+    Some((start, later.pop()?))
 }
 
 impl Method for Ivanjko {
@@ -183,8 +187,8 @@ impl Method for Ivanjko {
         let mut at = Lengths { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
         for session in sessions {
             for run in &session.runs {
-                let Some((start, end)) = run.observed_ends() else { continue };
-                let Some(steps_rad) = whole(run, session.robot) else { continue };
+                let Some((start, end)) = whole(run, session.robot, &geometry) else { continue };
+                let Look { wheel_rad: steps_rad, pose: end } = end;
                 let sum = |sum: Wheels<f64>, step: &Wheels<f64>| sum.zip_with(*step, |sum, step| sum + step);
                 let wheel_rad = steps_rad.iter().fold(Wheels::both(0.0), sum);
                 match run.info().protocol {

@@ -16,6 +16,7 @@ macro_rules! contents {
 }
 
 contents! {
+    joint::Joint,
     direct::Direct,
     umbmark::Umbmark,
     jung_chung::JungChung,

@@ -135,7 +135,8 @@ impl Segments {
         let (paths, _) = Looks::of_all(Self::NAME, sessions, self.spacing())?;
         let radius_m = geometry.m_per_rad();
         let lengths_m = Vector3::new(radius_m.left, radius_m.right, geometry.wheel_separation_m());
-        let errors = PathErrors { paths: &paths, nominal: lengths_m, heading_m: self.heading_m, factors: Vector3::repeat(1.0) };
+        let errors =
+            PathErrors { paths: &paths, nominal: lengths_m, heading_m: self.heading_m, factors: Vector3::repeat(1.0) };
         let mut cost = Cost { value_m2: 0.0, gradient_m: Vector3::zeros() };
         errors.for_each_end(|_, error, by_factors| {
             cost.value_m2 += error.norm_squared();
@@ -177,7 +178,10 @@ fn covariance(shares: &[Share], normal: &Matrix3<f64>) -> Option<Matrix3<f64>> {
         return None;
     }
     let mean = without.iter().sum::<Vector3<f64>>() / runs;
-    Some(without.iter().map(|moved| (moved - mean) * (moved - mean).transpose()).sum::<Matrix3<f64>>() * ((runs - 1.0) / runs))
+    Some(
+        without.iter().map(|moved| (moved - mean) * (moved - mean).transpose()).sum::<Matrix3<f64>>()
+            * ((runs - 1.0) / runs),
+    )
 }
 
 impl Method for Segments {
@@ -319,7 +323,8 @@ mod tests {
             .collect();
         let mean = without.iter().sum::<Vector3<f64>>() / 6.0;
         let refitted: Matrix3<f64> =
-            without.iter().map(|factors| (factors - mean) * (factors - mean).transpose()).sum::<Matrix3<f64>>() * (5.0 / 6.0);
+            without.iter().map(|factors| (factors - mean) * (factors - mean).transpose()).sum::<Matrix3<f64>>()
+                * (5.0 / 6.0);
         // One step instead of a whole descent: errors of 2e-3 on paths of metres leave per mille of the second order.
         let off = (one_step - refitted).norm() / refitted.norm();
         assert!(off < 0.01, "{off}");

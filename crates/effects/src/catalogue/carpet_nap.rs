@@ -71,7 +71,8 @@ impl Forward for State {
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
-        (self.size.yaw_sin_rad_m != 0.0 || self.size.yaw_cos_rad_m != 0.0).then_some("its turn bends the path on the way")
+        (self.size.yaw_sin_rad_m != 0.0 || self.size.yaw_cos_rad_m != 0.0)
+            .then_some("its turn bends the path on the way")
     }
 }
 

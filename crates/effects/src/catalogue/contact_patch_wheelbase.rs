@@ -102,8 +102,8 @@ impl Forward for State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Address, StreamName};
     use crate::catalogue::specimen_step;
+    use crate::{Address, StreamName};
 
     #[test]
     fn paper_eq_11_the_wheelbase_is_normal_from_motion_to_motion() {
@@ -135,7 +135,9 @@ mod tests {
             let mut state = size.forward().expect("acts in steps");
             let (runs, mut squares, mut products) = (4000_u32, 0.0, 0.0);
             for run in 0..runs {
-                state.start_run(Address { seed: 6, point: 0, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")));
+                state.start_run(
+                    Address { seed: 6, point: 0, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")),
+                );
                 let excess = |state: &mut Box<dyn Forward>, travel_m: f64| {
                     let mut step = specimen_step();
                     step.travel_m = kinematics::Wheels::both(travel_m);

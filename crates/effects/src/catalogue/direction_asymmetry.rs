@@ -41,10 +41,7 @@ impl PhysicalEffect for DirectionAsymmetry {
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self {
-            left_asymmetry: size(sizes, "left_asymmetry")?,
-            right_asymmetry: size(sizes, "right_asymmetry")?,
-        })
+        Some(Self { left_asymmetry: size(sizes, "left_asymmetry")?, right_asymmetry: size(sizes, "right_asymmetry")? })
     }
 }
 

@@ -116,8 +116,7 @@ mod tests {
 
     #[test]
     fn runs_carry_their_loads_in_turn_and_say_so() {
-        let size =
-            PayloadCompression { common_per_kg: 1e-3, mismatch_per_kg: 2e-4, payload_kg: vec![0.0, 5.0] };
+        let size = PayloadCompression { common_per_kg: 1e-3, mismatch_per_kg: 2e-4, payload_kg: vec![0.0, 5.0] };
         let mut state = size.forward().expect("acts on wheels");
         for (number, payload_kg) in [(0, 0.0), (1, 5.0), (2, 0.0), (3, 5.0)] {
             let mut info = RunInfo::default();

@@ -9,8 +9,8 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::forward::{Forward, Hooks, Step};
+use crate::hypothesis::{Hypothesis, Shape, size};
 
 /// Slip in proportion to speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

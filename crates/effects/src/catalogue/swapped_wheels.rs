@@ -56,7 +56,8 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
         WheelLog::Angles(Wheels { left, right }) => std::mem::swap(left, right),
         WheelLog::Twist { .. } => {}
     };
-    let turned = |twist: Twist| by_wheels(&dataset.robot, twist, |Wheels { left, right }| Wheels { left: right, right: left });
+    let turned =
+        |twist: Twist| by_wheels(&dataset.robot, twist, |Wheels { left, right }| Wheels { left: right, right: left });
     vec![Rewriting {
         sizes: vec![("swapped", 1.0)],
         sentence: "the left and the right counter are swapped".to_owned(),

@@ -35,7 +35,13 @@ impl PhysicalEffect for TractionLoss {
         positive("static_friction", self.static_friction)?;
         positive("stribeck_speed_m_s", self.stribeck_speed_m_s)?;
         let holds = self.kinetic_friction > 0.0 && self.kinetic_friction <= self.static_friction;
-        EffectError::unless(holds, id, "kinetic_friction", self.kinetic_friction, "positive and at most static_friction")
+        EffectError::unless(
+            holds,
+            id,
+            "kinetic_friction",
+            self.kinetic_friction,
+            "positive and at most static_friction",
+        )
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
@@ -115,7 +121,9 @@ mod tests {
 
     /// Ground travel of the left wheel over a start at `acceleration_m_s2` to 0.4 m/s and 0.3 s of cruise, and the tread's.
     fn start(acceleration_m_s2: f64) -> (f64, f64) {
-        let mut state = TractionLoss { static_friction: 0.1, kinetic_friction: 0.06, stribeck_speed_m_s: 0.05 }.forward().expect("acts");
+        let mut state = TractionLoss { static_friction: 0.1, kinetic_friction: 0.06, stribeck_speed_m_s: 0.05 }
+            .forward()
+            .expect("acts");
         state.start_motion();
         let (mut speed_m_s, mut ground_m, mut tread_m, dt_s) = (0.0_f64, 0.0, 0.0, 1e-4);
         let ramp_s = 0.4 / acceleration_m_s2;

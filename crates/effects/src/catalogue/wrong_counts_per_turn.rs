@@ -113,7 +113,8 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
                 anchors[k] = Some((seen, counted));
                 continue;
             };
-            let moved = [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
+            let moved =
+                [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
             if moved[k] > COMPARED[k] {
                 found[k].push((counted[k] - start[k]).abs() / moved[k]);
                 anchors[k] = Some((seen, counted));
@@ -138,7 +139,8 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
 fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     let Some(estimate) = estimate(dataset) else { return Vec::new() };
     let off = |factor: f64| (estimate / factor).ln().abs();
-    let known = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).filter(|(factor, _)| off(*factor) < SNAPS_WITHIN);
+    let known =
+        FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).filter(|(factor, _)| off(*factor) < SNAPS_WITHIN);
     let (factor, reason) = known.map_or((estimate, "a gear?"), |(factor, reason)| (*factor, *reason));
     let scaled = |wheels: &mut WheelLog| {
         if let WheelLog::Angles(Wheels { left, right }) = wheels {

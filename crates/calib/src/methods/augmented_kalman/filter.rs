@@ -332,7 +332,14 @@ mod tests {
 
     fn filter(variances: [f64; 3]) -> AugmentedFilter<f64> {
         let noise = NoiseFilter::new(variances.into(), [true; 3]);
-        AugmentedFilter::new(&nominal(), nominal().m_per_rad(), 0.05, noise, Pose::new(0.1, 0.2, 0.3), Wheels::both(0.0))
+        AugmentedFilter::new(
+            &nominal(),
+            nominal().m_per_rad(),
+            0.05,
+            noise,
+            Pose::new(0.1, 0.2, 0.3),
+            Wheels::both(0.0),
+        )
     }
 
     /// Wheel angles of a bent path with a spin in it.
@@ -428,7 +435,10 @@ mod tests {
 
     #[test]
     fn factors_are_found_settle_and_are_seen_to_change() {
-        let robot = |left: f64| Lengths { m_per_rad: Wheels { left: 0.08 * left, right: 0.085 * 0.99 }, separation_m: 0.363 * 1.03 };
+        let robot = |left: f64| Lengths {
+            m_per_rad: Wheels { left: 0.08 * left, right: 0.085 * 0.99 },
+            separation_m: 0.363 * 1.03,
+        };
         let mut filter = filter([1e-8, 1e-8, 1e-8]);
         wander(&mut filter, robot(1.01), 2);
         assert!(!filter.is_settled(), "two legs are not enough to know");

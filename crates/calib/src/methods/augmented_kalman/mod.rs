@@ -9,6 +9,7 @@
 //! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the augmented filter); Mehra 1970 for the innovations.
 
 mod filter;
+mod follow;
 mod noise;
 
 use std::f64::consts::PI;
@@ -18,6 +19,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use nalgebra::{Matrix3, Vector3};
 
 pub use filter::{AugmentedFilter, Innovation, Settling};
+pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
@@ -76,8 +78,8 @@ impl AugmentedKalman {
         let m_per_rad = nominal.m_per_rad();
         let start = runs.first().map_or(Pose::IDENTITY, |looks| looks.start);
         let mut turned = Wheels::both(0.0);
-        let mut filter = AugmentedFilter::new(nominal, m_per_rad, self.factor_sigma, noise, start, turned)
-            .starting_from(factors);
+        let mut filter =
+            AugmentedFilter::new(nominal, m_per_rad, self.factor_sigma, noise, start, turned).starting_from(factors);
         for looks in runs {
             filter.restart(looks.start, turned);
             for Look { wheel_rad, pose } in &looks.later {
@@ -120,9 +122,8 @@ impl AugmentedKalman {
         for _ in 0..MOST_PASSES {
             // The same variances from where the factors came to, before they are compared with others from there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
-            let moved = (0..3).all(|i| {
-                (again.factors[i] - best.factors[i]).abs() <= STAYS * again.covariance[(i, i)].sqrt()
-            });
+            let moved =
+                (0..3).all(|i| (again.factors[i] - best.factors[i]).abs() <= STAYS * again.covariance[(i, i)].sqrt());
             best = again;
             if !moved {
                 continue;
@@ -168,10 +169,12 @@ impl Method for AugmentedKalman {
         let (pass, stays) = self.iterate(&runs, &geometry, self.first_guess(sessions));
         self.observable(&pass.covariance)?;
         let [left, right, separation] = pass.factors.into();
-        let diameter_m = geometry.wheel_diameter_m().zip_with(Wheels { left, right }, |nominal_m, factor| nominal_m * factor);
+        let diameter_m =
+            geometry.wheel_diameter_m().zip_with(Wheels { left, right }, |nominal_m, factor| nominal_m * factor);
         let found = drive(Self::NAME, diameter_m, geometry.wheel_separation_m() * separation)?;
         let nominal_m = geometry.wheel_diameter_m();
-        let scale = Matrix3::from_diagonal(&Vector3::new(nominal_m.left, nominal_m.right, geometry.wheel_separation_m()));
+        let scale =
+            Matrix3::from_diagonal(&Vector3::new(nominal_m.left, nominal_m.right, geometry.wheel_separation_m()));
         let covariance = scale * pass.covariance * scale;
         Ok(Calibration {
             covariance: Some(Covariance::from_column_slice(3, 3, covariance.as_slice())),

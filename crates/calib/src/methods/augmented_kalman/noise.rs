@@ -221,9 +221,13 @@ mod tests {
         let found = scored(&looks, [false; 3]);
         assert!(relative(found.variances()) < 0.01, "{}", found.variances());
         // What must not pass: without the part that does not depend on the noise, and with two variances taken for each other.
-        let blind: Vec<_> = looks.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
+        let blind: Vec<_> =
+            looks.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
         assert!(relative(scored(&blind, [false; 3]).variances()) > 0.05);
-        let swapped = |expected: &Expected| Expected { slopes: [expected.slopes[0], expected.slopes[2], expected.slopes[1]], ..*expected };
+        let swapped = |expected: &Expected| Expected {
+            slopes: [expected.slopes[0], expected.slopes[2], expected.slopes[1]],
+            ..*expected
+        };
         let swapped: Vec<_> = looks.iter().map(|(of, expected)| (*of, swapped(expected))).collect();
         assert!(relative(scored(&swapped, [false; 3]).variances()) > 0.5);
     }

@@ -1,0 +1,531 @@
+//! One pass over all runs: innovations, their derivatives by the mean parameters, and the score of the noise.
+//!
+//! Scalar updates, one component of a look after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
+//! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
+
+use dataset::{Interval, Look, ModelTerm};
+use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+
+use super::evidence::Evidence;
+use super::model::{Column, Model};
+use super::noise::Noise;
+use super::normal::Sums;
+use super::records::{Chain, Piece, Records, Start};
+use super::thinning::{Leg, Selection, carry};
+
+/// A look whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
+pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
+/// After so many looks in a row that do not fit, it is the filter that is wrong: it starts again.
+const LOST_AFTER: u32 = 2;
+const NOISES: usize = 4;
+
+/// One whitened component of a look's innovation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Which chain.
+    pub chain: usize,
+    /// Which look of the chain.
+    pub look: usize,
+    /// 0 along the robot, 1 across, 2 heading.
+    pub component: usize,
+    /// Over its standard deviation.
+    pub z: f64,
+}
+
+/// What to carry along in a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Want {
+    pub(crate) noise_score: bool,
+    pub(crate) innovations: bool,
+    /// Take every look, however far off.
+    pub(crate) no_gate: bool,
+}
+
+/// Score of the cost by the logarithms of the variances, and its information.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoiseScore {
+    pub(crate) gradient: Vector4<f64>,
+    pub(crate) information: Matrix4<f64>,
+}
+
+impl NoiseScore {
+    fn zero() -> Self {
+        Self { gradient: Vector4::zeros(), information: Matrix4::zeros() }
+    }
+
+    fn add(&mut self, other: &Self, weight: f64) {
+        self.gradient += weight * other.gradient;
+        self.information += weight * other.information;
+    }
+}
+
+/// The result of a pass.
+#[derive(Debug, Clone)]
+pub struct Pass {
+    /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
+    pub runs: Vec<Evidence>,
+    /// The whitened innovations, phase by phase, in the order of chains and looks.
+    pub innovations: Vec<Vec<Innovation>>,
+    /// Looks left out as outliers in the first phase: chain and look.
+    pub outliers: Vec<(usize, usize)>,
+    /// Score of the cost by the logarithms of the variances.
+    pub(crate) noise: NoiseScore,
+    /// How the free headings of chains without one follow a step of the parameters: chain, step at rest, and by each column.
+    pub(crate) headings: Vec<(usize, f64, Vec<f64>)>,
+}
+
+impl Pass {
+    /// Of no run.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            runs: Vec::new(),
+            innovations: Vec::new(),
+            outliers: Vec::new(),
+            noise: NoiseScore::zero(),
+            headings: Vec::new(),
+        }
+    }
+}
+
+/// Runs the filter over all selections.
+pub(crate) fn pass(
+    records: &Records<'_>,
+    selections: &[Selection],
+    model: &Model,
+    noise: &Noise,
+    free_headings: &[f64],
+    terms: &mut [Box<dyn ModelTerm>],
+    want: Want,
+) -> Pass {
+    let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+    let mut result = Pass::nothing();
+    #[allow(clippy::cast_precision_loss)] // a handful of phases
+    let weight = 1.0 / selections.len() as f64;
+    for (phase, selection) in selections.iter().enumerate() {
+        let mut innovations = Vec::new();
+        let mut position = 0;
+        for (number, (chain, legs)) in records.chains.iter().zip(&selection.legs).enumerate() {
+            if phase == 0 && result.runs.last().is_none_or(|run| run.run != chain.run) {
+                result.runs.push(Evidence::new(chain.run, columns));
+            }
+            while result.runs[position].run != chain.run {
+                position += 1;
+            }
+            if legs.is_empty() {
+                continue;
+            }
+            let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
+            filter.run(legs, free_headings[number]);
+            let Filter { sums, outliers, innovations: of_chain, noise_score: of_noise, .. } = filter;
+            innovations.extend(of_chain);
+            if phase == 0 {
+                result.outliers.extend(outliers.into_iter().map(|look| (number, look)));
+            }
+            let (evidence, heading) = sums.eliminated(chain.run, columns);
+            if let (0, Some((rest, by))) = (phase, heading) {
+                result.headings.push((number, rest, by));
+            }
+            result.runs[position].add(&evidence, weight);
+            result.noise.add(&of_noise, weight);
+        }
+        if want.innovations {
+            result.innovations.push(innovations);
+        }
+    }
+    result
+}
+
+struct Filter<'f, 'a> {
+    chain: &'f Chain<'a>,
+    number: usize,
+    model: &'f Model,
+    noise: &'f Noise,
+    terms: &'f mut [Box<dyn ModelTerm>],
+    want: Want,
+    pose: Pose,
+    covariance: Matrix3<f64>,
+    /// ∂pose/∂column.
+    by: Vec<Vector3<f64>>,
+    covariance_by: [Matrix3<f64>; NOISES],
+    pose_by_noise: [Vector3<f64>; NOISES],
+    session_m: f64,
+    wheel_rad: Wheels<f64>,
+    previous: Option<Piece>,
+    gradients: Vec<Pose>,
+    sums: Sums,
+    innovations: Vec<Innovation>,
+    outliers: Vec<usize>,
+    noise_score: NoiseScore,
+    j: Vec<f64>,
+}
+
+/// A leg's motion in the frame of the body at its start, and what it depends on.
+struct Moved {
+    motion: Pose,
+    by_lengths: [Vector3<f64>; 3],
+    by_terms: Vec<Vector3<f64>>,
+}
+
+impl<'f, 'a> Filter<'f, 'a> {
+    fn new(
+        chain: &'f Chain<'a>,
+        number: usize,
+        model: &'f Model,
+        noise: &'f Noise,
+        columns: usize,
+        terms: &'f mut [Box<dyn ModelTerm>],
+        want: Want,
+    ) -> Self {
+        // One more for a free heading.
+        let all = columns + 1;
+        Self {
+            chain,
+            number,
+            model,
+            noise,
+            terms,
+            want,
+            pose: Pose::IDENTITY,
+            covariance: Matrix3::zeros(),
+            by: vec![Vector3::zeros(); all],
+            covariance_by: [Matrix3::zeros(); NOISES],
+            pose_by_noise: [Vector3::zeros(); NOISES],
+            session_m: chain.session_m,
+            wheel_rad: chain.wheel_rad,
+            previous: None,
+            gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
+            sums: Sums::new(columns),
+            innovations: Vec::new(),
+            outliers: Vec::new(),
+            noise_score: NoiseScore::zero(),
+            j: vec![0.0; all],
+        }
+    }
+
+    fn run(&mut self, legs: &[Leg], free_heading_rad: f64) {
+        for term in self.terms.iter_mut() {
+            term.restart(self.chain.info);
+        }
+        match self.chain.start {
+            Start::Seen => self.start_at(legs[0].from, legs[0].pieces.start, free_heading_rad),
+            Start::Origin => self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), 0.0),
+        }
+        let mut lost = 0;
+        for leg in legs {
+            self.predict(leg);
+            if self.update(leg) {
+                lost = 0;
+                continue;
+            }
+            self.outliers.push(leg.look);
+            lost += 1;
+            // Without a heading the filter cannot start in the middle of a chain.
+            if lost >= LOST_AFTER && self.chain.looks[leg.look].theta_rad.is_some() && self.chain.start == Start::Seen {
+                self.start_at(leg.look, leg.pieces.end, self.pose.theta_rad);
+                lost = 0;
+            }
+        }
+    }
+
+    /// Stands where a look saw the robot.
+    fn start_at(&mut self, look: usize, next_piece: usize, free_heading_rad: f64) {
+        let seen = self.chain.looks[look];
+        let [_, _, xy, theta] = self.noise.variance;
+        let pose = Pose::new(seen.x_m, seen.y_m, seen.theta_rad.unwrap_or(free_heading_rad));
+        let free = seen.theta_rad.is_none();
+        let piece = self.chain.pieces.get(next_piece).or(self.chain.pieces.last()).copied();
+        self.start(pose, xy, if free { 0.0 } else { theta }, piece, seen.t_s);
+        if free {
+            // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
+            self.sums.free = true;
+            let last = self.by.len() - 1;
+            self.by[last] = Vector3::new(-(self.pose.y_m - seen.y_m), self.pose.x_m - seen.x_m, 1.0);
+        }
+    }
+
+    fn start(&mut self, seen: Pose, var_xy: f64, var_theta: f64, next: Option<Piece>, t_s: f64) {
+        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.twist(&piece));
+        let late = self.model.latency_s;
+        let Pose { x_m: lx, y_m: ly, theta_rad: ltheta } = self.model.body_from_sensor;
+        let theta_rad = seen.theta_rad - ltheta;
+        let (sin, cos) = theta_rad.sin_cos();
+        let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
+        let moved = Vector3::new(cos * twist.v_m_s, sin * twist.v_m_s, twist.omega_rad_s);
+        self.pose = Pose::new(
+            seen.x_m - mounted.x + late * moved.x,
+            seen.y_m - mounted.y + late * moved.y,
+            theta_rad + late * moved.z,
+        );
+        self.by.iter_mut().for_each(|by| *by = Vector3::zeros());
+        self.by[Column::MountX.index()] = Vector3::new(-cos, -sin, 0.0);
+        self.by[Column::MountY.index()] = Vector3::new(sin, -cos, 0.0);
+        self.by[Column::MountTheta.index()] = Vector3::new(-mounted.y, mounted.x, -1.0);
+        self.by[Column::Latency.index()] = moved;
+        let sight = self.sight(t_s, twist);
+        for (number, sight) in sight.iter().enumerate() {
+            self.by[Column::Term(number).index()] = -sight;
+            let size = self.model.sizes[number];
+            self.pose = Pose::new(
+                self.pose.x_m - size * sight.x,
+                self.pose.y_m - size * sight.y,
+                self.pose.theta_rad - size * sight.z,
+            );
+        }
+        // The instrument's heading error moves the drive's centre round the instrument.
+        let lever = Vector3::new(-(self.pose.y_m - seen.y_m), self.pose.x_m - seen.x_m, 1.0);
+        let position = Matrix3::from_diagonal(&Vector3::new(var_xy, var_xy, 0.0));
+        let heading = lever * lever.transpose() * var_theta;
+        self.covariance = position + heading;
+        self.covariance_by = [Matrix3::zeros(), Matrix3::zeros(), position, heading];
+        self.pose_by_noise = [Vector3::zeros(); NOISES];
+    }
+
+    fn twist(&self, piece: &Piece) -> Twist {
+        let travel_m = self.model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.model.separation_m);
+        Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
+    }
+
+    /// What the terms add to a look at the pose in force, in the room, for each parameter.
+    fn sight(&mut self, t_s: f64, twist: Twist) -> Vec<Vector3<f64>> {
+        if self.gradients.is_empty() {
+            return Vec::new();
+        }
+        let look = Look { t_s, world_from_body: self.pose, twist, run: self.chain.info };
+        self.gradients.fill(Pose::IDENTITY);
+        let mut rest = &mut self.gradients[..];
+        for term in self.terms.iter_mut() {
+            let (own, others) = rest.split_at_mut(term.parameters().len());
+            term.sight(&look, own);
+            rest = others;
+        }
+        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let room = |g: &Pose| Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, g.theta_rad);
+        self.gradients.iter().map(room).collect()
+    }
+
+    /// The motion of a leg by the counts and the terms.
+    fn motion(&mut self, leg: &Leg) -> Moved {
+        let Model { m_per_rad, separation_m, .. } = *self.model;
+        let parameters = self.gradients.len();
+        let mut moved = Moved {
+            motion: Pose::IDENTITY,
+            by_lengths: [Vector3::zeros(); 3],
+            by_terms: vec![Vector3::zeros(); parameters],
+        };
+        for piece in &self.chain.pieces[leg.pieces.clone()] {
+            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
+            let before = moved.motion;
+            let half_rad = 0.5 * turn_rad;
+            let (sin, cos) = (before.theta_rad + half_rad).sin_cos();
+            let chord = sinc(half_rad);
+            let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
+            let bend = sinc_derivative(half_rad);
+            let by_turn = Vector3::new(
+                0.5 * distance_m * (bend * cos - chord * sin),
+                0.5 * distance_m * (bend * sin + chord * cos),
+                1.0,
+            );
+            let along = Vector3::new(chord * cos, chord * sin, 0.0);
+            let per_m = 1.0 / separation_m;
+            let steps = [
+                along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m),
+                along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m),
+                -by_turn * turn_rad,
+            ];
+            let mut term_steps = std::mem::take(&mut moved.by_terms);
+            if parameters > 0 {
+                self.term_gradients(piece, travel_m, before);
+                // In the frame of the step's middle; a turn acts on half of the way.
+                let of_term = |g: &Pose| {
+                    Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
+                };
+                for (gradient, size) in self.gradients.iter().zip(&self.model.sizes).filter(|(_, size)| **size != 0.0) {
+                    step += *size * of_term(gradient);
+                }
+                for (by, gradient) in term_steps.iter_mut().zip(&self.gradients) {
+                    *by = turned(*by, step) + of_term(gradient);
+                }
+            }
+            moved.by_terms = term_steps;
+            for (by, of_step) in moved.by_lengths.iter_mut().zip(steps) {
+                *by = turned(*by, step) + of_step;
+            }
+            moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
+            self.session_m += distance_m.abs();
+            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
+            self.previous = Some(*piece);
+        }
+        moved
+    }
+
+    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, before: Pose) {
+        let m_per_rad = self.model.m_per_rad;
+        let previous = self.previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
+        let interval = Interval {
+            t_s: piece.t_s,
+            dt_s: piece.dt_s,
+            travel_m,
+            previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
+            previous_dt_s: previous.dt_s,
+            wheel_separation_m: self.model.separation_m,
+            wheel_rad: self.wheel_rad,
+            turned_rad: piece.wheel_rad,
+            world_from_body: self.pose * before,
+            session_m: self.session_m,
+            run: self.chain.info,
+        };
+        self.gradients.fill(Pose::IDENTITY);
+        let mut rest = &mut self.gradients[..];
+        for term in self.terms.iter_mut() {
+            let (own, others) = rest.split_at_mut(term.parameters().len());
+            term.motion(&interval, own);
+            rest = others;
+        }
+    }
+
+    fn predict(&mut self, leg: &Leg) {
+        let Moved { motion, by_lengths, by_terms } = self.motion(leg);
+        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
+        let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
+        for by in &mut self.by {
+            *by = turned(*by, step);
+        }
+        for (by, of_leg) in self.by.iter_mut().zip(by_lengths) {
+            *by += room(of_leg);
+        }
+        for (by, of_leg) in self.by[Column::BASE.len()..].iter_mut().zip(by_terms) {
+            *by += room(of_leg);
+        }
+        self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
+        let rotation = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
+        carry(&mut self.covariance, -step.y, step.x);
+        let noise: [Matrix3<f64>; 2] =
+            std::array::from_fn(|k| rotation * leg.noise[k] * rotation.transpose() * self.noise.variance[k]);
+        self.covariance += noise[0] + noise[1];
+        if self.want.noise_score {
+            for covariance in &mut self.covariance_by {
+                carry(covariance, -step.y, step.x);
+            }
+            self.covariance_by[0] += noise[0];
+            self.covariance_by[1] += noise[1];
+            for by in &mut self.pose_by_noise {
+                *by = turned(*by, step);
+            }
+        }
+    }
+
+    /// Takes a look; false, and nothing changes, when it lies too far off.
+    fn update(&mut self, leg: &Leg) -> bool {
+        let seen = self.chain.looks[leg.look];
+        let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
+        let twist = self.twist(&piece);
+        let sight = self.sight(seen.t_s, twist);
+        let Pose { x_m: lx, y_m: ly, theta_rad: ltheta } = self.model.body_from_sensor;
+        let late = self.model.latency_s;
+        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
+        // A look is late by the way that the instrument made in the meantime.
+        let moved = Vector3::new(
+            cos * twist.v_m_s - twist.omega_rad_s * mounted.y,
+            sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
+            twist.omega_rad_s,
+        );
+        let from_terms = sight.iter().zip(&self.model.sizes).map(|(sight, size)| *size * sight).sum::<Vector3<f64>>();
+        let ahead = mounted - late * moved + from_terms;
+        let error = Vector3::new(
+            seen.x_m - self.pose.x_m - ahead.x,
+            seen.y_m - self.pose.y_m - ahead.y,
+            seen.theta_rad.map_or(0.0, |theta_rad| wrap_to_pi(theta_rad - self.pose.theta_rad - ltheta - ahead.z)),
+        );
+        // What a component c of the look sees of the pose, and of the parameters directly: rows along, across, heading.
+        let by_heading = Vector3::new(-ahead.y, ahead.x, 1.0);
+        let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
+        let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
+        let components = if seen.theta_rad.is_some() { 3 } else { 2 };
+        let r = [self.noise.variance[2], self.noise.variance[2], self.noise.variance[3]];
+        if !self.want.no_gate && self.distance(&axes, &rows, error, &r, components) > OUTLIER_CHI_SQUARE {
+            return false;
+        }
+        let direct = |column: usize, axis: &Vector3<f64>| match column {
+            3 => axis.dot(&Vector3::new(cos, sin, 0.0)),
+            4 => axis.dot(&Vector3::new(-sin, cos, 0.0)),
+            5 => axis.z,
+            6 => -axis.dot(&moved),
+            _ => column.checked_sub(Column::BASE.len()).and_then(|k| sight.get(k)).map_or(0.0, |sight| axis.dot(sight)),
+        };
+        let mut correction = Vector3::zeros();
+        for component in 0..components {
+            let (axis, row) = (axes[component], rows[component]);
+            let v = axis.dot(&error) - row.dot(&correction);
+            let ph = self.covariance * row;
+            let s = row.dot(&ph) + r[component];
+            let gain = ph / s;
+            if self.want.noise_score {
+                self.score_noise(component, &row, &gain, v, s, r[component]);
+            }
+            for (column, (j, by)) in self.j.iter_mut().zip(&self.by).enumerate() {
+                *j = -row.dot(by) - direct(column, &axis);
+            }
+            self.sums.add(&self.j, v, s);
+            if self.want.innovations {
+                self.innovations.push(Innovation { chain: self.number, look: leg.look, component, z: v / s.sqrt() });
+            }
+            for (by, j) in self.by.iter_mut().zip(&self.j) {
+                *by += gain * *j;
+            }
+            correction += gain * v;
+            self.covariance -= gain * ph.transpose();
+        }
+        self.pose =
+            Pose::new(self.pose.x_m + correction.x, self.pose.y_m + correction.y, self.pose.theta_rad + correction.z);
+        true
+    }
+
+    /// Squared distance of a look from where it should be, over its variance.
+    fn distance(
+        &self,
+        axes: &[Vector3<f64>; 3],
+        rows: &[Vector3<f64>; 3],
+        error: Vector3<f64>,
+        r: &[f64; 3],
+        components: usize,
+    ) -> f64 {
+        let (mut covariance, mut correction, mut sum) = (self.covariance, Vector3::zeros(), 0.0);
+        for component in 0..components {
+            let v: f64 = axes[component].dot(&error) - rows[component].dot(&correction);
+            let ph = covariance * rows[component];
+            let s = rows[component].dot(&ph) + r[component];
+            sum += v * v / s;
+            correction += ph * (v / s);
+            covariance -= ph * ph.transpose() / s;
+        }
+        sum
+    }
+
+    /// The filter's recursions, differentiated by the logarithm of each variance; Gupta & Mehra 1974.
+    fn score_noise(&mut self, component: usize, row: &Vector3<f64>, gain: &Vector3<f64>, v: f64, s: f64, r: f64) {
+        let (mut s_by, mut v_by) = ([0.0; NOISES], [0.0; NOISES]);
+        for a in 0..NOISES {
+            let ph_by = self.covariance_by[a] * row;
+            let own = if (a == 2 && component < 2) || (a == 3 && component == 2) { r } else { 0.0 };
+            s_by[a] = row.dot(&ph_by) + own;
+            v_by[a] = -row.dot(&self.pose_by_noise[a]);
+            let gain_by = (ph_by - gain * s_by[a]) / s;
+            self.pose_by_noise[a] += gain_by * v + gain * v_by[a];
+            let cross = gain_by * gain.transpose() * s;
+            self.covariance_by[a] -= cross + cross.transpose() + gain * gain.transpose() * s_by[a];
+        }
+        let (s_by, v_by) = (Vector4::from(s_by) / s, Vector4::from(v_by));
+        self.noise_score.gradient += s_by * (0.5 * (1.0 - v * v / s)) + v_by * (v / s);
+        self.noise_score.information += s_by * s_by.transpose() * 0.5 + v_by * v_by.transpose() / s;
+    }
+}
+
+/// A derivative carried over a step: a heading that is off turns what comes after.
+fn turned(by: Vector3<f64>, step: Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(by.x - step.y * by.z, by.y + step.x * by.z, by.z)
+}

@@ -1,0 +1,306 @@
+//! The fit: Gauss–Newton for the mean parameters and Fisher scoring for the noise, side by side.
+
+use dataset::ModelTerm;
+use kinematics::{Increment, Pose, unwrap_near};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+
+use super::evidence::{Evidence, Information, total};
+use super::filter::{Pass, Want, pass};
+use super::model::{Column, Model};
+use super::noise::{Noise, NoisePrior};
+use super::records::{Chain, Records, Start};
+use super::thinning::Selection;
+
+/// Median of χ² with one degree of freedom.
+const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
+/// A step this small, squared and over its variance, changes nothing that a print shows.
+const SETTLED: f64 = 1e-8;
+const NOISE_SETTLED: f64 = 1e-4;
+/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
+const LEAST_SIGMA: f64 = 1e-6;
+const LARGEST_NOISE_STEP: f64 = 1.5;
+/// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
+const DAMPING: f64 = 1e-7;
+const LEAST_INFORMATION: f64 = 1e-9;
+
+/// What to fit.
+#[derive(Debug, Clone)]
+pub struct FitOptions {
+    /// The free columns.
+    pub columns: Vec<Column>,
+    /// Directions of the free columns along which nothing moves: rows over the columns.
+    pub held: Vec<DVector<f64>>,
+    /// The noise stays as it is.
+    pub noise_held: bool,
+    /// Most steps.
+    pub max_steps: usize,
+}
+
+impl FitOptions {
+    /// Fits some columns.
+    #[must_use]
+    pub fn of(columns: &[Column]) -> Self {
+        Self { columns: columns.to_vec(), held: Vec::new(), noise_held: false, max_steps: 60 }
+    }
+}
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The mean parameters.
+    pub model: Model,
+    /// The noise.
+    pub noise: Noise,
+    /// Start headings of chains whose instrument sees none, radians; 0 for others.
+    pub(crate) free_headings: Vec<f64>,
+    /// The last pass, at the values above.
+    pub pass: Pass,
+    /// Did the steps die out?
+    pub converged: bool,
+}
+
+impl Fit {
+    /// Before anything is fitted.
+    pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
+        let pass = Pass::nothing();
+        Self { model: nominal.clone(), noise: prior.noise(), free_headings: Vec::new(), pass, converged: false }
+    }
+
+    /// The evidence at the values found, each run cut into so many blocks of chains or, where it is one chain, of looks that start anew.
+    pub(crate) fn blocks(&self, records: &Records<'_>, selections: &[Selection], blocks: usize) -> Vec<Evidence> {
+        let split: Vec<Selection> = selections.to_vec();
+        (0..blocks)
+            .flat_map(|block| {
+                let part: Vec<Selection> =
+                    split.iter().map(|selection| selection.block(records, block, blocks)).collect();
+                let found =
+                    pass(records, &part, &self.model, &self.noise, &self.free_headings, &mut [], Want::default());
+                found.runs.into_iter().filter(|run| run.count > 0.0)
+            })
+            .collect()
+    }
+
+    /// The normal equation of some columns at the values found, over all runs.
+    #[must_use]
+    pub fn information(&self, columns: &[Column]) -> Option<Information> {
+        total(&self.pass.runs).map(|sum| sum.of(columns))
+    }
+}
+
+/// Why there is no fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// No run has wheels and two looks.
+    #[error("no run has logged wheels and two looks of an instrument within its log")]
+    NoLooks,
+    /// The fit left what is finite.
+    #[error("the fit diverges: the looks do not follow the wheels at all")]
+    Diverges,
+}
+
+/// Where to start.
+#[derive(Debug, Clone)]
+pub(crate) struct From {
+    pub(crate) model: Model,
+    pub(crate) noise: Option<Noise>,
+    pub(crate) free_headings: Option<Vec<f64>>,
+}
+
+/// Fits the model to the records, from the nominal drive on.
+///
+/// # Errors
+/// [`FitError`] when there is nothing to fit, or it diverges.
+pub fn fit(
+    records: &Records<'_>,
+    selections: &[Selection],
+    nominal: &Model,
+    stated: dataset::TruthNoise,
+    terms: &mut [Box<dyn ModelTerm>],
+    options: &FitOptions,
+) -> Result<Fit, FitError> {
+    let from = From { model: nominal.clone(), noise: None, free_headings: None };
+    fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
+}
+
+pub(crate) fn fit_from(
+    records: &Records<'_>,
+    selections: &[Selection],
+    from: From,
+    prior: &NoisePrior,
+    terms: &mut [Box<dyn ModelTerm>],
+    options: &FitOptions,
+) -> Result<Fit, FitError> {
+    if selections.iter().all(|selection| selection.legs.iter().all(Vec::is_empty)) {
+        return Err(FitError::NoLooks);
+    }
+    let mut model = from.model;
+    let mut headings =
+        from.free_headings.unwrap_or_else(|| records.chains.iter().map(|chain| start_heading(chain, &model)).collect());
+    let basis = basis(options);
+    let mut noise = from.noise.unwrap_or_else(|| prior.noise());
+    if from.noise.is_none() {
+        // Sizes first, by medians, which outliers do not move; then outliers can be told.
+        for _ in 0..3 {
+            let want = Want { innovations: true, no_gate: true, noise_score: false };
+            let found = pass(records, selections, &model, &noise, &headings, terms, want);
+            step(&mut model, &mut headings, &found, options, &basis)?;
+            let mut squares: Vec<f64> =
+                found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
+            if squares.is_empty() {
+                break;
+            }
+            let middle = squares.len() / 2;
+            let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
+        }
+    }
+    let want = Want { noise_score: !options.noise_held, ..Want::default() };
+    let (mut converged, mut pace) = (false, Pace::default());
+    for _ in 0..options.max_steps {
+        let found = pass(records, selections, &model, &noise, &headings, terms, want);
+        let moved = step(&mut model, &mut headings, &found, options, &basis)?;
+        let noise_moved = if options.noise_held { 0.0 } else { step_noise(&mut noise, &mut pace, &found, prior) };
+        if moved < SETTLED && noise_moved < NOISE_SETTLED {
+            converged = true;
+            break;
+        }
+    }
+    let pass = pass_with_innovations(records, selections, &model, &noise, &headings, terms);
+    Ok(Fit { model, noise, free_headings: headings, pass, converged })
+}
+
+/// A pass at given values, with its innovations.
+pub(crate) fn pass_with_innovations(
+    records: &Records<'_>,
+    selections: &[Selection],
+    model: &Model,
+    noise: &Noise,
+    free_headings: &[f64],
+    terms: &mut [Box<dyn ModelTerm>],
+) -> Pass {
+    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, ..Want::default() })
+}
+
+/// An orthonormal basis of the directions that may move.
+fn basis(options: &FitOptions) -> DMatrix<f64> {
+    let n = options.columns.len();
+    if options.held.is_empty() {
+        return DMatrix::identity(n, n);
+    }
+    let held = DMatrix::from_columns(&options.held);
+    // Held directions have eigenvalue 1 or more in H Hᵀ, the others 0.
+    let eigen = (&held * held.transpose()).symmetric_eigen();
+    let free: Vec<_> =
+        (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+    DMatrix::from_columns(&free)
+}
+
+/// A damped Gauss–Newton step of the mean; returns its squared length over its variance.
+fn step(
+    model: &mut Model,
+    headings: &mut [f64],
+    found: &Pass,
+    options: &FitOptions,
+    basis: &DMatrix<f64>,
+) -> Result<f64, FitError> {
+    let Some(sum) = total(&found.runs) else { return Err(FitError::NoLooks) };
+    let mut moved = vec![0.0; sum.gradient.len()];
+    let mut size = 0.0;
+    if !options.columns.is_empty() && basis.ncols() > 0 {
+        let Information { matrix, gradient } = sum.of(&options.columns);
+        let reduced = basis.transpose() * &matrix * basis;
+        let m = reduced.nrows();
+        let damping = DVector::from_fn(m, |k, _| DAMPING * reduced[(k, k)] + LEAST_INFORMATION);
+        let damped =
+            Information { matrix: &reduced + DMatrix::from_diagonal(&damping), gradient: basis.transpose() * gradient };
+        let (step, _) = damped.solve().ok_or(FitError::Diverges)?;
+        size = (step.transpose() * &reduced * &step)[0];
+        let step = basis * step;
+        for (column, by) in options.columns.iter().zip(step.iter()) {
+            // A drive that a step makes a half or twice as large is none; the next step goes on.
+            let by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
+            if !by.is_finite() {
+                return Err(FitError::Diverges);
+            }
+            model.advance(*column, by);
+            moved[column.index()] = by;
+        }
+    }
+    for (chain, rest, by) in &found.headings {
+        let follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+        headings[*chain] += rest + follows;
+    }
+    Ok(size)
+}
+
+/// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    last: Vector4<f64>,
+    share: Vector4<f64>,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { last: Vector4::zeros(), share: Vector4::repeat(1.0) }
+    }
+}
+
+impl Pace {
+    /// The step to take instead of `step`.
+    fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
+        for k in 0..step.len() {
+            self.share[k] =
+                if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
+        }
+        self.last = step;
+        let tamed = step.component_mul(&self.share);
+        tamed * (LARGEST_NOISE_STEP / tamed.amax()).min(1.0)
+    }
+}
+
+/// A scoring step of the noise; returns the largest component of the whole step.
+fn step_noise(noise: &mut Noise, pace: &mut Pace, found: &Pass, prior: &NoisePrior) -> f64 {
+    let pull = prior.pull(noise);
+    let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+    let information =
+        found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
+    let Some(step) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else { return 0.0 };
+    let tamed = pace.tamed(step);
+    let before = *noise;
+    for (variance, by) in noise.variance.iter_mut().zip(tamed.iter()) {
+        *variance = (*variance * by.exp()).max(LEAST_SIGMA * LEAST_SIGMA);
+    }
+    // What stands at its floor does not move.
+    let moving = (0..4).filter(|&k| noise.variance[k] != before.variance[k]);
+    moving.map(|k| step[k].abs()).fold(0.0, f64::max)
+}
+
+/// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
+fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
+    let Some(first) = chain.looks.first().filter(|look| chain.start == Start::Seen && look.theta_rad.is_none()) else {
+        return 0.0;
+    };
+    let (mut pose, mut at) = (Pose::IDENTITY, first.after);
+    let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
+    for look in &chain.looks[1..] {
+        for piece in &chain.pieces[at..look.after] {
+            let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            pose = pose * Increment::from_travel(travel_m, model.separation_m).arc();
+        }
+        at = look.after;
+        let (x_m, y_m) = (look.x_m - first.x_m, look.y_m - first.y_m);
+        dot += pose.x_m * x_m + pose.y_m * y_m;
+        cross += pose.x_m * y_m - pose.y_m * x_m;
+        longest_m = longest_m.max(x_m.hypot(y_m));
+        // Reckoning is good at the start; half a metre of way shows the heading to a degree.
+        if longest_m > 0.5 || heading_rad == 0.0 {
+            heading_rad = unwrap_near(cross.atan2(dot), 0.0);
+        }
+        if longest_m > 0.5 {
+            break;
+        }
+    }
+    heading_rad
+}

@@ -1,0 +1,240 @@
+//! Runs as chains: how the wheels turned, cut at the instants at which the instrument looked, and what it saw.
+//!
+//! Poses and positions make one chain a run and start free at its first look; where the log does not reach from one look to the next, a new chain begins. A
+//! displacement is a chain of its own: it starts where the instrument stood, which is known exactly in its own frame.
+
+use dataset::{RunInfo, Session};
+use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
+
+use super::model::Model;
+use crate::wheel_track::WheelTrack;
+
+/// A stretch of constant wheel speeds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) t_s: f64,
+    pub(crate) dt_s: f64,
+    /// Turn of each wheel, radians.
+    pub(crate) wheel_rad: Wheels<f64>,
+}
+
+/// What the instrument saw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) t_s: f64,
+    pub(crate) x_m: f64,
+    pub(crate) y_m: f64,
+    pub(crate) theta_rad: Option<f64>,
+    /// How many pieces of the chain end before it.
+    pub(crate) after: usize,
+}
+
+/// Where a chain starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Start {
+    /// At its first look, with that look's errors.
+    Seen,
+    /// With the instrument at the origin of its own frame.
+    Origin,
+}
+
+/// Counts and looks without a gap.
+#[derive(Debug, Clone)]
+pub struct Chain<'a> {
+    /// Which run: session and run in the order given.
+    pub run: (usize, usize),
+    /// The run.
+    pub info: &'a RunInfo,
+    pub(crate) start: Start,
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) looks: Vec<Seen>,
+    /// Angle of each wheel at the first piece, by its counter, radians.
+    pub(crate) wheel_rad: Wheels<f64>,
+    /// What the session's runs drove before, metres by nominal values.
+    pub(crate) session_m: f64,
+}
+
+impl Chain<'_> {
+    fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
+        let pose =
+            |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
+        let start = match self.start {
+            Start::Seen => pose(self.looks.first()?)?,
+            Start::Origin => model.body_from_sensor.inverse(),
+        };
+        let end = pose(self.looks.last()?)?;
+        let reckoned = self.pieces.iter().fold(start, |pose, piece| {
+            let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            pose * Increment::from_travel(travel_m, model.separation_m).arc()
+        });
+        let off_rad = wrap_to_pi(reckoned.theta_rad - end.theta_rad).abs();
+        Some((reckoned.position().distance_m(end.position()), off_rad))
+    }
+}
+
+/// All that sessions hold for the likelihood.
+#[derive(Debug, Clone)]
+pub struct Records<'a> {
+    /// The chains in the order of sessions, runs and time.
+    pub chains: Vec<Chain<'a>>,
+    /// Runs without wheels or with fewer than two looks.
+    pub unused: Vec<(usize, usize)>,
+    /// Ids of all runs by session.
+    pub ids: Vec<Vec<&'a str>>,
+}
+
+impl<'a> Records<'a> {
+    /// The chains of sessions.
+    #[must_use]
+    pub fn of(sessions: &[Session<'a>]) -> Self {
+        let mut records = Self { chains: Vec::new(), unused: Vec::new(), ids: Vec::new() };
+        for (number, session) in sessions.iter().enumerate() {
+            let mut session_m = 0.0;
+            records.ids.push(session.runs.iter().map(|run| run.info().id.as_str()).collect());
+            for (position, run) in session.runs.iter().enumerate() {
+                let before = records.chains.len();
+                if let Some(track) = WheelTrack::of(run, session.robot) {
+                    let base = Chain {
+                        run: (number, position),
+                        info: run.info(),
+                        start: Start::Seen,
+                        pieces: Vec::new(),
+                        looks: Vec::new(),
+                        wheel_rad: Wheels::both(0.0),
+                        session_m,
+                    };
+                    add_poses(&mut records.chains, &base, &track, looks_of(run));
+                    add_displacements(&mut records.chains, &base, &track, run.run());
+                    let way_m = |(diameter_m, side): (f64, &Vec<f64>)| {
+                        side.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>() * 0.5 * diameter_m
+                    };
+                    let turns = track.turns();
+                    session_m += 0.5
+                        * (way_m((session.robot.left_wheel_diameter_m, &turns.left))
+                            + way_m((session.robot.right_wheel_diameter_m, &turns.right)));
+                }
+                if records.chains.len() == before {
+                    records.unused.push((number, position));
+                }
+            }
+        }
+        records
+    }
+
+    /// How many looks there are, starts left out.
+    #[must_use]
+    pub fn looks(&self) -> usize {
+        self.chains.iter().map(|chain| chain.looks.len()).sum()
+    }
+
+    /// Final errors of dead reckoning in a run, from the first look of each chain to its last: of the position, metres, and of the heading, radians.
+    pub(crate) fn end_errors(&self, run: (usize, usize), model: &Model) -> impl Iterator<Item = (f64, f64)> {
+        self.chains.iter().filter(move |chain| chain.run == run).filter_map(|chain| chain.end_error(model))
+    }
+
+    /// The heading of the instrument on the robot, roughly, from the directions in which it and the wheels say that the robot went between looks, each weighed
+    /// by its length; a spin has none, and an arc errs as much one way as its mirror image the other.
+    pub(crate) fn sensor_heading_rad(&self, model: &Model) -> f64 {
+        let (mut dot, mut cross) = (0.0, 0.0);
+        for chain in &self.chains {
+            let mut before = match chain.start {
+                Start::Seen => None,
+                Start::Origin => Some((Pose::IDENTITY, 0)),
+            };
+            for look in &chain.looks {
+                let Some(theta_rad) = look.theta_rad else { return 0.0 };
+                let pose = Pose::new(look.x_m, look.y_m, theta_rad);
+                if let Some((seen, after)) = before {
+                    let moved = chain.pieces[after..look.after].iter().fold(Pose::IDENTITY, |moved, piece| {
+                        let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                        moved * Increment::from_travel(travel_m, model.separation_m).arc()
+                    });
+                    let seen = seen.to(pose);
+                    dot += moved.x_m * seen.x_m + moved.y_m * seen.y_m;
+                    cross += seen.x_m * moved.y_m - seen.y_m * moved.x_m;
+                }
+                before = Some((pose, look.after));
+            }
+        }
+        if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
+    }
+
+    /// Times between looks that follow each other, seconds.
+    pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
+        self.chains.iter().flat_map(|chain| chain.looks.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))
+    }
+
+    /// Has any look a heading?
+    #[must_use]
+    pub fn has_headings(&self) -> bool {
+        self.chains.iter().flat_map(|chain| &chain.looks).any(|look| look.theta_rad.is_some())
+    }
+}
+
+/// The looks of a run: its truth, positions alone included, or else its marked points.
+fn looks_of(run: &dataset::RunView<'_>) -> Vec<(f64, f64, f64, Option<f64>)> {
+    let truth = &run.run().truth;
+    if truth.is_empty() {
+        let poses = run.observed_poses().into_iter();
+        poses.map(|(t_s, pose)| (t_s, pose.x_m, pose.y_m, Some(pose.theta_rad))).collect()
+    } else {
+        truth.iter().map(|sample| (sample.t_s, sample.x_m, sample.y_m, sample.theta_rad())).collect()
+    }
+}
+
+fn add_poses<'a>(
+    chains: &mut Vec<Chain<'a>>,
+    base: &Chain<'a>,
+    track: &WheelTrack<'_>,
+    looks: Vec<(f64, f64, f64, Option<f64>)>,
+) {
+    let mut cursor = track.cursor();
+    let mut chain: Option<Chain<'a>> = None;
+    let mut close = |chain: Option<Chain<'a>>| chains.extend(chain.filter(|chain| chain.looks.len() > 1));
+    for (t_s, x_m, y_m, theta_rad) in looks {
+        let Some(before_s) = chain.as_ref().and_then(|chain| chain.looks.last()).map(|look| look.t_s) else {
+            chain = begin(base, &mut cursor, (t_s, x_m, y_m, theta_rad));
+            continue;
+        };
+        let joined = chain.as_mut().is_some_and(|chain| {
+            let reaches = cursor.pieces(before_s, t_s, &mut chain.pieces);
+            if reaches {
+                chain.looks.push(Seen { t_s, x_m, y_m, theta_rad, after: chain.pieces.len() });
+            }
+            reaches
+        });
+        if !joined {
+            close(chain.take());
+            chain = begin(base, &mut cursor, (t_s, x_m, y_m, theta_rad));
+        }
+    }
+    close(chain);
+}
+
+fn begin<'a>(
+    base: &Chain<'a>,
+    cursor: &mut crate::wheel_track::Cursor<'_, '_>,
+    (t_s, x_m, y_m, theta_rad): (f64, f64, f64, Option<f64>),
+) -> Option<Chain<'a>> {
+    let wheel_rad = cursor.angle_rad(t_s)?;
+    Some(Chain { wheel_rad, looks: vec![Seen { t_s, x_m, y_m, theta_rad, after: 0 }], ..base.clone() })
+}
+
+fn add_displacements<'a>(chains: &mut Vec<Chain<'a>>, base: &Chain<'a>, track: &WheelTrack<'_>, run: &dataset::Run) {
+    let mut cursor = track.cursor();
+    for seen in &run.displacements {
+        let Some(wheel_rad) = cursor.angle_rad(seen.t0_s) else { continue };
+        let mut pieces = Vec::new();
+        if cursor.pieces(seen.t0_s, seen.t1_s, &mut pieces) {
+            let pose = Pose::new(seen.dx_m, seen.dy_m, seen.dtheta_rad);
+            let look = Seen {
+                t_s: seen.t1_s,
+                x_m: pose.x_m,
+                y_m: pose.y_m,
+                theta_rad: Some(pose.theta_rad),
+                after: pieces.len(),
+            };
+            chains.push(Chain { start: Start::Origin, pieces, looks: vec![look], wheel_rad, ..base.clone() });
+        }
+    }
+}

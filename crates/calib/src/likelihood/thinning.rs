@@ -1,0 +1,169 @@
+//! Which looks the likelihood takes: all, or looks so far apart that their errors have nothing to do with each other.
+//!
+//! The errors of an instrument that tracks the robot often last for seconds: lens distortion, a marker's own frame, a filter inside. A likelihood that takes such
+//! looks one by one believes each, and fits the wheels to the instrument's errors. Thinned looks are honest. What the looks in between know is not thrown away:
+//! the same is done in several phases, each shifted by a share of the spacing, and the costs are averaged (a composite likelihood; Varin, Reid & Firth 2011).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::model::Model;
+use super::records::{Chain, Records, Start};
+
+/// How looks are thinned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thinning {
+    /// Least time between two looks, seconds; 0 for all.
+    pub every_s: f64,
+    /// In how many phases.
+    pub phases: usize,
+}
+
+impl Thinning {
+    /// Every look.
+    pub const NONE: Self = Self { every_s: 0.0, phases: 1 };
+}
+
+/// From one look to the next that is taken.
+#[derive(Debug, Clone)]
+pub(crate) struct Leg {
+    pub(crate) pieces: std::ops::Range<usize>,
+    /// The look before; 0 for a displacement.
+    pub(crate) from: usize,
+    pub(crate) look: usize,
+    /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a turn noise of 1 rad²/rad.
+    pub(crate) noise: [Matrix3<f64>; 2],
+}
+
+/// The looks taken in one phase.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// For each chain its legs; without any, the chain has no part in the phase.
+    pub(crate) legs: Vec<Vec<Leg>>,
+}
+
+impl Selection {
+    /// The selections of all phases.
+    #[must_use]
+    pub fn of(records: &Records<'_>, thinning: Thinning, nominal: &Model) -> Vec<Self> {
+        #[allow(clippy::cast_precision_loss)] // a handful of phases
+        let offset = |phase: usize| phase as f64 / thinning.phases as f64;
+        (0..thinning.phases)
+            .map(|phase| Self {
+                legs: records
+                    .chains
+                    .iter()
+                    .map(|chain| legs(chain, &taken(chain, thinning.every_s, offset(phase)), nominal))
+                    .collect(),
+            })
+            .collect()
+    }
+
+    /// One of several blocks of each run: by its chains where it has as many, else by the looks of each.
+    pub(crate) fn block(&self, records: &Records<'_>, block: usize, blocks: usize) -> Self {
+        let mut legs = vec![Vec::new(); self.legs.len()];
+        let mut first = 0;
+        for run in records.chains.chunk_by(|a, b| a.run == b.run) {
+            let of = first..first + run.len();
+            first = of.end;
+            let share = |of: usize| block * of / blocks..(block + 1) * of / blocks;
+            if run.len() >= blocks {
+                let part = of.start + share(run.len()).start..of.start + share(run.len()).end;
+                legs[part.clone()].clone_from_slice(&self.legs[part]);
+            } else {
+                for chain in of {
+                    legs[chain] = self.legs[chain][share(self.legs[chain].len())].to_vec();
+                }
+            }
+        }
+        Self { legs }
+    }
+
+    /// How many looks it takes a chain that has any, on average; starts left out.
+    #[must_use]
+    pub fn mean_looks(&self) -> f64 {
+        let (chains, looks) =
+            self.legs.iter().filter(|legs| !legs.is_empty()).fold((0.0, 0.0), |(chains, looks), legs| {
+                #[allow(clippy::cast_precision_loss)]
+                (chains + 1.0, looks + legs.len() as f64)
+            });
+        if chains > 0.0 { looks / chains } else { 0.0 }
+    }
+}
+
+/// The looks after the first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
+/// place of one that is too near to it.
+fn taken(chain: &Chain<'_>, every_s: f64, offset: f64) -> Vec<usize> {
+    let first = usize::from(chain.start == Start::Seen);
+    let (Some(start), Some(last)) = (chain.looks.first(), chain.looks.last()) else { return Vec::new() };
+    if every_s == 0.0 || first == 0 {
+        return (first..chain.looks.len()).collect();
+    }
+    let mut due_s = start.t_s + every_s * (1.0 + offset);
+    let mut taken = Vec::new();
+    for (number, look) in chain.looks.iter().enumerate().skip(first) {
+        if look.t_s >= due_s - 1e-9 {
+            taken.push(number);
+            due_s = look.t_s + every_s;
+        }
+    }
+    while taken.last().is_some_and(|number| last.t_s - chain.looks[*number].t_s < every_s) {
+        taken.pop();
+    }
+    taken.push(chain.looks.len() - 1);
+    taken
+}
+
+fn legs(chain: &Chain<'_>, taken: &[usize], nominal: &Model) -> Vec<Leg> {
+    let mut before = 0;
+    let mut from = if chain.start == Start::Seen { chain.looks.first().map_or(0, |look| look.after) } else { 0 };
+    taken
+        .iter()
+        .map(|&look| {
+            let pieces = from..chain.looks[look].after;
+            from = pieces.end;
+            let leg = Leg { noise: noise(chain, pieces.clone(), nominal), pieces, from: before, look };
+            before = look;
+            leg
+        })
+        .collect()
+}
+
+/// The covariance of a leg's motion for unit noises. It is that of the nominal drive: an estimate of the lengths must not gain by what it does to covariances.
+fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> [Matrix3<f64>; 2] {
+    let (mut wheel, mut turn) = (Matrix3::zeros(), Matrix3::zeros());
+    let mut theta_rad = 0.0;
+    for piece in &chain.pieces[pieces] {
+        let travel_m = nominal.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        let (way_m, turn_rad) =
+            (0.5 * (travel_m.left + travel_m.right), (travel_m.right - travel_m.left) / nominal.separation_m);
+        let (sin, cos) = (theta_rad + 0.5 * turn_rad).sin_cos();
+        let (dx_m, dy_m) = (way_m * cos, way_m * sin);
+        for covariance in [&mut wheel, &mut turn] {
+            carry(covariance, -dy_m, dx_m);
+        }
+        // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on half of the way.
+        for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {
+            let by_turn = side / nominal.separation_m;
+            let column = Vector3::new(0.5 * (cos - dy_m * by_turn), 0.5 * (sin + dx_m * by_turn), by_turn);
+            wheel += column * column.transpose() * travel_m.abs();
+        }
+        let column = Vector3::new(-0.5 * dy_m, 0.5 * dx_m, 1.0);
+        turn += column * column.transpose() * turn_rad.abs();
+        theta_rad += turn_rad;
+    }
+    [wheel, turn]
+}
+
+/// F C Fᵀ for a step that moves by (dx, dy): F = [1 0 a; 0 1 b; 0 0 1] with a = −dy, b = dx.
+pub(crate) fn carry(covariance: &mut Matrix3<f64>, a: f64, b: f64) {
+    let c = covariance;
+    let (c02, c12, c22) = (c[(0, 2)], c[(1, 2)], c[(2, 2)]);
+    c[(0, 0)] += a * (2.0 * c02 + a * c22);
+    c[(0, 1)] += a * c12 + b * c02 + a * b * c22;
+    c[(1, 1)] += b * (2.0 * c12 + b * c22);
+    c[(0, 2)] += a * c22;
+    c[(1, 2)] += b * c22;
+    c[(1, 0)] = c[(0, 1)];
+    c[(2, 0)] = c[(0, 2)];
+    c[(2, 1)] = c[(1, 2)];
+}

@@ -1,0 +1,470 @@
+//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument saw.
+//!
+//! Model: [`crate::likelihood`]: counts predict, looks correct; the three lengths, the noise of wheels and instrument and every start pose are estimated.
+//! Assumptions: the instrument's errors are independent from look to look. That is tested: while innovations resemble the ones before, looks are taken farther
+//! apart. Mounting and latency of the instrument join when they predict runs that they were not fitted to.
+//! Observability: any path; what the looks do not determine is named and kept at its nominal value. Ends of closed paths hide the common scale, paths without
+//! turns the separation.
+//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
+
+mod profile;
+
+use dataset::{ModelTerm, Schedule, Session};
+use kinematics::Pose;
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
+
+use crate::estimate::{
+    CalibError, Calibration, Covariance, Method, Mounting, NotObservable, Rejected, drive, nominal,
+    refuse_wrapped_counters,
+};
+use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Pass, Records, Selection, Thinning};
+use crate::likelihood::{From, NoisePrior, fit_from, pass_with_innovations};
+use crate::sensitivity::unseen;
+
+pub use profile::RISE_95;
+
+/// The method with its settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// Look for a mounting and a latency of the instrument.
+    pub nuisances: bool,
+    /// Take looks farther apart while their errors resemble each other; without, every look counts as independent.
+    pub thin: bool,
+}
+
+/// Innovations are taken for white while no component's correlation with the look before reaches this many standard errors: three components at 1 % together.
+const WHITE_BELOW: f64 = 2.935;
+/// In how many phases thinned looks are taken.
+const PHASES: usize = 4;
+/// Thinned further, a run would be little more than its ends.
+const LEAST_LOOKS_A_RUN: f64 = 1.0;
+/// A direction of the lengths is seen when its relative standard deviation is below this: nominal values are better known than worse.
+const LARGEST_SIGMA: f64 = 0.03;
+/// An instrument whose heading on the robot seems to be more than this is mounted so on purpose; less may be the lie of a short log.
+const TURNED_ASIDE_RAD: f64 = 0.2;
+/// With fewer runs, they are cut into blocks to be held out.
+const LEAST_RUNS: usize = 6;
+const FOLDS: usize = 6;
+/// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
+const SCATTER_OF_RUNS: usize = 20;
+/// A nuisance must gain by so many standard errors on what was held out.
+const GAIN_IN_SIGMAS: f64 = 2.0;
+
+/// What [`Joint::fit`] found.
+#[derive(Debug, Clone)]
+pub struct JointFit<'a> {
+    /// The runs.
+    pub records: Records<'a>,
+    /// How their looks are thinned.
+    pub thinning: Thinning,
+    /// The looks taken.
+    pub selections: Vec<Selection>,
+    /// The nominal drive.
+    pub nominal: Model,
+    /// Where fits start: the nominal drive with its instrument turned as it seems to be.
+    pub(crate) start: Model,
+    /// The fit.
+    pub fit: Fit,
+    /// The free columns.
+    pub columns: Vec<Column>,
+    /// Directions of the three lengths that the data do not determine, and that stay nominal: rows left, right, separation.
+    pub unseen: Vec<DVector<f64>>,
+    pub(crate) prior: NoisePrior,
+}
+
+impl Joint {
+    /// The method as the table of contents offers it.
+    pub const DEFAULT: Self = Self { nuisances: true, thin: true };
+
+    const NAME: &'static str = "joint";
+
+    /// The fit behind the calibration, for whoever extends it.
+    ///
+    /// # Errors
+    /// [`CalibError`] when the sessions hold no looks, or the fit diverges.
+    pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
+        refuse_wrapped_counters(sessions)?;
+        let (_, geometry) = nominal(Self::NAME, sessions)?;
+        let records = Records::of(sessions);
+        let nominal = Model::of(&geometry, 0);
+        let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
+        let mut found = JointFit {
+            selections: Selection::of(&records, Thinning::NONE, &nominal),
+            thinning: Thinning::NONE,
+            fit: Fit::nothing(&nominal, &prior),
+            columns: Column::GEOMETRY.to_vec(),
+            unseen: Vec::new(),
+            records,
+            start: nominal.clone(),
+            nominal,
+            prior,
+        };
+        found.look_at_the_mounting();
+        found.refit(None)?;
+        if self.thin {
+            found.thin()?;
+        }
+        if self.nuisances {
+            found.add_nuisances()?;
+        }
+        found.hold_what_is_unseen()?;
+        Ok(found)
+    }
+}
+
+fn refused(error: FitError) -> CalibError {
+    CalibError::NotApplicable { method: Joint::NAME, why: error.to_string() }
+}
+
+impl JointFit<'_> {
+    /// An instrument that looks to the side cannot be left out of the first fit.
+    fn look_at_the_mounting(&mut self) {
+        let heading_rad = self.records.sensor_heading_rad(&self.nominal);
+        if heading_rad.abs() > TURNED_ASIDE_RAD {
+            self.start.body_from_sensor.theta_rad = heading_rad;
+            self.columns.extend(Column::MOUNTING);
+        }
+    }
+
+    fn refit(&mut self, from: Option<From>) -> Result<(), CalibError> {
+        self.refit_with(from, &mut [])
+    }
+
+    fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
+        let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
+        let options = FitOptions { held: self.held(), ..FitOptions::of(&self.columns) };
+        self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
+        Ok(())
+    }
+
+    /// The directions of the free columns that stay nominal.
+    fn held(&self) -> Vec<DVector<f64>> {
+        let along = |direction: &DVector<f64>, column: &Column| direction.get(column.index()).copied().unwrap_or(0.0);
+        let of = |direction| {
+            DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| along(direction, column)))
+        };
+        self.unseen.iter().map(of).collect()
+    }
+
+    fn here(&self) -> From {
+        let Fit { model, noise, free_headings, .. } = &self.fit;
+        From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
+    }
+
+    /// Takes looks farther apart until their innovations are white, or a run has too few left.
+    fn thin(&mut self) -> Result<(), CalibError> {
+        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
+        let mut every_s = between_s;
+        while self.correlation() > WHITE_BELOW {
+            every_s *= 2.0;
+            let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
+            let selections = Selection::of(&self.records, thinning, &self.nominal);
+            if selections[0].mean_looks() < LEAST_LOOKS_A_RUN {
+                break;
+            }
+            (self.selections, self.thinning) = (selections, thinning);
+            self.refit(Some(self.here()))?;
+        }
+        Ok(())
+    }
+
+    /// The largest correlation of an innovation with the one before, over the components, in standard errors.
+    #[must_use]
+    pub fn correlation(&self) -> f64 {
+        (0..3)
+            .map(|component| {
+                let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
+                for phase in &self.fit.pass.innovations {
+                    let mut of: Option<(usize, f64)> = None;
+                    for innovation in phase.iter().filter(|innovation| innovation.component == component) {
+                        squares += innovation.z * innovation.z;
+                        count += 1.0;
+                        if let Some((chain, z)) = of
+                            && chain == innovation.chain
+                        {
+                            products += z * innovation.z;
+                            pairs += 1.0;
+                        }
+                        of = Some((innovation.chain, innovation.z));
+                    }
+                }
+                // Phases share their looks' errors: they count once.
+                #[allow(clippy::cast_precision_loss)]
+                let phases = self.fit.pass.innovations.len() as f64;
+                if pairs == 0.0 { 0.0 } else { products / (squares / count) / (pairs * phases).sqrt() }
+            })
+            .fold(0.0, |largest: f64, z| largest.max(z.abs()))
+    }
+
+    /// Lets the mounting and the latency of the instrument in where they predict what they were not fitted to: the looks by their likelihood, and the ends of
+    /// the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a calibration is for.
+    fn add_nuisances(&mut self) -> Result<(), CalibError> {
+        let sets: [&[Column]; 3] = [
+            &Column::MOUNTING,
+            &[Column::Latency],
+            &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency],
+        ];
+        let units = self.units();
+        let present = self.columns.clone();
+        let Some(base) = self.held_out(&units, &present) else { return Ok(()) };
+        let best = sets
+            .into_iter()
+            .filter_map(|set| {
+                let columns: Vec<Column> =
+                    present.iter().chain(set.iter().filter(|column| !present.contains(column))).copied().collect();
+                let found = self.held_out(&units, &columns)?;
+                let gains: Vec<f64> = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
+                let (mean, error) = mean_and_error(&gains)?;
+                let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
+                (mean > GAIN_IN_SIGMAS * error && !drifts).then_some((mean, columns))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, columns)) = best {
+            self.columns = columns;
+            self.refit(Some(self.here()))?;
+        }
+        Ok(())
+    }
+
+    /// Fits some columns to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not determine the columns.
+    fn held_out(&self, units: &[Evidence], columns: &[Column]) -> Option<HeldOut> {
+        let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
+        for fold in 0..FOLDS.min(units.len()) {
+            let of_fold = |k: usize| k % FOLDS == fold;
+            let mut others = units.iter().enumerate().filter(|(k, _)| !of_fold(*k)).map(|(_, unit)| unit);
+            let mut sum = others.next()?.clone();
+            others.for_each(|unit| sum.add(unit, 1.0));
+            let (step, _) = sum.of(columns).solve()?;
+            let mut model = self.fit.model.clone();
+            columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+            for (k, unit) in units.iter().enumerate().filter(|(k, _)| of_fold(*k)) {
+                found.costs[k] = unit.cost_after(columns, &step);
+                for (end_m, end_rad) in self.records.end_errors(unit.run, &model) {
+                    found.end_m += end_m;
+                    found.end_rad += end_rad;
+                }
+            }
+        }
+        Some(found)
+    }
+
+    /// The evidence in units that can be held out: runs, or blocks where runs are few.
+    fn units(&self) -> Vec<Evidence> {
+        if self.fit.pass.runs.len() >= LEAST_RUNS {
+            return self.fit.pass.runs.clone();
+        }
+        self.fit.blocks(&self.records, &self.selections, LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+    }
+
+    /// Names the directions of the lengths that the looks do not determine, and keeps them nominal.
+    fn hold_what_is_unseen(&mut self) -> Result<(), CalibError> {
+        let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
+        let geometry = geometry_information(&information.matrix);
+        let SymmetricEigen { eigenvalues, eigenvectors } = geometry.symmetric_eigen();
+        self.unseen = (0..3)
+            .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
+            .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
+            .collect();
+        if self.unseen.is_empty() {
+            return Ok(());
+        }
+        let from = From {
+            model: Model {
+                m_per_rad: self.nominal.m_per_rad,
+                separation_m: self.nominal.separation_m,
+                ..self.fit.model.clone()
+            },
+            ..self.here()
+        };
+        self.refit(Some(from))
+    }
+
+    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of.
+    #[must_use]
+    pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
+        let model = Model { sizes: vec![0.0; parameters], ..self.fit.model.clone() };
+        let Fit { noise, free_headings, .. } = &self.fit;
+        pass_with_innovations(&self.records, &self.selections, &model, noise, free_headings, terms)
+    }
+
+    /// The fit with further terms, their sizes free beside what is free already, on the same looks.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn extended(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, CalibError> {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+        let mut columns = self.columns.clone();
+        columns.retain(|column| !matches!(column, Column::Term(_)));
+        columns.extend((0..parameters).map(Column::Term));
+        let mut from = self.here();
+        from.model.sizes = vec![0.0; parameters];
+        let mut extended = Self { columns, ..self.clone() };
+        extended.refit_with(Some(from), terms)?;
+        Ok(extended)
+    }
+
+    /// Covariance of the free columns: from the observed information where runs are few and innovations white, else corrected for what the model gets wrong by the
+    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account).
+    #[must_use]
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let information = self.fit.information(&self.columns)?;
+        let free = self.free_basis();
+        let reduced = crate::likelihood::Information {
+            matrix: free.transpose() * &information.matrix * &free,
+            gradient: free.transpose() * &information.gradient,
+        };
+        let (_, inverse) = reduced.solve()?;
+        let model_based = &free * &inverse * free.transpose();
+        let units = self.units();
+        let enough = if self.thinning == Thinning::NONE { SCATTER_OF_RUNS } else { free.ncols() + 2 };
+        if units.len() < enough {
+            return Some(model_based);
+        }
+        #[allow(clippy::cast_precision_loss)]
+        let count = units.len() as f64;
+        let mut meat = DMatrix::zeros(free.ncols(), free.ncols());
+        for unit in &units {
+            let of = unit.of(&self.columns);
+            // Each unit's leverage taken into account: its score without itself in the fit.
+            let own = free.transpose() * of.matrix * &free;
+            let gradient = free.transpose() * of.gradient;
+            let Some(others) = (DMatrix::identity(free.ncols(), free.ncols()) - &own * &inverse).try_inverse() else {
+                continue;
+            };
+            let without = others * gradient;
+            meat += &without * without.transpose();
+        }
+        let sandwich = &inverse * (meat * ((count - 1.0) / count)) * &inverse;
+        Some(&free * sandwich * free.transpose())
+    }
+
+    fn free_basis(&self) -> DMatrix<f64> {
+        let n = self.columns.len();
+        if self.unseen.is_empty() {
+            return DMatrix::identity(n, n);
+        }
+        let held = DMatrix::from_fn(n, self.unseen.len(), |row, k| {
+            self.unseen[k].get(self.columns[row].index()).copied().unwrap_or(0.0)
+        });
+        let eigen = (&held * held.transpose()).symmetric_eigen();
+        let free: Vec<_> =
+            (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+        DMatrix::from_columns(&free)
+    }
+}
+
+/// Information on the three lengths with the other columns at their best.
+fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
+    let n = matrix.nrows();
+    let own = matrix.view((0, 0), (3, 3)).into_owned();
+    let rest = if n > 3 {
+        let (cross, others) = (matrix.view((0, 3), (3, n - 3)), matrix.view((3, 3), (n - 3, n - 3)).into_owned());
+        others.try_inverse().map_or_else(|| DMatrix::zeros(3, 3), |inverse| cross * inverse * cross.transpose())
+    } else {
+        DMatrix::zeros(3, 3)
+    };
+    Matrix3::from_iterator((own - rest).iter().copied())
+}
+
+/// Median time between looks.
+fn median_between(records: &Records<'_>) -> Option<f64> {
+    let mut between: Vec<f64> = records.times_between().collect();
+    if between.is_empty() {
+        return None;
+    }
+    let middle = between.len() / 2;
+    Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// What was predicted of runs by fits to other runs.
+#[derive(Debug, Clone, PartialEq)]
+struct HeldOut {
+    /// Each unit's cost.
+    costs: Vec<f64>,
+    /// Sum of the runs' final errors of dead reckoning, metres.
+    end_m: f64,
+    /// The same of headings, radians.
+    end_rad: f64,
+}
+
+fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
+    #[allow(clippy::cast_precision_loss)]
+    let n = values.len() as f64;
+    if n < 2.0 {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Some((mean, (variance / n).sqrt()))
+}
+
+impl Method for Joint {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn about(&self) -> &'static str {
+        "any path and any truth (poses, positions, ends, displacements, marks): maximum likelihood of whole runs, noise estimated"
+    }
+
+    /// The paper's runs, with squares for what only shows in corners.
+    fn protocol(&self) -> Vec<Schedule> {
+        vec![
+            Schedule::Straights { length_m: 0.5, runs: 40 },
+            Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 20 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 5 },
+        ]
+    }
+
+    fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
+        let (robot, _) = nominal(Self::NAME, sessions)?;
+        let found = self.fit(sessions)?;
+        let Model { m_per_rad, separation_m, body_from_sensor, .. } = found.fit.model.clone();
+        let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
+        let covariance = found.covariance();
+        let diameter_m = geometry.wheel_diameter_m();
+        let sizes = [diameter_m.left, diameter_m.right, separation_m];
+        let mounted = found.columns.contains(&Column::MountX);
+        let at = |column: Column| found.columns.iter().position(|of| *of == column);
+        let mounting = mounted.then(|| Mounting {
+            body_from_sensor: Pose { ..body_from_sensor },
+            covariance: covariance
+                .as_ref()
+                .zip(at(Column::MountX))
+                .map(|(covariance, first)| Matrix3::from_fn(|i, j| covariance[(first + i, first + j)])),
+        });
+        Ok(Calibration {
+            covariance: covariance
+                .as_ref()
+                .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
+            mounting,
+            not_observable: found.unseen.iter().map(not_observable).collect(),
+            runs_used: found.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+            runs_rejected: found.rejected(),
+            converged: found.fit.converged,
+            ..Calibration::new(Self::NAME, geometry, robot.ticks_per_rev)
+        })
+    }
+}
+
+fn not_observable(direction: &DVector<f64>) -> NotObservable {
+    let (parameter, missing) = unseen(&nalgebra::Vector3::new(direction[0], direction[1], direction[2]));
+    NotObservable { parameter, why: missing }
+}
+
+impl JointFit<'_> {
+    /// Runs without use and runs of which no look fitted.
+    fn rejected(&self) -> Vec<Rejected> {
+        let id = |run: (usize, usize)| self.records.ids[run.0][run.1].to_owned();
+        let unused = self.records.unused.iter().map(|run| Rejected {
+            run: id(*run),
+            why: "it has no wheels, or fewer than two looks of the instrument within its log".to_owned(),
+        });
+        let far = self.fit.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
+            run: id(run.run),
+            why: "what the instrument saw lies far outside of what wheels and noise explain".to_owned(),
+        });
+        unused.chain(far).collect()
+    }
+}

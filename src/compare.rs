@@ -1,0 +1,169 @@
+//! `yair compare DATASET... [--method M]...`
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use calib::{ComparedMethod, Comparison, KindMean, METHODS, Method, refuse_wrapped_counters};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use dataset::Session;
+
+use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+
+/// Which calibration holds on sessions that it has not seen?
+///
+/// Calibrates one robot on each of its sessions with every method, and evaluates on every other session.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Datasets, each one a session of the same robot; a folder of datasets stands for all of them.
+    #[arg(required = true, value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// Method; may be given several times. Without it, every one.
+    #[arg(long = "method", value_name = "M", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name())))]
+    methods: Vec<String>,
+}
+
+/// Kinds of path beside each other in 100 columns.
+const KINDS_A_TABLE: usize = 3;
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let mut paths = Vec::new();
+    for path in &arguments.datasets {
+        paths.extend(datasets_in(path)?);
+    }
+    let datasets = read_datasets(&paths, terminal)?;
+    let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    refuse_wrapped_counters(&sessions)?;
+    let chosen = |method: &&dyn Method| {
+        arguments.methods.is_empty() || arguments.methods.iter().any(|name| name == method.name())
+    };
+    let methods: Vec<&dyn Method> = METHODS.iter().copied().filter(chosen).collect();
+    let bar = terminal.progress((sessions.len() * methods.len()) as u64, "calibrations");
+    let comparison = calib::compare(&sessions, &methods, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let robots: BTreeSet<String> = sessions
+        .iter()
+        .map(|session| {
+            let robot = session.robot;
+            let lengths_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];
+            lengths_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ")
+        })
+        .collect();
+    show(&comparison, terminal)?;
+    if robots.len() > 1 {
+        let robots: Vec<&str> = robots.iter().map(String::as_str).collect();
+        terminal.say("sessions state different nominal values, and what a method is blind to stays nominal")?;
+        terminal.say(&format!("  left, right, separation in mm: {}", robots.join("; ")))?;
+    }
+    terminal.document(&comparison)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A dataset, or those in a folder of datasets, by name.
+fn datasets_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    const MANIFEST: &str = "dataset.toml";
+    if !path.is_dir() || path.join(MANIFEST).exists() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let unreadable = |error| format!("{}: {error}", path.display());
+    let mut inside = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?.path();
+        if entry.join(MANIFEST).is_file() {
+            inside.push(entry);
+        }
+    }
+    inside.sort();
+    // Nothing inside: reading the folder as a dataset says what is missing.
+    Ok(if inside.is_empty() { vec![path.to_owned()] } else { inside })
+}
+
+fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
+    let Some(nominal) = comparison.methods.first() else { return Ok(()) };
+    let sessions_of = |kind: &str| comparison.sessions.iter().filter(|session| session.path_kind == kind).count();
+    let kinds: Vec<(&str, usize)> =
+        nominal.kinds.iter().map(|mean| (mean.evaluated_on.as_str(), sessions_of(&mean.evaluated_on))).collect();
+    let counts: Vec<String> = kinds.iter().map(|(kind, count)| format!("{count} of {kind}")).collect();
+    terminal.say(&format!("{} sessions: {}", comparison.sessions.len(), counts.join(", ")))?;
+    terminal.say("mean error at the ends of runs that the calibration has not seen; n = ordered pairs of sessions")?;
+    for evaluated in kinds.chunks(KINDS_A_TABLE) {
+        // Units stand in the last line, a kind's name as low above them as it goes.
+        let lines = evaluated.iter().map(|(kind, _)| kind.split(" + ").count()).max().unwrap_or(1);
+        let above = |lines: usize| "\n".repeat(lines);
+        let mut headers = vec![format!("{}trained on", above(lines)), format!("{}method", above(lines))];
+        for (kind, _) in evaluated {
+            let name = kind.replace(" + ", "\n+ ");
+            let gap = above(lines - kind.split(" + ").count());
+            headers.extend([format!("{gap}{name}\nmm"), format!("{}deg", above(lines)), format!("{}n", above(lines))]);
+        }
+        let mut rows = table(&headers.iter().map(String::as_str).collect::<Vec<_>>(), 2);
+        rows.add_row(row("–", nominal, None, evaluated));
+        for (trained, _) in &kinds {
+            // A kind is printed where it begins, so that the eye finds the blocks.
+            let mut label = *trained;
+            for method in &comparison.methods[1..] {
+                let refused = method.refusals.iter().filter(|refusal| refusal.path_kind == *trained).count();
+                if refused < sessions_of(trained) {
+                    rows.add_row(row(label, method, Some(trained), evaluated));
+                    label = "";
+                }
+            }
+        }
+        terminal.say(&rows.to_string())?;
+    }
+    for pair in &nominal.pairs {
+        if let Some(why) = &pair.why_null {
+            terminal.say(&format!("nothing is evaluated on {}: {why}", pair.evaluated_on))?;
+        }
+    }
+    let refusals = refusals(comparison, &kinds);
+    if !refusals.is_empty() {
+        let mut rows = table(&["method", "refused", "why"], 3);
+        for refusal in refusals {
+            rows.add_row(refusal);
+        }
+        terminal.say(&rows.to_string())?;
+    }
+    Ok(())
+}
+
+fn row(label: &str, method: &ComparedMethod, trained: Option<&str>, evaluated: &[(&str, usize)]) -> Vec<String> {
+    let mut row = vec![label.to_owned(), method.method.clone()];
+    for (kind, _) in evaluated {
+        let of = |mean: &&KindMean| mean.trained_on.as_deref() == trained && mean.evaluated_on == *kind;
+        let mean = method.kinds.iter().find(of);
+        row.extend([
+            cell(mean.and_then(|mean| mean.mean_final_position_m), 1e3, 2),
+            cell(mean.and_then(|mean| mean.mean_final_heading_rad), 180.0 / std::f64::consts::PI, 3),
+            mean.map_or_else(String::new, |mean| mean.pairs.to_string()),
+        ]);
+    }
+    row
+}
+
+/// Method, which sessions it refused, and why: the reason of the first one, by name where others have their own.
+fn refusals(comparison: &Comparison, kinds: &[(&str, usize)]) -> Vec<[String; 3]> {
+    let mut rows = Vec::new();
+    for method in &comparison.methods {
+        // The method stands beside it.
+        let reason = |why: &str| {
+            let why = why.trim_start_matches(method.method.as_str()).trim_start_matches(':');
+            why.trim_start().to_owned()
+        };
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for (kind, sessions) in kinds {
+            let refused: Vec<_> = method.refusals.iter().filter(|refusal| refusal.path_kind == *kind).collect();
+            let Some(first) = refused.first() else { continue };
+            let own = refused.iter().any(|refusal| refusal.why != first.why);
+            let why = if own { format!("{}: {}", first.dataset, reason(&first.why)) } else { reason(&first.why) };
+            let of = format!("{} of {sessions} {kind}", refused.len());
+            match groups.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, kinds)) => kinds.push(of),
+                None => groups.push((why, vec![of])),
+            }
+        }
+        rows.extend(groups.into_iter().map(|(why, of)| [method.method.clone(), of.join(", "), why]));
+    }
+    rows
+}
