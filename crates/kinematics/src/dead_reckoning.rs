@@ -4,6 +4,7 @@
 //! chord `ΔS·sinc(Δθ/2)` ([`Rule::ExactArc`]). Heading is *not* summed: it is a function of the counts since the start,
 //! `θ = θ₀ + (C_R N_R − C_L N_L)/B`, so ten million steps leave no rounding drift in it and steps do not wait for each other.
 
+use crate::trig::sin_cos;
 use crate::{Pose, Wheels, sinc};
 
 /// How one step's wheel travel becomes a displacement.
@@ -137,7 +138,7 @@ impl<C: Count> DeadReckoning<C> {
             Rule::Midpoint => distance_m,
             Rule::ExactArc => distance_m * sinc(half_turn_rad),
         };
-        let (sin, cos) = (self.world_from_body.theta_rad + half_turn_rad).sin_cos();
+        let (sin, cos) = sin_cos(self.world_from_body.theta_rad + half_turn_rad);
         self.world_from_body.x_m += chord_m * cos;
         self.world_from_body.y_m += chord_m * sin;
         self.world_from_body.theta_rad = theta_rad;

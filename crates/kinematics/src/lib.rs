@@ -19,11 +19,13 @@ mod covariance;
 mod dead_reckoning;
 mod drive;
 mod pose;
+mod trig;
 mod wheels;
 
-pub use angle::{sinc, sinc_derivative, unwrap_near, wrap_to_pi};
+pub use angle::{sinc_derivative, unwrap_near, wrap_to_pi};
 pub use covariance::{ArcScatter, OdometryCovariance, WheelNoise};
 pub use dead_reckoning::{Count, DeadReckoning, Odometry, Rule};
 pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
 pub use pose::{Frame, Point, Pose};
+pub use trig::{atan2, sinc};
 pub use wheels::{Side, Wheels};

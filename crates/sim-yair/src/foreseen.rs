@@ -1,0 +1,106 @@
+//! The closed form where all of a run but its draws is foreseen: when it moves, rests and is read follows from the plan, so that no clock has to be asked.
+//!
+//! That is so where no effect has a say in commands and counters, nothing is logged between motions and no instrument looks by itself: the paper's
+//! experiments. What the body and its counters do is the same code as in [`crate::drive`], and a test holds both ways to the same records.
+
+use dataset::{Run, WheelLog};
+use effects::Readout;
+use kinematics::{Pose, Wheels};
+
+use crate::active::ActiveEffects;
+use crate::actuator::{ConstantSpeed, Piece};
+use crate::body::{Body, DriveSetup, DriveStreams, Start};
+use crate::drive::SAME_INSTANT_S;
+use crate::instrument::Observer;
+use crate::plan::PlannedMotion;
+
+/// What a run does from one standstill to the next.
+#[derive(Debug, Clone)]
+struct Leg {
+    /// Does it begin a motion, for which effects and sensitivities draw?
+    sets_out: bool,
+    pieces: Vec<Piece>,
+    /// Is the standing robot read?
+    is_read: bool,
+}
+
+/// A run foreseen.
+#[derive(Debug, Clone)]
+pub(crate) struct Course {
+    /// Each leg ends with a row.
+    legs: Vec<Leg>,
+    /// When, seconds.
+    rows_s: Vec<f64>,
+}
+
+impl Course {
+    /// The course of a plan's motions; `None` where one of them has its say only when it comes.
+    pub(crate) fn new(motions: &[PlannedMotion]) -> Option<Self> {
+        let mut legs = vec![Leg { sets_out: false, pieces: Vec::new(), is_read: true }];
+        let (mut t_s, mut rows_s) = (0.0, vec![0.0]);
+        for motion in motions {
+            let (sets_out, pieces) = match motion {
+                PlannedMotion::Measure => {
+                    if let Some(last) = legs.last_mut() {
+                        last.is_read = true;
+                    }
+                    continue;
+                }
+                PlannedMotion::Pause { duration_s } => (false, Piece::at_rest(*duration_s).into_iter().collect()),
+                PlannedMotion::Go { pieces, .. } => (true, pieces.clone()?),
+            };
+            // Added up as the body's clock is.
+            let ends_s = pieces.iter().fold(t_s, |t_s, piece: &Piece| t_s + piece.duration_s);
+            if ends_s <= t_s + SAME_INSTANT_S {
+                return None;
+            }
+            t_s = ends_s;
+            legs.push(Leg { sets_out, pieces, is_read: false });
+            rows_s.push(t_s);
+        }
+        if let Some(last) = legs.last_mut() {
+            last.is_read = true;
+        }
+        Some(Self { legs, rows_s })
+    }
+
+    /// Drives it; the run is empty. Gives the last true pose.
+    #[inline]
+    pub(crate) fn drive(
+        &self,
+        setup: &DriveSetup,
+        start: &Start,
+        streams: &mut DriveStreams,
+        (effects, observers): (&mut ActiveEffects, &mut [Observer]),
+        run: &mut Run,
+    ) -> Pose {
+        let mut body = Body::new(setup, start);
+        let mut drive = ConstantSpeed::new(setup.counts_per_rad, start.counts);
+        run.odometry.t_s.extend_from_slice(&self.rows_s);
+        let WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { return start.world_from_body };
+        ticks.left.resize(self.legs.len(), 0);
+        ticks.right.resize(self.legs.len(), 0);
+        let rows = ticks.left.iter_mut().zip(&mut ticks.right);
+        for (leg, (left, right)) in self.legs.iter().zip(rows) {
+            if leg.sets_out {
+                effects.start_motion();
+                body.start_motion(setup, streams);
+            }
+            for &piece in &leg.pieces {
+                let motion = drive.whole(piece);
+                let step = body.advance(setup, streams, effects, (piece.duration_s, &motion));
+                drive.count(&step);
+            }
+            let mut readout = Readout { ticks: drive.counts() };
+            effects.readout(&mut readout);
+            Wheels { left: *left, right: *right } = readout.ticks;
+            if leg.is_read {
+                let (t_s, world_from_body) = body.sighting(effects, body.t_s);
+                for observer in &mut *observers {
+                    observer.read_standing(t_s, world_from_body, &setup.points, &mut run.point_readings);
+                }
+            }
+        }
+        body.world_from_body.pose()
+    }
+}
