@@ -200,7 +200,11 @@ impl Stream {
     /// Standard normal draws, one after the other.
     #[inline]
     pub fn normals<const N: usize>(&mut self) -> [f64; N] {
-        std::array::from_fn(|_| self.normal())
+        let mut draws = [0.0; N];
+        for draw in &mut draws {
+            *draw = self.normal();
+        }
+        draws
     }
 
     /// A draw uniform in [0, 1).

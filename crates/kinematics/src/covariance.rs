@@ -61,21 +61,32 @@ impl ArcScatter {
 /// Variances of the unit tangent over an arc of turn θ, along and across the chord, divided by θ².
 #[inline]
 fn tangent_variance_over_turn_squared(turn_rad: f64) -> (f64, f64) {
-    let tt = turn_rad * turn_rad;
     if turn_rad.abs() < TANGENT_SERIES_BELOW_RAD {
-        // Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − ..., ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − ...
-        let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt * (1.0 / 119_750_400.0))));
-        let across = 1.0 / 12.0
-            - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt * (1.0 / 79_833_600.0))));
-        (along, across)
+        tangent_series(turn_rad)
     } else {
-        // The division first, which then is done when the sine is; sinc θ = sinc(θ/2)·cos(θ/2).
-        let per_tt = 1.0 / tt;
         let (sin, cos) = sin_cos(0.5 * turn_rad);
-        let half = sinc_given_sine(0.5 * turn_rad, || sin);
-        let whole = half * cos;
-        ((0.5 * (1.0 + whole) - half * half) * per_tt, 0.5 * (1.0 - whole) * per_tt)
+        tangent_closed_form(turn_rad, sin, cos)
     }
+}
+
+/// Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − …, ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − …
+#[inline(always)]
+fn tangent_series(turn_rad: f64) -> (f64, f64) {
+    let tt = turn_rad * turn_rad;
+    let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt * (1.0 / 119_750_400.0))));
+    let across =
+        1.0 / 12.0 - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt * (1.0 / 79_833_600.0))));
+    (along, across)
+}
+
+/// By sine and cosine of half the turn; sinc θ = sinc(θ/2)·cos(θ/2).
+#[inline(always)]
+fn tangent_closed_form(turn_rad: f64, sin: f64, cos: f64) -> (f64, f64) {
+    // The division first, which then is done when the sine is.
+    let per_tt = 1.0 / (turn_rad * turn_rad);
+    let half = sinc_given_sine(0.5 * turn_rad, sin);
+    let whole = half * cos;
+    ((0.5 * (1.0 + whole) - half * half) * per_tt, 0.5 * (1.0 - whole) * per_tt)
 }
 
 /// Covariance of a dead-reckoned pose, world axes, order x, y, θ.

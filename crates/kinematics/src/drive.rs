@@ -144,7 +144,7 @@ impl Increment {
     pub fn scattered_arc(self, along_m: f64, across_m: f64) -> Frame {
         let half_rad = 0.5 * self.turn_rad;
         let (sin, cos) = sin_cos(half_rad);
-        let chord_m = self.distance_m * sinc_given_sine(half_rad, || sin);
+        let chord_m = self.distance_m * sinc_given_sine(half_rad, sin);
         let mut before_from_after = Pose::new(chord_m * cos, chord_m * sin, self.turn_rad);
         if along_m != 0.0 || across_m != 0.0 {
             before_from_after.x_m += cos * along_m - sin * across_m;

@@ -68,7 +68,7 @@ fn polynomial([c0, c1, c2, c3, c4, c5]: [f64; 6], x: f64) -> f64 {
 
 /// sin x / x up to π/4.
 #[inline(always)]
-fn small_sinc(x: f64) -> f64 {
+pub(crate) fn small_sinc(x: f64) -> f64 {
     let xx = x * x;
     1.0 + xx * polynomial(SINE, xx)
 }
@@ -96,6 +96,12 @@ pub(crate) fn reduced(x: f64) -> (f64, f64) {
     (f64::from_bits((sin ^ swap) ^ sin_sign), f64::from_bits((cos ^ swap) ^ cos_sign))
 }
 
+/// Sets the highest bit where |x| is above a limit or x is no number: the bits of positive doubles have the doubles' order, and loops can collect them.
+#[inline(always)]
+pub(crate) const fn exceeds(x: f64, limit: f64) -> u64 {
+    x.abs().to_bits().wrapping_add((1 << 63) - 1 - limit.to_bits())
+}
+
 /// Sine and cosine.
 #[inline]
 pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
@@ -115,13 +121,13 @@ pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
 #[inline]
 #[must_use]
 pub fn sinc(x: f64) -> f64 {
-    sinc_given_sine(x, || sin_cos(x).0)
+    if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sin_cos(x).0 / x }
 }
 
 /// [`sinc`] where the sine of `x` is at hand already.
 #[inline]
-pub(crate) fn sinc_given_sine(x: f64, sine: impl FnOnce() -> f64) -> f64 {
-    if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sine() / x }
+pub(crate) fn sinc_given_sine(x: f64, sine: f64) -> f64 {
+    if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sine / x }
 }
 
 /// Angle of the vector (x, y) from the x axis, radians in [−π, π]: [`f64::atan2`], faster where the angle is small.
@@ -234,7 +240,8 @@ mod tests {
                 assert!(units_apart(atan2(y, x), y.atan2(x)) <= 3, "{y} {x}");
             }
         }
-        for (y, x) in [(0.0, 1.0), (-0.0, 1.0), (0.0, -1.0), (0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (1.0, f64::INFINITY)] {
+        for (y, x) in [(0.0, 1.0), (-0.0, 1.0), (0.0, -1.0), (0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (1.0, f64::INFINITY)]
+        {
             assert_eq!(atan2(y, x).to_bits(), y.atan2(x).to_bits(), "{y} {x}");
         }
         assert!(atan2(f64::NAN, 1.0).is_nan());

@@ -66,17 +66,7 @@ impl<'a> Drive<'a> {
         let next_look_s = next_look_s(observers);
         // The row at t = 0 is a standing row; the clock's first is one interval later.
         let log = setup.log_interval_s.map(|interval_s| LogClock::schedule(interval_s, 1, effects));
-        Self {
-            setup,
-            actuator,
-            effects,
-            observers,
-            run,
-            body: Body::new(setup, &start),
-            streams,
-            log,
-            next_look_s,
-        }
+        Self { setup, actuator, effects, observers, run, body: Body::new(setup, &start), streams, log, next_look_s }
     }
 
     pub(crate) const fn world_from_body(&self) -> Pose {

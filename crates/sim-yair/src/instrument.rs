@@ -74,15 +74,24 @@ impl Observer {
 
     /// A reading of the standing robot's marks on the floor grid.
     #[inline]
-    pub(crate) fn read_standing(&mut self, t_s: f64, world_from_body: Frame, points: &[MarkedPoint], readings: &mut Vec<PointReading>) {
+    pub(crate) fn read_standing(
+        &mut self,
+        t_s: f64,
+        world_from_body: Frame,
+        points: &[MarkedPoint],
+        readings: &mut Vec<PointReading>,
+    ) {
         let Instrument::FloorGrid { resolution_m, reading_sigma_m } = self.instrument else { return };
         readings.reserve(points.len());
         for (point, mark) in points.iter().enumerate() {
             let room = world_from_body * mark.body;
             let [dx, dy] = self.stream.normals();
             let read_m = [room.x_m + reading_sigma_m * dx, room.y_m + reading_sigma_m * dy];
-            let [x_m, y_m] =
-                if resolution_m > 0.0 { round(read_m.map(|m| m / resolution_m)).map(|m| m * resolution_m) } else { read_m };
+            let [x_m, y_m] = if resolution_m > 0.0 {
+                round(read_m.map(|m| m / resolution_m)).map(|m| m * resolution_m)
+            } else {
+                read_m
+            };
             let room = Point::new(x_m, y_m);
             readings.push(PointReading { t_s, point, room });
         }
