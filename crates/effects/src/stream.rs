@@ -200,11 +200,7 @@ impl Stream {
     /// Standard normal draws, one after the other.
     #[inline]
     pub fn normals<const N: usize>(&mut self) -> [f64; N] {
-        let mut draws = [0.0; N];
-        for draw in &mut draws {
-            *draw = self.normal();
-        }
-        draws
+        std::array::from_fn(|_| self.normal())
     }
 
     /// A draw uniform in [0, 1).

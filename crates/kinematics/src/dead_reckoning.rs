@@ -216,6 +216,12 @@ impl Odometry {
     pub fn for_each_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, mut visit: impl FnMut(Pose)) {
         let Some((mut state, steps)) = self.first_row(start, counts) else { return };
         visit(start);
+        if steps.left.len() < whole_log::FEWEST_FOR_A_BLOCK {
+            for (&left, &right) in steps.left.iter().zip(steps.right) {
+                visit(state.update(Wheels { left, right }));
+            }
+            return;
+        }
         // By blocks of a length at which the copy of the poses stays in the nearest cache.
         let mut poses = [start; whole_log::BLOCK];
         for (left, right) in steps.left.chunks(whole_log::BLOCK).zip(steps.right.chunks(whole_log::BLOCK)) {

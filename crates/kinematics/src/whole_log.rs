@@ -18,7 +18,7 @@ pub(crate) const BLOCK: usize = 256;
 const GROUPS: usize = BLOCK / GROUP;
 
 /// Fewer steps than this are not worth a block.
-const FEWEST_FOR_A_BLOCK: usize = 24;
+pub(crate) const FEWEST_FOR_A_BLOCK: usize = 24;
 
 /// What becomes of the poses.
 pub(crate) trait Sink {

@@ -104,3 +104,50 @@ impl Course {
         body.world_from_body.pose()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dataset::{Motion, MotionProgram, Protocol, ProtocolSettings};
+    use scenario::{Engine, Scenario};
+
+    use super::*;
+    use crate::SimulatedRobot;
+
+    /// Both ways through programs with everything in them, with the paper's effects and with sensitivities that scatter from motion to motion.
+    #[test]
+    fn a_course_gives_the_records_of_a_run_that_asks_its_clock() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/paper.toml");
+        let paper = Scenario::read(&path).expect("the shipped scenario");
+        assert_eq!(paper.engine, Engine::ClosedForm);
+        let mut scattering = paper.clone();
+        scattering.noise.sensitivity_sigma = 1e-3;
+        let program = |id: &str, motions: &[Motion]| MotionProgram {
+            id: id.to_owned(),
+            protocol: Protocol::Free,
+            settings: ProtocolSettings::default(),
+            motions: motions.to_vec(),
+        };
+        let (straight, spin) = (Motion::Straight { length_m: -0.5 }, Motion::Spin { turn_rad: 3.0 });
+        let arc = Motion::Arc { radius_m: 0.4, turn_rad: -2.0 };
+        let pause = Motion::Pause { duration_s: 0.2 };
+        let programs = [
+            program("read in between", &[Motion::Measure, straight, Motion::Measure, pause, arc, Motion::Measure]),
+            program("read at the ends", &[spin, pause, straight]),
+            program("read twice where it stands", &[arc, Motion::Measure, Motion::Measure]),
+            program("not at all", &[]),
+        ];
+        for scenario in [paper, scattering] {
+            let [mut foreseen, mut asking] = [(); 2].map(|()| SimulatedRobot::new(&scenario, 5, 7).expect("simulates"));
+            // The same buffers for all, as a campaign has it.
+            let (mut run, mut asked) = (Run::default(), Run::default());
+            for program in &programs {
+                let plan = foreseen.plan(program.clone());
+                assert!(plan.course.is_some(), "{}", program.id);
+                foreseen.drive_plan_into(&plan, &mut run).expect("drives");
+                asking.drive_plan_into(&crate::Plan { course: None, ..plan }, &mut asked).expect("drives");
+                assert_eq!(run, asked);
+                assert_eq!(foreseen.last_true_ends(), asking.last_true_ends());
+            }
+        }
+    }
+}
