@@ -160,7 +160,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64],
                     distance_m: share * (base.distance_m + term_moves.x_m),
                     turn_rad: share * (base.turn_rad + term_moves.theta_rad),
                 };
-                increment.scattered_arc(0.0, share * term_moves.y_m)
+                increment.scattered_arc(0.0, share * term_moves.y_m).pose()
             };
             let twist = Twist { v_m_s: base.distance_m / row.dt_s, omega_rad_s: base.turn_rad / row.dt_s };
             while look < run.truth.len() && run.truth[look].t_s <= row.t_s + row.dt_s + 1e-9 {
