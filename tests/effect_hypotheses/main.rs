@@ -5,5 +5,6 @@
 
 mod faults;
 mod means;
+mod scatter;
 mod variants;
 mod watched;

@@ -158,4 +158,11 @@ fn plausible_sizes_of_every_shape_make_a_physical_effect_that_says_the_same_size
         }
     }
     assert!(effects::effect_of_sizes("motor_ripple", &[]).is_none());
+    // What a fit finds of nothing, on the wrong side of 0: one wheel's is none, both wheels' or a single size is no effect.
+    let gaps = |left, right| effects::effect_of_sizes("backlash", &[("left_gap_m", left), ("right_gap_m", right)]);
+    assert_eq!(gaps(1e-3, -1e-5), gaps(1e-3, 0.0));
+    assert!(gaps(1e-3, 0.0).is_some() && gaps(-1e-5, -1e-6).is_none());
+    let drag =
+        |drag_rad_m| effects::effect_of_sizes("castor_drag", &[("drag_rad_m", drag_rad_m), ("castor_behind_m", 0.2)]);
+    assert!(drag(0.1).is_some() && drag(-0.1).is_none() && drag(f64::NAN).is_none());
 }
