@@ -17,6 +17,7 @@
 
 pub use ::bench;
 pub use calib;
+pub use ::diagnose;
 pub use dataset;
 pub use effects;
 pub use kinematics;

@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod compare;
+mod diagnose;
 mod evaluate;
 mod import;
 mod merge;
@@ -37,6 +38,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Import(import::Arguments),
     Calibrate(calibrate::Arguments),
+    Diagnose(diagnose::Arguments),
     Evaluate(evaluate::Arguments),
     Compare(compare::Arguments),
     Sweep(sweep::Arguments),
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(arguments, &terminal),
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
+        Command::Diagnose(arguments) => diagnose::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),

@@ -23,9 +23,10 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("scenario", &["kinematics", "dataset", "effects"]),
     ("sim-yair", &["kinematics", "dataset", "effects", "scenario"]),
     ("calib", &["kinematics", "dataset"]),
+    ("diagnose", &["kinematics", "dataset", "effects", "scenario", "calib"]),
     ("report", &[]),
     ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "report"]),
-    ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "bench", "report"]),
+    ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "bench", "report"]),
 ];
 
 /// Names that say nothing of what is inside.

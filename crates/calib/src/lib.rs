@@ -7,6 +7,7 @@ mod compare;
 mod drift;
 mod drive;
 mod estimate;
+mod extended;
 pub mod likelihood;
 mod looks;
 mod report;
@@ -25,6 +26,7 @@ pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, Parameter, Rejected,
     refuse_wrapped_counters,
 };
+pub use extended::EndError;
 pub use methods::{METHODS, method};
 pub use report::{
     CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,

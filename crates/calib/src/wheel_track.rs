@@ -16,6 +16,8 @@ const SAME_INSTANT_S: f64 = 1e-9;
 pub(crate) struct WheelTrack<'a> {
     t_s: &'a [f64],
     turn_rad: Wheels<Vec<f64>>,
+    /// The counters' angles at the first row: where each wheel's mark stands.
+    first_rad: Wheels<f64>,
     continuous: bool,
 }
 
@@ -31,12 +33,19 @@ impl<'a> WheelTrack<'a> {
         if odometry.t_s.is_empty() {
             return None;
         }
+        let mut first_rad = Wheels::both(0.0);
         let turn_rad = match &odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
+                #[allow(clippy::cast_precision_loss)] // whole turns are taken off first where the counter is long
+                let mark = |column: &[i64]| (column[0] as f64 * rad).rem_euclid(std::f64::consts::TAU);
+                first_rad = ticks.as_ref().map(|column| mark(column));
                 ticks.as_ref().map(|column| since_first(column, rad))
             }
-            WheelLog::Angles(angles) => angles.as_ref().map(|column| since_first(column, 1.0)),
+            WheelLog::Angles(angles) => {
+                first_rad = angles.as_ref().map(|column| column[0]);
+                angles.as_ref().map(|column| since_first(column, 1.0))
+            }
             WheelLog::Twist { v_mps, omega_radps } => {
                 let geometry = robot.geometry().ok()?;
                 let mut turns = Wheels::both(vec![0.0]);
@@ -52,7 +61,7 @@ impl<'a> WheelTrack<'a> {
                 turns
             }
         };
-        Some(Self { t_s: &odometry.t_s, turn_rad, continuous: run.info().continuous })
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous: run.info().continuous })
     }
 
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
@@ -84,6 +93,11 @@ impl<'a> WheelTrack<'a> {
     /// The wheels' angles at the rows, radians since the first.
     pub(crate) fn turns(&self) -> &Wheels<Vec<f64>> {
         &self.turn_rad
+    }
+
+    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its twist.
+    pub(crate) const fn first_rad(&self) -> Wheels<f64> {
+        self.first_rad
     }
 
     /// A reader that goes through the log once.

@@ -19,6 +19,9 @@ const NOISE_SETTLED: f64 = 1e-4;
 /// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
 const LEAST_SIGMA: f64 = 1e-6;
 const LARGEST_NOISE_STEP: f64 = 1.5;
+/// Steps before outliers are told: at least, and at most.
+const LEAST_STARTS: usize = 3;
+const MOST_STARTS: usize = 20;
 /// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
 const DAMPING: f64 = 1e-7;
 const LEAST_INFORMATION: f64 = 1e-9;
@@ -141,10 +144,10 @@ pub(crate) fn fit_from(
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
-        for _ in 0..3 {
+        for round in 1..=MOST_STARTS {
             let want = Want { innovations: true, no_gate: true, noise_score: false };
             let found = pass(records, selections, &model, &noise, &headings, terms, want);
-            step(&mut model, &mut headings, &found, options, &basis)?;
+            let moved = step(&mut model, &mut headings, &found, options, &basis)?;
             let mut squares: Vec<f64> =
                 found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
             if squares.is_empty() {
@@ -153,6 +156,10 @@ pub(crate) fn fit_from(
             let middle = squares.len() / 2;
             let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
             noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
+            // A long way with few looks bends the path: while steps are large, every look would be taken for an outlier.
+            if round >= LEAST_STARTS && moved < 1.0 {
+                break;
+            }
         }
     }
     let want = Want { noise_score: !options.noise_held, ..Want::default() };
@@ -193,7 +200,7 @@ fn basis(options: &FitOptions) -> DMatrix<f64> {
     let eigen = (&held * held.transpose()).symmetric_eigen();
     let free: Vec<_> =
         (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-    DMatrix::from_columns(&free)
+    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
 }
 
 /// A damped Gauss–Newton step of the mean; returns its squared length over its variance.

@@ -18,6 +18,9 @@ pub(crate) struct Piece {
     pub(crate) wheel_rad: Wheels<f64>,
 }
 
+/// A motion whose chord is less than this share of its way hardly shows where it went.
+const LEAST_CHORD: f64 = 0.3;
+
 /// What the instrument saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Seen {
@@ -55,6 +58,21 @@ pub struct Chain<'a> {
 }
 
 impl Chain<'_> {
+    /// The pose of the first look, with its time and the pieces before it, and the time and the pose of the last; `None` where a look has no heading.
+    #[allow(clippy::type_complexity)]
+    pub(crate) fn ends(&self) -> Option<(Pose, (f64, usize), (f64, Pose))> {
+        let pose = |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?));
+        let last = self.looks.last()?;
+        let (start, first) = match self.start {
+            Start::Seen => {
+                let first = self.looks.first()?;
+                (pose(first)?, (first.t_s, first.after))
+            }
+            Start::Origin => (Pose::IDENTITY, (0.0, 0)),
+        };
+        Some((start, first, (last.t_s, pose(last)?)))
+    }
+
     fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
         let pose =
             |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
@@ -100,7 +118,7 @@ impl<'a> Records<'a> {
                         start: Start::Seen,
                         pieces: Vec::new(),
                         looks: Vec::new(),
-                        wheel_rad: Wheels::both(0.0),
+                        wheel_rad: track.first_rad(),
                         session_m,
                     };
                     add_poses(&mut records.chains, &base, &track, looks_of(run));
@@ -145,13 +163,19 @@ impl<'a> Records<'a> {
                 let Some(theta_rad) = look.theta_rad else { return 0.0 };
                 let pose = Pose::new(look.x_m, look.y_m, theta_rad);
                 if let Some((seen, after)) = before {
-                    let moved = chain.pieces[after..look.after].iter().fold(Pose::IDENTITY, |moved, piece| {
+                    let (mut moved, mut way_m) = (Pose::IDENTITY, 0.0);
+                    for piece in &chain.pieces[after..look.after] {
                         let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                        moved * Increment::from_travel(travel_m, model.separation_m).arc()
-                    });
-                    let seen = seen.to(pose);
-                    dot += moved.x_m * seen.x_m + moved.y_m * seen.y_m;
-                    cross += seen.x_m * moved.y_m - seen.y_m * moved.x_m;
+                        let increment = Increment::from_travel(travel_m, model.separation_m);
+                        way_m += increment.distance_m.abs();
+                        moved = moved * increment.arc();
+                    }
+                    // Where a loop ends, it ends by its errors: they have no direction.
+                    if moved.x_m.hypot(moved.y_m) > LEAST_CHORD * way_m {
+                        let seen = seen.to(pose);
+                        dot += moved.x_m * seen.x_m + moved.y_m * seen.y_m;
+                        cross += seen.x_m * moved.y_m - seen.y_m * moved.x_m;
+                    }
                 }
                 before = Some((pose, look.after));
             }
@@ -216,14 +240,15 @@ fn begin<'a>(
     cursor: &mut crate::wheel_track::Cursor<'_, '_>,
     (t_s, x_m, y_m, theta_rad): (f64, f64, f64, Option<f64>),
 ) -> Option<Chain<'a>> {
-    let wheel_rad = cursor.angle_rad(t_s)?;
+    let wheel_rad = cursor.angle_rad(t_s)?.zip_with(base.wheel_rad, |turned, first| first + turned);
     Some(Chain { wheel_rad, looks: vec![Seen { t_s, x_m, y_m, theta_rad, after: 0 }], ..base.clone() })
 }
 
 fn add_displacements<'a>(chains: &mut Vec<Chain<'a>>, base: &Chain<'a>, track: &WheelTrack<'_>, run: &dataset::Run) {
     let mut cursor = track.cursor();
     for seen in &run.displacements {
-        let Some(wheel_rad) = cursor.angle_rad(seen.t0_s) else { continue };
+        let Some(turned_rad) = cursor.angle_rad(seen.t0_s) else { continue };
+        let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
         let mut pieces = Vec::new();
         if cursor.pieces(seen.t0_s, seen.t1_s, &mut pieces) {
             let pose = Pose::new(seen.dx_m, seen.dy_m, seen.dtheta_rad);

@@ -279,11 +279,14 @@ impl JointFit<'_> {
         self.refit(Some(from))
     }
 
-    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of.
+    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of. The terms of the fit come
+    /// first.
     #[must_use]
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        let model = Model { sizes: vec![0.0; parameters], ..self.fit.model.clone() };
+        // Terms that are in the fit come first and keep their sizes.
+        let mut model = self.fit.model.clone();
+        model.sizes.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
         pass_with_innovations(&self.records, &self.selections, &model, noise, free_headings, terms)
     }
@@ -350,7 +353,7 @@ impl JointFit<'_> {
         let eigen = (&held * held.transpose()).symmetric_eigen();
         let free: Vec<_> =
             (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-        DMatrix::from_columns(&free)
+        if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
     }
 }
 

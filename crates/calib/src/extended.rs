@@ -1,0 +1,152 @@
+//! What whoever extends `joint`'s model needs beside the fit: evidence in blocks, and dead reckoning with terms.
+
+use dataset::{Interval, Look, ModelTerm};
+use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
+
+use crate::likelihood::{Evidence, Piece, pass_with_innovations};
+use crate::methods::joint::JointFit;
+
+/// How far off dead reckoning ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EndError {
+    /// Which run: session and run in the order given.
+    pub run: (usize, usize),
+    /// Of the position, metres.
+    pub position_m: f64,
+    /// Of the heading, radians.
+    pub heading_rad: f64,
+    /// Way of the drive's centre, metres.
+    pub length_m: f64,
+}
+
+impl JointFit<'_> {
+    /// The evidence at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
+    #[must_use]
+    pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<Evidence> {
+        (0..blocks)
+            .flat_map(|block| {
+                let part: Vec<_> =
+                    self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
+                let fit = &self.fit;
+                let found =
+                    pass_with_innovations(&self.records, &part, &fit.model, &fit.noise, &fit.free_headings, terms);
+                found.runs.into_iter().filter(|run| run.count > 0.0)
+            })
+            .collect()
+    }
+
+    /// Dead reckoning of every chain from its first look to its last under a model with terms; chains that are seen without headings are left out.
+    #[must_use]
+    pub fn reckoned(&self, model: &crate::likelihood::Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+        let parameters: usize = terms.iter().map(|term| term.parameters().len()).sum();
+        let mut gradient = vec![Pose::IDENTITY; parameters];
+        let mut found = Vec::new();
+        for chain in &self.records.chains {
+            let Some((start, first, last)) = chain.ends() else { continue };
+            for term in terms.iter_mut() {
+                term.restart(chain.info);
+            }
+            let twist = |piece: &Piece| {
+                let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, model.separation_m);
+                Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
+            };
+            let seen_from = |terms: &mut [Box<dyn ModelTerm>],
+                             t_s: f64,
+                             body: Pose,
+                             piece: Option<&Piece>,
+                             gradient: &mut [Pose]| {
+                let twist = piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, twist);
+                let look = Look { t_s, world_from_body: body, twist, run: chain.info };
+                gradient.fill(Pose::IDENTITY);
+                each(terms, gradient, |term, own| term.sight(&look, own));
+                let off = weighed(gradient, &model.sizes);
+                let late = Increment { distance_m: twist.v_m_s, turn_rad: twist.omega_rad_s };
+                (off, Pose::new(-late.distance_m * model.latency_s, 0.0, -late.turn_rad * model.latency_s))
+            };
+            // Where the drive's centre stands at the first look, to first order in what the terms add to it.
+            let mounted = start * model.body_from_sensor.inverse();
+            let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
+            let mut pose = mounted * add(off, late).inverse();
+            let mut previous: Option<Piece> = None;
+            let (mut session_m, mut wheel_rad, mut length_m) = (chain.session_m, chain.wheel_rad, 0.0);
+            for piece in &chain.pieces[first.1..] {
+                let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                let mut increment = Increment::from_travel(travel_m, model.separation_m);
+                let before = previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
+                let interval = Interval {
+                    t_s: piece.t_s,
+                    dt_s: piece.dt_s,
+                    travel_m,
+                    previous_m: model.m_per_rad.zip_with(before.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
+                    previous_dt_s: before.dt_s,
+                    wheel_separation_m: model.separation_m,
+                    wheel_rad,
+                    turned_rad: piece.wheel_rad,
+                    world_from_body: pose,
+                    session_m,
+                    run: chain.info,
+                };
+                gradient.fill(Pose::IDENTITY);
+                each(terms, &mut gradient, |term, own| term.motion(&interval, own));
+                let change = weighed(&gradient, &model.sizes);
+                session_m += increment.distance_m.abs();
+                length_m += increment.distance_m.abs();
+                wheel_rad = wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
+                increment.distance_m += change.x_m;
+                increment.turn_rad += change.theta_rad;
+                pose = pose * increment.arc() * Pose::new(0.0, change.y_m, 0.0);
+                previous = Some(*piece);
+            }
+            let (off, late) = seen_from(terms, last.0, pose, chain.pieces.last(), &mut gradient);
+            let seen = pose * add(off, late) * model.body_from_sensor;
+            found.push(EndError {
+                run: chain.run,
+                position_m: seen.position().distance_m(last.1.position()),
+                heading_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad).abs(),
+                length_m,
+            });
+        }
+        found
+    }
+
+    /// What the looks do not determine of the three lengths.
+    #[must_use]
+    pub fn not_observable(&self) -> Vec<crate::estimate::NotObservable> {
+        self.unseen
+            .iter()
+            .map(|direction| {
+                let lengths = nalgebra::Vector3::new(direction[0], direction[1], direction[2]);
+                let (parameter, why) = crate::sensitivity::unseen(&lengths);
+                crate::estimate::NotObservable { parameter, why }
+            })
+            .collect()
+    }
+}
+
+fn add(a: Pose, b: Pose) -> Pose {
+    Pose::new(a.x_m + b.x_m, a.y_m + b.y_m, a.theta_rad + b.theta_rad)
+}
+
+fn each(
+    terms: &mut [Box<dyn ModelTerm>],
+    gradient: &mut [Pose],
+    mut visit: impl FnMut(&mut dyn ModelTerm, &mut [Pose]),
+) {
+    let mut rest = gradient;
+    for term in terms {
+        let (own, others) = rest.split_at_mut(term.parameters().len());
+        visit(term.as_mut(), own);
+        rest = others;
+    }
+}
+
+fn weighed(gradient: &[Pose], sizes: &[f64]) -> Pose {
+    gradient.iter().zip(sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
+        Pose::new(
+            sum.x_m + size * gradient.x_m,
+            sum.y_m + size * gradient.y_m,
+            sum.theta_rad + size * gradient.theta_rad,
+        )
+    })
+}

@@ -1,0 +1,59 @@
+//! What this data could not have shown, and from which size on everything else would have.
+//!
+//! A size shows with nine chances in ten at a false-alarm rate of 1e-3 when √λ = 4.57 (discovery by a score test; λ = size² of the projected information).
+
+use crate::candidate::Choice;
+use crate::document::{Blind, Smallest};
+use crate::scan::scan;
+use crate::search::Extended;
+
+/// √λ for power 0.9 at a two-sided level of 1e-3.
+const SHOWS: f64 = 4.57;
+
+/// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
+pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice]) -> (Vec<Blind>, Vec<Blind>) {
+    let left: Vec<Choice> = catalogue
+        .iter()
+        .filter(|choice| model.choices.iter().all(|chosen| chosen.id() != choice.id()))
+        .cloned()
+        .collect();
+    let mut best: Vec<(Blind, f64)> = Vec::new();
+    for scored in scan(&model.fit, &model.choices, &left) {
+        let id = scored.choice.id();
+        // The parameter that shows soonest, the others at rest, in units of what would be large.
+        let smallest = scored
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(k, parameter)| (parameter, SHOWS / scored.information[(k, k)].max(0.0).sqrt()))
+            .filter(|(_, size)| size.is_finite())
+            .min_by(|a, b| (a.1 / a.0.plausible).total_cmp(&(b.1 / b.0.plausible)));
+        let entry = match smallest {
+            // A million times what would be large is rounding, not information.
+            Some((parameter, size)) if size < 1e6 * parameter.plausible => {
+                let why = if size > parameter.plausible {
+                    format!(
+                        "these runs hardly excite it: {} below {size:.2e} {} would not have shown, and {:.1e} is large already",
+                        parameter.name, parameter.unit, parameter.plausible
+                    )
+                } else {
+                    format!("{} from {size:.2e} {} on would have shown", parameter.name, parameter.unit)
+                };
+                let smallest =
+                    Smallest { value: size, unit: parameter.unit.to_owned(), parameter: parameter.name.to_owned() };
+                (Blind { id: id.to_owned(), why, smallest_detectable: Some(smallest) }, size / parameter.plausible)
+            }
+            _ => {
+                let why = "no run excites it, or the calibration itself takes it up".to_owned();
+                (Blind { id: id.to_owned(), why, smallest_detectable: None }, f64::INFINITY)
+            }
+        };
+        match best.iter_mut().find(|(blind, _)| blind.id == id) {
+            Some(known) if entry.1 < known.1 => *known = entry,
+            Some(_) => {}
+            None => best.push(entry),
+        }
+    }
+    let blind = best.iter().filter(|(_, size)| *size > 1.0).map(|(blind, _)| blind.clone()).collect();
+    (best.into_iter().map(|(blind, _)| blind).collect(), blind)
+}

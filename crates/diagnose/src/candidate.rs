@@ -1,0 +1,82 @@
+//! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
+
+use dataset::{ModelTerm, TermParameter};
+use effects::{CATALOGUE, Hypothesis, hypothesis};
+
+use crate::sparse::Sparse;
+
+/// A mean term with its shape held.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Choice {
+    /// One of the shapes of an effect of the catalogue.
+    Effect { id: &'static str, shape: usize },
+    /// A product of covariates on one channel.
+    Sparse(Sparse),
+}
+
+impl Choice {
+    /// The term, at the start of its life; `None` only for a shape that the catalogue does not have.
+    pub(crate) fn term(&self) -> Option<Box<dyn ModelTerm>> {
+        match self {
+            Self::Effect { id, shape } => shapes(id).into_iter().nth(*shape).map(|shape| shape.term),
+            Self::Sparse(sparse) => Some(sparse.term()),
+        }
+    }
+
+    /// The id of the effect, or `unlisted`.
+    pub(crate) const fn id(&self) -> &'static str {
+        match self {
+            Self::Effect { id, .. } => id,
+            Self::Sparse(_) => "unlisted",
+        }
+    }
+
+    /// Its held shape parameters.
+    pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Effect { id, shape } => {
+                shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default()
+            }
+            Self::Sparse(_) => Vec::new(),
+        }
+    }
+
+    pub(crate) fn parameters(&self) -> &'static [TermParameter] {
+        self.term().map_or(&[], |term| term.parameters())
+    }
+}
+
+/// The terms of choices, in order.
+pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
+    choices.iter().filter_map(Choice::term).collect()
+}
+
+fn shapes(id: &str) -> Vec<effects::Shape> {
+    match hypothesis(id) {
+        Some(Hypothesis::Terms(shapes)) => shapes,
+        _ => Vec::new(),
+    }
+}
+
+/// Every shape of every effect whose hypothesis is a mean term, without those taken out.
+pub(crate) fn mean_terms(without: &[String]) -> Vec<Choice> {
+    CATALOGUE
+        .iter()
+        .filter(|id| !without.iter().any(|out| out == *id))
+        .flat_map(|id| (0..shapes(id).len()).map(|shape| Choice::Effect { id, shape }))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_can_be_left_out() {
+        let all = mean_terms(&[]);
+        assert!(all.iter().any(|choice| choice.id() == "slip_speed"));
+        let fewer = mean_terms(&["slip_speed".to_owned()]);
+        assert!(fewer.iter().all(|choice| choice.id() != "slip_speed") && fewer.len() < all.len());
+        assert!(all.iter().all(|choice| !choice.parameters().is_empty()));
+    }
+}

@@ -1,0 +1,301 @@
+//! Omnibus checks of the residuals: size, whiteness, tails, run against run, and whether they go with anything that was recorded.
+//!
+//! Innovations of a right model are white, normal and of the size that the model says (Kailath 1968). Covariates are asked by score tests of products on
+//! every channel, beside what the model has: a regression of innovations would be blurred by the filter.
+//! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
+
+use calib::likelihood::{Column, Innovation};
+use calib::methods::joint::JointFit;
+use kinematics::Side;
+
+use crate::candidate::{Choice, terms};
+use crate::document::Check;
+use crate::scan::{Projected, Projection, freedom, principal, total};
+use crate::search::Extended;
+use crate::sparse::{Channel, Covariate, Sparse};
+use crate::statistics::{holm, p_of_chi_square, p_of_statistic, p_of_z};
+
+/// Family-wise rate of false alarms of all checks.
+pub(crate) const CHECKS_LEVEL: f64 = 0.01;
+/// Correlations with so many looks before are summed.
+const LAGS: usize = 5;
+/// A look off by this much is an outlier with a chance of 1e-5.
+const OUTLIER_CHANCE: f64 = 1e-5;
+/// The look after an outlier fits unless its chance is below this.
+const BACK_AGAIN: f64 = 0.01;
+/// An innovation this large, in standard deviations, comes from the tail.
+const LARGE: f64 = 3.0;
+
+/// What the checks of a model say.
+pub(crate) struct Checked {
+    pub(crate) checks: Vec<Check>,
+    /// Lag-one correlation of innovations: coefficient and standard errors.
+    pub(crate) correlation: (f64, f64),
+    pub(crate) outliers: Outliers,
+}
+
+/// Looks that do not fit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Outliers {
+    pub(crate) isolated: usize,
+    /// Those after which the robot is seen where the outlier was.
+    pub(crate) staying: usize,
+    pub(crate) looks: usize,
+    pub(crate) p_value: f64,
+}
+
+/// What residuals may go with: a name and the products that are tested on every channel.
+pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Vec<Covariate>>)> {
+    use Covariate::{
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
+        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+    };
+    let mut questions: Vec<(String, Vec<Vec<Covariate>>)> = [
+        ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
+        ("yaw_rate", vec![vec![AbsYawRate], vec![YawRate, AbsYawRate]]),
+        ("speed_times_yaw_rate", vec![vec![Speed, YawRate], vec![AbsSpeed, YawRate]]),
+        ("acceleration", vec![vec![Acceleration], vec![YawAcceleration]]),
+        ("heading_in_the_room", vec![vec![AbsSpeed, CosHeading], vec![AbsSpeed, SinHeading]]),
+        ("left_wheel_phase", vec![vec![CosPhase(Side::Left)], vec![SinPhase(Side::Left)]]),
+        ("right_wheel_phase", vec![vec![CosPhase(Side::Right)], vec![SinPhase(Side::Right)]]),
+        ("time_in_run", vec![vec![RunTime, Speed], vec![RunTime, YawRate]]),
+        ("time_in_session", vec![vec![SessionTime, Speed], vec![SessionTime, YawRate]]),
+        ("distance", vec![vec![Way, Speed], vec![Way, YawRate]]),
+        ("distance_since_reversal", vec![vec![SinceReversal, Speed], vec![SinceReversal, AbsSpeed]]),
+        ("position", vec![vec![X, Speed], vec![Y, Speed], vec![X, YawRate], vec![Y, YawRate]]),
+    ]
+    .map(|(name, products)| (name.to_owned(), products))
+    .into();
+    for covariate in of_runs(fit) {
+        let name = format!("covariate_{}", covariate.name());
+        questions.push((name, vec![vec![covariate.clone(), Speed], vec![covariate, YawRate]]));
+    }
+    questions
+}
+
+/// The covariates of runs that differ between runs.
+pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
+    let mut keys: Vec<&String> = fit.records.chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter()
+        .filter_map(|key| {
+            let values: Vec<f64> =
+                fit.records.chains.iter().filter_map(|chain| chain.info.covariates.get(key).copied()).collect();
+            #[allow(clippy::cast_precision_loss)]
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let sd = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt();
+            (sd > 1e-9 * mean.abs().max(1e-9)).then(|| Covariate::OfRun { key: key.clone(), mean, sd })
+        })
+        .collect()
+}
+
+/// Asks the residuals of a model.
+pub(crate) fn check(model: &Extended<'_>) -> Checked {
+    let fit = &model.fit;
+    let mut checks = Vec::new();
+    let mut add = |name: &str, statistic: f64, p_value: f64| {
+        checks.push(Check { name: name.to_owned(), statistic, p_value, passes: true });
+    };
+    size(fit, &mut add);
+    let correlation = whiteness(fit, &mut add);
+    tails(fit, &mut add);
+    let outliers = outliers(fit);
+    #[allow(clippy::cast_precision_loss)]
+    add("outliers", (outliers.isolated + outliers.staying) as f64, outliers.p_value);
+    covariates(model, &mut add);
+    let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
+    checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
+    Checked { checks, correlation, outliers }
+}
+
+/// The innovations of the first phase: phases share their looks' errors.
+fn innovations<'f>(fit: &'f JointFit<'_>, component: usize) -> Vec<&'f Innovation> {
+    let first = fit.fit.pass.innovations.first();
+    first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
+}
+
+/// Σz² over the looks, and how it differs between runs: the noise is one for all.
+fn size(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
+    for (component, name) in ["nis_along", "nis_across", "nis_heading"].into_iter().enumerate() {
+        let squares: Vec<f64> = innovations(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
+        #[allow(clippy::cast_precision_loss)]
+        let n = squares.len() as f64;
+        if n < 2.0 {
+            continue;
+        }
+        let mean = squares.iter().sum::<f64>() / n;
+        // The noise is fitted to all three together: one of them can still be off. Its own tails say how well a mean square is known.
+        let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let z = (mean - 1.0) / (variance.max(2.0) / n).sqrt();
+        add(name, mean, p_of_z(z));
+    }
+    let runs: Vec<_> = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let (sum, count) = runs.iter().fold((0.0, 0.0), |(sum, count), run| (sum + run.chi_square, count + run.count));
+    if runs.len() > 2 && count > 0.0 {
+        let mean = sum / count;
+        // Wilson & Hilferty 1931: the cube root of χ²/ν is normal about 1 − 2/(9ν) with variance 2/(9ν).
+        let squares: f64 = runs
+            .iter()
+            .map(|run| {
+                let part = 2.0 / (9.0 * run.count);
+                (((run.chi_square / run.count / mean).cbrt() - (1.0 - part)) / part.sqrt()).powi(2)
+            })
+            .sum();
+        #[allow(clippy::cast_precision_loss)]
+        add("run_to_run", squares, p_of_chi_square(squares, runs.len() as f64 - 1.0));
+    }
+}
+
+/// Ljung & Box over the looks of each chain; returns the lag-one correlation that stands out most.
+fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) -> (f64, f64) {
+    let mut strongest = (0.0, 0.0_f64);
+    for (component, name) in ["white_along", "white_across", "white_heading"].into_iter().enumerate() {
+        let series = innovations(fit, component);
+        #[allow(clippy::cast_precision_loss)]
+        let n = series.len() as f64;
+        if n < 20.0 {
+            continue;
+        }
+        let variance = series.iter().map(|innovation| innovation.z.powi(2)).sum::<f64>() / n;
+        let (mut statistic, mut lags) = (0.0, 0.0);
+        for lag in 1..=LAGS {
+            let (mut products, mut pairs) = (0.0, 0.0_f64);
+            for pair in series.windows(lag + 1).filter(|pair| pair[0].chain == pair[lag].chain) {
+                products += pair[0].z * pair[lag].z;
+                pairs += 1.0;
+            }
+            if pairs < 10.0 {
+                break;
+            }
+            let z = products / variance / pairs.sqrt();
+            if lag == 1 && z.abs() > f64::abs(strongest.1) {
+                strongest = (products / variance / pairs, z);
+            }
+            statistic += z * z;
+            lags += 1.0;
+        }
+        if lags > 0.0 {
+            add(name, statistic, p_of_chi_square(statistic, lags));
+        }
+    }
+    strongest
+}
+
+fn tails(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
+    for (component, name) in ["kurtosis_along", "kurtosis_across", "kurtosis_heading"].into_iter().enumerate() {
+        let series = innovations(fit, component);
+        #[allow(clippy::cast_precision_loss)]
+        let n = series.len() as f64;
+        if n < 50.0 {
+            continue;
+        }
+        let moment = |power: i32| series.iter().map(|innovation| innovation.z.powi(power)).sum::<f64>() / n;
+        let kurtosis = moment(4) / moment(2).powi(2);
+        // Anscombe & Glynn 1983: kurtosis is skewed until n is in the thousands.
+        add(name, kurtosis, p_of_z(anscombe_glynn(kurtosis, n)));
+    }
+}
+
+/// The kurtosis of n normal values as a normal variable.
+fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
+    let mean = 3.0 * (n - 1.0) / (n + 1.0);
+    let variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0).powi(2) * (n + 3.0) * (n + 5.0));
+    let x = (kurtosis - mean) / variance.sqrt();
+    let skew = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0))
+        * (6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0))).sqrt();
+    let a = 6.0 + 8.0 / skew * (2.0 / skew + (1.0 + 4.0 / (skew * skew)).sqrt());
+    let low = 1.0 + x * (2.0 / (a - 4.0)).sqrt();
+    ((1.0 - 2.0 / (9.0 * a)) - ((1.0 - 2.0 / a) / low.abs()).cbrt() * low.signum()) / (2.0 / (9.0 * a)).sqrt()
+}
+
+/// Looks far off, and what follows large innovations: after a jump of the robot the next looks are off the same way, as the filter has followed only in part;
+/// after an error of one look they are off the other way, or not at all where the look was left out.
+fn outliers(fit: &JointFit<'_>) -> Outliers {
+    let mut found = Outliers { looks: innovations(fit, 0).len(), ..Outliers::default() };
+    let far = &fit.fit.pass.outliers;
+    let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
+    for (position, &(chain, look)) in far.iter().enumerate() {
+        // Thinned looks have gaps between them: the next that was taken is the neighbour.
+        let next = phase.partition_point(|innovation| (innovation.chain, innovation.look) <= (chain, look));
+        let after = phase[next..].iter().take(3).filter(|innovation| innovation.chain == chain);
+        let (square, values) = after.fold((0.0, 0.0), |(sum, n), innovation| (sum + innovation.z.powi(2), n + 1.0));
+        let followed = far.get(position + 1).is_some_and(|&(c, l)| c == chain && l == look + 1);
+        let follows = position.checked_sub(1).is_some_and(|before| far[before].0 == chain && far[before].1 + 1 == look);
+        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < BACK_AGAIN) {
+            found.staying += 1;
+        } else {
+            found.isolated += 1;
+        }
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let (count, expected) = (far.len() as f64, (found.looks + far.len()) as f64 * OUTLIER_CHANCE);
+    // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
+    found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
+    found
+}
+
+/// What follows large innovations of a component: the mean of the next, in the direction of the large one, in standard errors. Positive after what stays,
+/// negative after errors of single looks.
+pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> f64 {
+    let series = innovations(fit, component);
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for pair in series.windows(2).filter(|pair| pair[0].chain == pair[1].chain && pair[0].z.abs() > LARGE) {
+        sum += pair[1].z * pair[0].z.signum();
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count.sqrt() } else { 0.0 }
+}
+
+/// Score tests of every question, all in one pass.
+fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
+    let questions = questions(&model.fit);
+    let library: Vec<Choice> = questions
+        .iter()
+        .flat_map(|(_, products)| products)
+        .flat_map(|product| Channel::ALL.map(|channel| Sparse { channel, covariates: product.clone() }))
+        .map(Choice::Sparse)
+        .collect();
+    let mut all = terms(&model.choices);
+    let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
+    all.extend(terms(&library));
+    let pass = model.fit.scan(&mut all);
+    let Some(evidence) = total(&pass.runs) else { return };
+    let Some(projection) = Projection::of(&model.fit, &evidence) else { return };
+    let freedom = freedom(&model.fit, &evidence);
+    let shrink = freedom / evidence.count.max(1.0);
+    let mut at = first;
+    for (name, products) in &questions {
+        let own = products.len() * Channel::ALL.len();
+        let columns: Vec<usize> = (at..at + own).collect();
+        let parameters: Vec<_> =
+            library[at - first..at - first + own].iter().map(|choice| choice.parameters()[0]).collect();
+        at += own;
+        let Projected { information, gradient, .. } = projection.of_columns(&evidence, &columns);
+        let (mut statistic, mut dimensions) = (0.0, 0);
+        for (value, gradient) in principal(&information, &gradient, &parameters) {
+            if value >= 1.0 {
+                statistic += shrink * gradient * gradient / value;
+                dimensions += 1;
+            }
+        }
+        if dimensions > 0 {
+            add(name, statistic, p_of_statistic(statistic, dimensions, freedom));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::anscombe_glynn;
+
+    #[test]
+    fn published_example_of_the_kurtosis_test() {
+        // SciPy's documentation of stats.kurtosistest: the 20 values 0 … 19 give z = −1.7058104152122062.
+        let values: Vec<f64> = (0..20).map(f64::from).collect();
+        let moment = |power: i32| values.iter().map(|value| (value - 9.5).powi(power)).sum::<f64>() / 20.0;
+        let z = anscombe_glynn(moment(4) / moment(2).powi(2), 20.0);
+        assert!((z + 1.705_810_415_212_206_2).abs() < 1e-12, "{z}");
+    }
+}

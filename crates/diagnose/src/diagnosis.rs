@@ -1,0 +1,347 @@
+//! The order of work.
+
+use std::collections::BTreeMap;
+
+use calib::methods::joint::{Joint, JointFit};
+use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
+use dataset::Dataset;
+use effects::{CATALOGUE, Sign};
+use kinematics::DriveGeometry;
+use nalgebra::DMatrix;
+use scenario::Scenario;
+
+use crate::blind::blind;
+use crate::candidate::{Choice, mean_terms};
+use crate::checks::{Checked, check, what_follows};
+use crate::document::{Document, Finding, Gain, Value, Verdict};
+use crate::gain::gain;
+use crate::gross::{Fault, fault, left_out, sessions};
+use crate::naming;
+use crate::search::{Extended, Found, evidence, examine, reach, search};
+use crate::statistics::p_of_z;
+use crate::unlisted::{UNLISTED_LEVEL, sparse};
+
+/// What to leave out.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Effects that are not to be named, by id.
+    pub without: Vec<String>,
+}
+
+/// Why there is no diagnosis.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DiagnoseError {
+    /// An id that the catalogue does not have.
+    #[error("no effect \"{id}\" in the catalogue; known: {}", CATALOGUE.join(", "))]
+    UnknownEffect {
+        /// The id.
+        id: String,
+    },
+    /// The base model does not follow the robot, and no gross fault explains it.
+    #[error(
+        "the calibrated model leaves out {percent:.0} % of the looks, and no gross fault explains it: there is nothing to build on; add runs with looks on the way"
+    )]
+    NothingFollows {
+        /// Share of looks left out.
+        percent: f64,
+    },
+    /// There is no base fit.
+    #[error("no calibrated model to ask: {0}")]
+    NoFit(#[from] CalibError),
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// What goes to scripts.
+    pub document: Document,
+    /// The simulated robot with what was found, where it can be written.
+    pub extended: Result<Scenario, String>,
+}
+
+/// Looks whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
+const CORRELATED: f64 = 0.05;
+const CORRELATED_SIGMAS: f64 = 4.0;
+
+/// A model that leaves out more of the looks is none.
+const MOST_LEFT_OUT: f64 = 0.5;
+
+const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false };
+const THINNED: Joint = Joint { nuisances: false, thin: true };
+
+/// Diagnoses one robot's sessions.
+///
+/// # Errors
+/// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
+pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
+    if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
+        return Err(DiagnoseError::UnknownEffect { id: id.clone() });
+    }
+    let measured = sessions(datasets);
+    let first = ALL_LOOKS.fit(&measured);
+    match fault(datasets, first.as_ref().ok(), &options.without) {
+        Some(found) => {
+            let rewritten = sessions(&found.records);
+            let base = ALL_LOOKS.fit(&rewritten)?;
+            Ok(continued(&found.records, base, Some(&found), options))
+        }
+        None => {
+            let first = first?;
+            let share = left_out(&first);
+            if share > MOST_LEFT_OUT {
+                return Err(DiagnoseError::NothingFollows { percent: 100.0 * share });
+            }
+            Ok(continued(datasets, first, None, options))
+        }
+    }
+}
+
+fn is_white(checked: &Checked) -> bool {
+    let (coefficient, sigmas) = checked.correlation;
+    sigmas.abs() < CORRELATED_SIGMAS || coefficient.abs() < CORRELATED
+}
+
+/// What is left after the search, and how much of it has a name.
+struct Asked<'a> {
+    base: JointFit<'a>,
+    found: Found<'a>,
+    checked: Checked,
+    /// A model with a sparse term at its end, its chance, and how many were tried.
+    sparse: Option<(Extended<'a>, f64, usize)>,
+    /// Correlation of looks that follow each other, where they had to be thinned.
+    correlated: Option<(f64, f64)>,
+}
+
+fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
+    let found = search(&base, catalogue);
+    let checked = check(&found.model);
+    let mut asked = Asked { base, found, checked, sparse: None, correlated: None };
+    if !is_white(&asked.checked) {
+        // Looks that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
+        // apart they are independent, and what stands out then may be believed.
+        let explains = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
+            .map(|sparse| (check(&sparse.model), sparse))
+            .filter(|(checked, _)| is_white(checked));
+        if let Some((checked, sparse)) = explains {
+            asked.checked = checked;
+            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+            return asked;
+        }
+        if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
+            asked.correlated = Some(asked.checked.correlation);
+            asked.found = search(&thinned, catalogue);
+            asked.checked = check(&asked.found.model);
+            asked.base = thinned;
+        }
+    }
+    // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
+    let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
+    if !asked.found.model.choices.is_empty()
+        && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
+    {
+        let named = evidence(&alone.fit, &asked.found.model);
+        #[allow(clippy::cast_precision_loss)]
+        let unnamed = evidence(&alone.fit, &sparse.model) - (sparse.trials as f64).ln();
+        if unnamed > named + reach(named) {
+            asked.found.model = alone;
+            asked.found.names.clear();
+            asked.found.tests.clear();
+            asked.checked = check(&sparse.model);
+            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+            return asked;
+        }
+    }
+    let goes_with_something = asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name));
+    if goes_with_something && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL) {
+        asked.checked = check(&sparse.model);
+        asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+    }
+    asked
+}
+
+/// Whether a check asks what residuals go with, not how they scatter.
+fn is_covariate(name: &str) -> bool {
+    !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
+        && name != "outliers"
+        && name != "run_to_run"
+}
+
+fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, options: &Options) -> Diagnosis {
+    let catalogue = mean_terms(&options.without);
+    let asked = ask(datasets, base, &catalogue);
+    let mut findings: Vec<Finding> = fault.map(naming::of_fault).into_iter().collect();
+    findings.extend(naming::of_search(&asked.found));
+    let model = asked.sparse.as_ref().map_or(&asked.found.model, |(model, _, _)| model);
+    if let Some((model, p_value, trials)) = &asked.sparse
+        && let Some((test, _)) = examine(model, model.choices.len() - 1)
+    {
+        findings.extend(naming::of_sparse(model, &test, *p_value, *trials));
+    }
+    findings.extend(scatter(&asked, options));
+    // Something is left that no name explains; a failed check that a scatter explains has its name already.
+    let explained = asked.sparse.is_some() || findings.iter().any(is_scatter);
+    if !explained {
+        findings.extend(naming::of_failed_checks(&asked.checked));
+    }
+    let (gain, gain_why_null) = gain_of(&asked.base, model);
+    let (sensitivity, blind_to) = blind(model, &catalogue);
+    let verdict = verdict(&findings);
+    let extended = crate::scenario_of::scenario_of(datasets, model, &findings);
+    let names: Vec<String> = datasets
+        .iter()
+        .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
+        .collect();
+    let document = Document {
+        dataset: Names::of(names.clone()),
+        verdict,
+        sentence: sentence(verdict, &findings, gain.as_ref()),
+        checks: asked.checked.checks,
+        findings,
+        blind_to,
+        sensitivity,
+        calibration: CalibrationReport {
+            dataset: Names::of(names),
+            methods: vec![MethodReport::new("joint", &calibration(datasets, &model.fit), &datasets[0].robot)],
+        },
+        gain,
+        gain_why_null,
+        next_experiment: None,
+        extended_model: None,
+        extended_model_why_null: extended.as_ref().err().cloned(),
+    };
+    Diagnosis { document, extended }
+}
+
+fn is_scatter(finding: &Finding) -> bool {
+    matches!(effects::hypothesis(&finding.id), Some(effects::Hypothesis::Scatter(_)))
+}
+
+/// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
+const SCATTER_LEVEL: f64 = 1e-3;
+
+/// With more, it is the model that is off, and not the looks.
+const MOST_OUTLIERS: f64 = 0.2;
+/// What follows large errors is told from chance at this many standard errors.
+const FOLLOWS: f64 = 2.6;
+
+/// Scatter that failed checks show.
+fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let outliers = asked.checked.outliers;
+    let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
+    let far = outliers.isolated + outliers.staying;
+    #[allow(clippy::cast_precision_loss)]
+    if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
+        // The model does not follow the robot at all: that has no name.
+        return findings;
+    }
+    if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
+        #[allow(clippy::cast_precision_loss)]
+        let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
+        let value = Value { value: share, sigma: None, unit: "1".to_owned() };
+        let of = outliers.looks + far;
+        let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
+        let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
+        let parameters = BTreeMap::from([("probability".to_owned(), value)]);
+        findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
+    } else {
+        // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
+        let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
+        let kurtosis = |name: &str| {
+            asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
+        };
+        let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
+        let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
+        let jump = heaviest.and_then(|(name, component, sign)| {
+            let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;
+            Some((p_value, what_follows(&asked.found.model.fit, component), sign))
+        });
+        if let Some((p_value, follows, sign)) = jump {
+            let stays = naming::with_sign(sign, &options.without);
+            let errs = naming::with_sign(Sign::IsolatedLooks, &options.without);
+            let (ids, what) = if follows > FOLLOWS {
+                (stays, "single large errors that stay: the robot jumped")
+            } else if follows < -FOLLOWS {
+                (errs, "single large errors of the instrument, undone in the next look")
+            } else {
+                (
+                    [stays, errs].concat(),
+                    "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
+                )
+            };
+            findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
+        }
+    }
+    if let Some((coefficient, sigmas)) = asked.correlated
+        && coefficient > 0.0
+    {
+        let what = format!(
+            "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
+        );
+        let ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
+        findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
+    }
+    findings
+}
+
+fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<String>) {
+    if model.choices.is_empty() {
+        return (None, Some("nothing was added to the calibrated model's mean".to_owned()));
+    }
+    let alone = Extended { fit: base.clone(), choices: Vec::new() };
+    match gain(&alone, model) {
+        Ok(gain) => (Some(gain), None),
+        Err(why) => (None, Some(why)),
+    }
+}
+
+fn verdict(findings: &[Finding]) -> Verdict {
+    if findings.is_empty() {
+        Verdict::Consistent
+    } else if findings.iter().any(|finding| finding.id == "unlisted") {
+        Verdict::Unlisted
+    } else if findings.iter().any(|finding| finding.names.len() > 1) {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Named
+    }
+}
+
+fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> String {
+    let names: Vec<String> = findings.iter().map(|finding| finding.names.join(" or ")).collect();
+    let gains = match gain {
+        Some(gain) if gain.log_score_per_observation.low > 0.0 => "; the extended model predicts unseen runs better",
+        Some(_) => "; on unseen runs the extended model gains nothing that is certain",
+        None => "",
+    };
+    match verdict {
+        Verdict::Consistent => "the calibrated model explains what was measured".to_owned(),
+        Verdict::Named => format!("found: {}{gains}", names.join(", ")),
+        Verdict::Ambiguous => {
+            format!("found, with names that this data cannot tell apart: {}{gains}", names.join("; "))
+        }
+        Verdict::Unlisted => format!("found, and not all of it has a name: {}{gains}", names.join(", ")),
+    }
+}
+
+/// The calibration with what was found in the model.
+fn calibration(datasets: &[Dataset], fit: &JointFit<'_>) -> Result<Calibration, CalibError> {
+    let model = &fit.fit.model;
+    let not_physical =
+        |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
+    let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
+        .map_err(not_physical)?;
+    let diameter_m = geometry.wheel_diameter_m();
+    let sizes = [diameter_m.left, diameter_m.right, model.separation_m];
+    let covariance = fit.covariance();
+    Ok(Calibration {
+        covariance: covariance
+            .as_ref()
+            .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
+        not_observable: fit.not_observable(),
+        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        converged: fit.fit.converged,
+        ..Calibration::new("joint", geometry, datasets[0].robot.ticks_per_rev)
+    })
+}

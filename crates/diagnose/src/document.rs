@@ -1,0 +1,168 @@
+//! The document of `yair diagnose`: keys are stable, SI units.
+
+use std::collections::BTreeMap;
+
+use calib::{CalibrationReport, Names};
+use serde::Serialize;
+
+/// In one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The calibrated model explains what was measured.
+    Consistent,
+    /// Every finding has one name.
+    Named,
+    /// Some finding has several names that this data cannot tell apart.
+    Ambiguous,
+    /// Some finding is not in the catalogue.
+    Unlisted,
+}
+
+/// The whole diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Document {
+    /// The dataset's name, or a list of them.
+    pub dataset: Names,
+    /// In one word.
+    pub verdict: Verdict,
+    /// In a sentence.
+    pub sentence: String,
+    /// What was asked of the residuals that the final model leaves.
+    pub checks: Vec<Check>,
+    /// What was found.
+    pub findings: Vec<Finding>,
+    /// What this data could not have shown.
+    pub blind_to: Vec<Blind>,
+    /// The smallest size of every candidate that would have shown, found or not.
+    pub sensitivity: Vec<Blind>,
+    /// The calibration with what was found in the model.
+    pub calibration: CalibrationReport,
+    /// What the extension gains on runs that it has not seen.
+    pub gain: Option<Gain>,
+    /// Why there is no gain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain_why_null: Option<String>,
+    /// What to drive to tell names apart.
+    pub next_experiment: Option<NextExperiment>,
+    /// Where the extended scenario is.
+    pub extended_model: Option<String>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extended_model_why_null: Option<String>,
+}
+
+/// A question to the residuals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// Its name.
+    pub name: String,
+    /// What was computed.
+    pub statistic: f64,
+    /// Its chance when nothing is wrong.
+    pub p_value: f64,
+    /// Whether it passes among all checks together (Holm).
+    pub passes: bool,
+}
+
+/// Something that the calibrated model gets wrong.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// The most probable name, or `unlisted`.
+    pub id: String,
+    /// Names that this data cannot tell apart, most probable first.
+    pub names: Vec<String>,
+    /// Of the first name, among all names tried.
+    pub probability: f64,
+    /// How far out a normal variable of this chance would be.
+    pub z: f64,
+    /// Chance of so large an effect when there is none; trials of shapes paid for.
+    pub p_value: f64,
+    /// Sizes of the first name.
+    pub parameters: BTreeMap<String, Value>,
+    /// For people.
+    pub sentence: String,
+    /// The term, when no name of the catalogue fits.
+    pub unlisted_term: Option<UnlistedTerm>,
+}
+
+/// A size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Value {
+    /// In the unit beside it.
+    pub value: f64,
+    /// One standard deviation; `None` for a shape parameter that was tried at a few values.
+    pub sigma: Option<f64>,
+    /// The unit.
+    pub unit: String,
+}
+
+/// A term outside of the catalogue.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnlistedTerm {
+    /// `along`, `across` or `yaw`.
+    pub channel: String,
+    /// Its rate is the coefficient times the product of these.
+    pub covariates: Vec<String>,
+    /// In m/s or rad/s.
+    pub coefficient: f64,
+    /// One standard deviation.
+    pub sigma: f64,
+}
+
+/// What would have shown from which size on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Blind {
+    /// The effect.
+    pub id: String,
+    /// Why it does not show, or how sharply it would.
+    pub why: String,
+    /// With nine chances in ten at a false-alarm rate of 1e-3; `None` when no size would show.
+    pub smallest_detectable: Option<Smallest>,
+}
+
+/// A size of a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Smallest {
+    /// In the unit beside it.
+    pub value: f64,
+    /// The unit.
+    pub unit: String,
+    /// Which parameter.
+    pub parameter: String,
+}
+
+/// What an extension gains on runs that were held out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gain {
+    /// How many runs, or blocks of runs, were held out, each once.
+    pub held_out_runs: usize,
+    /// Log likelihood of a scalar observation: extended − base.
+    pub log_score_per_observation: Compared,
+    /// Final position error of dead reckoning over the way: base − extended.
+    pub drift_percent: Option<Compared>,
+}
+
+/// Base and extended model compared; positive bounds are a gain.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Compared {
+    /// Without the extension.
+    pub base: f64,
+    /// With it.
+    pub extended: f64,
+    /// Lower bound of the gain at 95 %.
+    pub low: f64,
+    /// Upper bound of the gain at 95 %.
+    pub high: f64,
+}
+
+/// What to drive next.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NextExperiment {
+    /// What to drive.
+    pub protocol: String,
+    /// Why.
+    pub why: String,
+    /// What each name predicts.
+    pub predicts: BTreeMap<String, String>,
+}

@@ -1,0 +1,166 @@
+//! What an extension gains on runs that it has not seen: folds by run, each protocol in every fold.
+//!
+//! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
+//! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
+
+use calib::EndError;
+use calib::likelihood::{Column, Evidence, Model};
+use calib::methods::joint::JointFit;
+use dataset::ModelTerm;
+use nalgebra::DVector;
+
+use crate::candidate::terms;
+use crate::document::{Compared, Gain};
+use crate::scan::{free_basis, inverse};
+use crate::search::Extended;
+use crate::statistics::student_95;
+
+/// With fewer runs, they are cut into blocks.
+const LEAST_RUNS: usize = 6;
+const FOLDS: usize = 6;
+
+/// What one held-out unit scores.
+struct Unit {
+    cost: f64,
+    count: f64,
+    run: (usize, usize),
+    fold: usize,
+}
+
+/// The gain, or why there is none to tell.
+pub(crate) fn gain(base: &Extended<'_>, extended: &Extended<'_>) -> Result<Gain, String> {
+    let (before, reckoned_before) = held_out(&base.fit, &mut terms(&base.choices))?;
+    let (after, reckoned_after) = held_out(&extended.fit, &mut terms(&extended.choices))?;
+    if before.len() != after.len() || before.iter().zip(&after).any(|(before, after)| before.run != after.run) {
+        return Err("the models do not hold out the same runs".to_owned());
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let freedom = before.len() as f64 - 1.0;
+    let per_observation = |units: &[Unit]| -> f64 {
+        let constant = 0.5 * std::f64::consts::TAU.ln();
+        -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.count).sum::<f64>() - constant
+    };
+    // A look that one model takes for an outlier and the other does not is charged to the first.
+    let charged = |own: &Unit, other: &Unit| own.cost + (other.count - own.count).max(0.0) * 0.5 * 25.9 / 3.0;
+    let pairs: Vec<(f64, f64)> = before
+        .iter()
+        .zip(&after)
+        .map(|(before, after)| (charged(before, after) - charged(after, before), before.count.max(after.count)))
+        .collect();
+    let (mean, error) = ratio(&pairs);
+    let reach = student_95(freedom) * error;
+    let log_score = Compared {
+        base: per_observation(&before),
+        extended: per_observation(&after),
+        low: mean - reach,
+        high: mean + reach,
+    };
+    let drift = drift(&reckoned_before, &reckoned_after);
+    Ok(Gain { held_out_runs: before.len(), log_score_per_observation: log_score, drift_percent: drift })
+}
+
+/// Drift under both models, run by run.
+fn drift(before: &[EndError], after: &[EndError]) -> Option<Compared> {
+    let by_run = |ends: &[EndError]| -> Vec<(f64, f64)> {
+        ends.chunk_by(|a, b| a.run == b.run)
+            .map(|run| {
+                (run.iter().map(|end| end.position_m).sum::<f64>(), run.iter().map(|end| end.length_m).sum::<f64>())
+            })
+            .collect()
+    };
+    let (before, after) = (by_run(before), by_run(after));
+    let way_m: f64 = before.iter().map(|run| run.1).sum();
+    if before.len() != after.len() || before.len() < 2 || way_m <= 0.0 {
+        return None;
+    }
+    let percent = |runs: &[(f64, f64)]| 100.0 * runs.iter().map(|run| run.0).sum::<f64>() / way_m;
+    let pairs: Vec<(f64, f64)> =
+        before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
+    let (mean, error) = ratio(&pairs);
+    #[allow(clippy::cast_precision_loss)]
+    let reach = student_95(pairs.len() as f64 - 1.0) * error;
+    Some(Compared { base: percent(&before), extended: percent(&after), low: mean - reach, high: mean + reach })
+}
+
+/// Σa/Σb over units and its standard error, linearised.
+fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
+    #[allow(clippy::cast_precision_loss)]
+    let n = pairs.len() as f64;
+    let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
+    let mean = a / b;
+    let squares: f64 = pairs.iter().map(|pair| (pair.0 - mean * pair.1).powi(2)).sum();
+    (mean, (squares * n / (n - 1.0)).sqrt() / b)
+}
+
+/// Every unit's cost under a fit to the other folds, and its run's dead reckoning under that fit.
+fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
+    let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    let (units, blocks) = if runs >= LEAST_RUNS {
+        (fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
+    } else if runs > 0 {
+        (fit.in_blocks(terms, LEAST_RUNS.div_ceil(runs)), true)
+    } else {
+        return Err("no run has looks".to_owned());
+    };
+    if units.len() < 3 {
+        return Err("too few runs, and too few looks in them to be held out in blocks".to_owned());
+    }
+    let fold_of = folds(fit, &units, blocks);
+    let free = free_basis(fit);
+    let mut scored: Vec<Unit> = Vec::new();
+    let mut models: Vec<Model> = Vec::new();
+    for fold in 0..FOLDS {
+        let mut others = units.iter().zip(&fold_of).filter(|(_, of)| **of != fold).map(|(unit, _)| unit);
+        let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
+        let mut sum: Evidence = first.clone();
+        others.for_each(|unit| sum.add(unit, 1.0));
+        let own = sum.of(&fit.columns);
+        let covariance = inverse(&(free.transpose() * &own.matrix * &free))
+            .ok_or("the other runs do not determine the model once some are held out")?;
+        let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
+        let mut model = fit.fit.model.clone();
+        fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
+        models.push(model);
+        for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
+            scored.push(Unit { cost: unit.cost_after(&fit.columns, &step), count: unit.count, run: unit.run, fold });
+        }
+    }
+    let mut ends = Vec::new();
+    for (fold, model) in models.iter().enumerate() {
+        let all = fit.reckoned(model, terms);
+        // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a part of it.
+        let held =
+            |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
+        ends.extend(all.into_iter().filter(|end| held(end.run)));
+    }
+    ends.sort_by_key(|end| end.run);
+    scored.sort_by_key(|unit| unit.run);
+    Ok((scored, ends))
+}
+
+/// The fold of each unit: each protocol's units in turn.
+fn folds(fit: &JointFit<'_>, units: &[Evidence], blocks: bool) -> Vec<usize> {
+    if blocks {
+        return (0..units.len()).map(|unit| unit % FOLDS).collect();
+    }
+    let protocol = |run: (usize, usize)| {
+        fit.records.chains.iter().find(|chain| chain.run == run).and_then(|chain| chain.info.protocol)
+    };
+    let mut seen: Vec<Option<dataset::Protocol>> = Vec::new();
+    let mut order: Vec<(usize, usize)> = units
+        .iter()
+        .enumerate()
+        .map(|(position, unit)| {
+            let of = protocol(unit.run);
+            let kind = seen.iter().position(|kind| *kind == of).unwrap_or_else(|| {
+                seen.push(of);
+                seen.len() - 1
+            });
+            (kind, position)
+        })
+        .collect();
+    order.sort_unstable();
+    let mut fold = vec![0; units.len()];
+    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % FOLDS);
+    fold
+}

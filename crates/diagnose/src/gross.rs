@@ -1,0 +1,133 @@
+//! Gross faults first: swapped or reversed wheels, factors, wraps, torn reads. Each is a rewriting of the records, judged by the likelihood of a base fit.
+//!
+//! A factor on both wheels is no matter of the likelihood, which fits any lengths: how plausible the fitted lengths are decides. A fault that a fit
+//! hides is worse than none.
+
+use calib::methods::joint::{Joint, JointFit};
+use dataset::{Dataset, Session};
+use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
+
+use crate::search::{cost, count};
+
+/// A rewriting must make the data likelier by this factor, e^20, over the records as they are: dozens are tried, and each claims much.
+const GAIN: f64 = 20.0;
+/// Wheels are known to a few per cent; the separation, to which skid steering adds, less well.
+const WHEEL_SD: f64 = 0.05;
+const SEPARATION_SD: f64 = 0.3;
+/// Swapped wheels are, to the likelihood, reversed ones under an instrument that looks backward; an instrument mostly looks ahead.
+const MOUNT_SD_RAD: f64 = 0.3;
+/// A wheel noise, m/√m, beyond which counts hardly follow the robot.
+const WHEEL_SIGMA: f64 = 0.01;
+/// The same of turns, rad/√rad.
+const TURN_SIGMA: f64 = 0.05;
+/// A share of looks that do not fit beyond which something is wrong with the records.
+const OUTLIERS: f64 = 0.01;
+
+/// A fault with the records without it.
+pub(crate) struct Fault {
+    pub(crate) id: &'static str,
+    pub(crate) sizes: Vec<(&'static str, f64)>,
+    pub(crate) sentence: String,
+    pub(crate) records: Vec<Dataset>,
+    /// Log of how much likelier the data become.
+    pub(crate) gain: f64,
+}
+
+const PLAIN: Joint = Joint { nuisances: false, thin: false };
+
+/// An instrument turned farther than this on the robot is more of a claim than the fault.
+const MOST_TURNED_RAD: f64 = 1.0;
+
+pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
+    datasets.iter().map(Dataset::session).collect()
+}
+
+/// The fault that makes the data far likelier, if there is one.
+pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: &[String]) -> Option<Fault> {
+    let sound = base.is_some_and(is_sound);
+    let mut best: Option<Fault> = None;
+    for id in CATALOGUE.iter().filter(|id| !without.iter().any(|out| out == *id)) {
+        let Some(Hypothesis::Records(rewritings)) = hypothesis(id) else { continue };
+        if sound && ALWAYS_POSSIBLE.contains(id) {
+            continue;
+        }
+        for (sizes, sentence, records) in together(datasets, rewritings) {
+            let own = sessions(&records);
+            let Ok(fit) = PLAIN.fit(&own) else { continue };
+            // Records that no plausible drive follows, rewritten or not, say nothing of the fault.
+            if !is_sound(&fit) || fit.fit.model.body_from_sensor.theta_rad.abs() > MOST_TURNED_RAD {
+                continue;
+            }
+            let gain = base.map_or(f64::MAX, |base| {
+                // Looks that only one of the fits explains are charged as outliers to the other.
+                let looks = count(base).max(count(&fit));
+                cost(base, looks) + implausible(base) - cost(&fit, looks) - implausible(&fit)
+            });
+            if gain > GAIN && best.as_ref().is_none_or(|best| gain > best.gain) {
+                best = Some(Fault { id, sizes, sentence, records, gain });
+            }
+        }
+    }
+    best
+}
+
+/// Faults that any records may have; they are tried where the base fit is hard to believe. The others look for their own traces.
+const ALWAYS_POSSIBLE: [&str; 4] = ["swapped_wheels", "reversed_wheel", "wrong_counts_per_turn", "time_unit"];
+
+/// How implausible the lengths of a fit are, as a part of its cost.
+fn implausible(fit: &JointFit<'_>) -> f64 {
+    let (model, nominal) = (&fit.fit.model, &fit.nominal);
+    let off = |of: f64, nominal: f64, sd: f64| 0.5 * ((of / nominal).abs().ln() / sd).powi(2);
+    off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_SD)
+        + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_SD)
+        + off(model.separation_m, nominal.separation_m, SEPARATION_SD)
+        + 0.5 * (model.body_from_sensor.theta_rad / MOUNT_SD_RAD).powi(2)
+}
+
+/// Share of looks that a fit takes for outliers.
+pub(crate) fn left_out(fit: &JointFit<'_>) -> f64 {
+    #[allow(clippy::cast_precision_loss)]
+    let share = fit.fit.pass.outliers.len() as f64 / fit.records.looks().max(1) as f64;
+    share
+}
+
+/// Does a base fit look like a robot whose counts follow it?
+fn is_sound(fit: &JointFit<'_>) -> bool {
+    let (model, nominal) = (&fit.fit.model, &fit.nominal);
+    let near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
+    near(model.m_per_rad.left, nominal.m_per_rad.left, 2.0 * WHEEL_SD)
+        && near(model.m_per_rad.right, nominal.m_per_rad.right, 2.0 * WHEEL_SD)
+        && near(model.separation_m, nominal.separation_m, 1.5 * SEPARATION_SD)
+        && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Wheel) < WHEEL_SIGMA
+        && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Turn) < TURN_SIGMA
+        && left_out(fit) < OUTLIERS
+        && fit.fit.converged
+}
+
+/// A form of a fault: its sizes, what it is, and the records without it.
+type Form = (Vec<(&'static str, f64)>, String, Vec<Dataset>);
+
+/// The same rewriting of all sessions, by its sizes; a session in which it is impossible stays as it is.
+fn together(datasets: &[Dataset], rewritings: fn(&Dataset) -> Vec<Rewriting>) -> Vec<Form> {
+    let each: Vec<Vec<Rewriting>> = datasets.iter().map(rewritings).collect();
+    let mut forms: Vec<(Vec<(&'static str, f64)>, String)> = Vec::new();
+    for rewriting in each.iter().flatten() {
+        if forms.iter().all(|(sizes, _)| *sizes != rewriting.sizes) {
+            forms.push((rewriting.sizes.clone(), rewriting.sentence.clone()));
+        }
+    }
+    forms
+        .into_iter()
+        .map(|(sizes, sentence)| {
+            let records = datasets
+                .iter()
+                .zip(&each)
+                .map(|(dataset, own)| {
+                    let same = own.iter().find(|rewriting| rewriting.sizes == sizes);
+                    same.map_or_else(|| dataset.clone(), |rewriting| rewriting.records.clone())
+                })
+                .collect();
+            (sizes, sentence, records)
+        })
+        .collect()
+}

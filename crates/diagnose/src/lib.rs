@@ -1,0 +1,25 @@
+//! What a calibrated model gets wrong: residuals → what is wrong → its name, or that it cannot be told → the extended model → the gain on unseen runs.
+//!
+//! Order: gross faults by likelihood; a base fit; a score scan over the catalogue's mean terms, each with base and nuisances projected out; refits of the
+//! rivals; checks of what is left; scatter named from failed checks; a sparse term where structure is left that no name explains; the gain on held-out runs.
+//! It never reads what a simulator hid: it depends on the measured records and the hypotheses of [`effects`] alone. docs/diagnose.md says what the numbers mean.
+
+mod blind;
+mod candidate;
+mod checks;
+mod diagnosis;
+mod document;
+mod gain;
+mod gross;
+mod naming;
+mod scan;
+mod scenario_of;
+mod search;
+mod sparse;
+mod statistics;
+mod unlisted;
+
+pub use diagnosis::{DiagnoseError, Diagnosis, Options, diagnose};
+pub use document::{
+    Blind, Check, Compared, Document, Finding, Gain, NextExperiment, Smallest, UnlistedTerm, Value, Verdict,
+};

@@ -1,0 +1,177 @@
+//! From fits to findings: names, chances, sizes and sentences.
+
+use std::collections::BTreeMap;
+
+use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
+
+use crate::candidate::Choice;
+use crate::checks::Checked;
+use crate::document::{Finding, UnlistedTerm, Value};
+use crate::gross::Fault;
+use crate::search::{Extended, Found, LEAST_REACH, Name, Test, reach};
+use crate::statistics::{of_trials, z_of_p};
+
+/// The parameters of a choice as found.
+pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<String, Value> {
+    let held = choice.held().into_iter().map(|(name, value)| {
+        let unit = name.rsplit_once('_').map_or("1", |(_, unit)| unit);
+        (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() })
+    });
+    let fitted = choice.parameters().iter().zip(sizes).map(|(parameter, (value, sigma))| {
+        let sigma = Some(*sigma).filter(|sigma| sigma.is_finite());
+        (parameter.name.to_owned(), Value { value: *value, sigma, unit: parameter.unit.to_owned() })
+    });
+    fitted.chain(held).collect()
+}
+
+fn listed(values: &BTreeMap<String, Value>) -> String {
+    let parts: Vec<String> = values
+        .iter()
+        .map(|(name, value)| match value.sigma {
+            Some(sigma) => format!("{name} = {:.3e} ± {sigma:.1e} {}", value.value, value.unit),
+            None => format!("{name} = {:.3}", value.value),
+        })
+        .collect();
+    parts.join(", ")
+}
+
+/// The findings of a search over the catalogue.
+pub(crate) fn of_search(found: &Found<'_>) -> Vec<Finding> {
+    let places = found.model.choices.iter().zip(&found.names).zip(&found.tests);
+    places
+        .map(|((choice, names), test)| {
+            let shapes = found.first_scan.iter().find(|entry| entry.scored.choice.id() == choice.id());
+            let trials = shapes.map_or(1, |entry| entry.shapes.max(1));
+            of_choice(choice, names, test, trials)
+        })
+        .collect()
+}
+
+fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
+    let top = names.first().map_or(0.0, |name| name.log_odds);
+    // Where a name explains thousands, its form is not known well enough for the last of them to count in full.
+    let weights: f64 = names.iter().map(|name| ((name.log_odds - top) * LEAST_REACH / reach(top)).exp()).sum();
+    let p_value = of_trials(test.p_value, trials);
+    let parameters = parameters(choice, &test.sizes);
+    let ids: Vec<String> = names.iter().map(|name| name.choice.id().to_owned()).collect();
+    let sentence = if ids.len() == 1 {
+        format!("{}: {}", choice.id(), listed(&parameters))
+    } else {
+        format!("one of {}; this data cannot tell which. As {}: {}", ids.join(", "), choice.id(), listed(&parameters))
+    };
+    Finding {
+        id: choice.id().to_owned(),
+        names: ids,
+        probability: if weights > 0.0 { 1.0 / weights } else { 1.0 },
+        z: z(test, p_value),
+        p_value,
+        parameters,
+        sentence,
+        unlisted_term: None,
+    }
+}
+
+/// The normal variable of a chance; where that is below what a double holds, from the statistic itself.
+fn z(test: &Test, p_value: f64) -> f64 {
+    if p_value > 1e-290 { z_of_p(p_value) } else { test.statistic.sqrt() }
+}
+
+/// The finding of a sparse term at the end of a model's choices.
+pub(crate) fn of_sparse(model: &Extended<'_>, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
+    let Choice::Sparse(sparse) = model.choices.last()? else { return None };
+    let (coefficient, sigma) = *test.sizes.first()?;
+    let covariates: Vec<String> = sparse.covariates.iter().map(crate::sparse::Covariate::name).collect();
+    let channel = sparse.channel.name();
+    let covariates = if covariates.is_empty() { vec!["1".to_owned()] } else { covariates };
+    let sentence = format!(
+        "not in the catalogue: {channel}, grows with {} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried",
+        covariates.join(" · ")
+    );
+    Some(Finding {
+        id: "unlisted".to_owned(),
+        names: vec!["unlisted".to_owned()],
+        probability: 1.0,
+        z: z(test, p_value),
+        p_value,
+        parameters: BTreeMap::new(),
+        sentence,
+        unlisted_term: Some(UnlistedTerm { channel: channel.to_owned(), covariates, coefficient, sigma }),
+    })
+}
+
+/// Something is left, and nothing that was tried explains it.
+pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
+    let failed: Vec<&str> =
+        checked.checks.iter().filter(|check| !check.passes).map(|check| check.name.as_str()).collect();
+    let worst = checked.checks.iter().filter(|check| !check.passes).map(|check| check.p_value).fold(1.0, f64::min);
+    (!failed.is_empty()).then(|| Finding {
+        id: "unlisted".to_owned(),
+        names: vec!["unlisted".to_owned()],
+        probability: 1.0,
+        z: z_of_p(worst),
+        p_value: worst,
+        parameters: BTreeMap::new(),
+        sentence: format!(
+            "the residuals are not what the model says ({}), and nothing in the catalogue explains it: what it is cannot be told",
+            failed.join(", ")
+        ),
+        unlisted_term: None,
+    })
+}
+
+/// The finding of a gross fault.
+pub(crate) fn of_fault(fault: &Fault) -> Finding {
+    let value = |(name, value): &(&'static str, f64)| {
+        ((*name).to_owned(), Value { value: *value, sigma: None, unit: "1".to_owned() })
+    };
+    // A likelihood ratio of e^gain bounds the chance of as much by accident (Markov's inequality).
+    let p_value = (-fault.gain).exp();
+    Finding {
+        id: fault.id.to_owned(),
+        names: vec![fault.id.to_owned()],
+        probability: 1.0,
+        z: (2.0 * fault.gain.min(1e6)).sqrt(),
+        p_value,
+        parameters: fault.sizes.iter().map(value).collect(),
+        sentence: format!("{}: {}", fault.id, fault.sentence),
+        unlisted_term: None,
+    }
+}
+
+/// Effects of the catalogue that show by a sign, without those taken out.
+pub(crate) fn with_sign(sign: Sign, without: &[String]) -> Vec<&'static str> {
+    CATALOGUE
+        .iter()
+        .copied()
+        .filter(|id| !without.iter().any(|out| out == id))
+        .filter(|id| matches!(hypothesis(id), Some(Hypothesis::Scatter(signs)) if signs.contains(&sign)))
+        .collect()
+}
+
+/// A finding of what only scatters.
+pub(crate) fn of_scatter(
+    ids: &[&'static str],
+    p_value: f64,
+    parameters: BTreeMap<String, Value>,
+    what: &str,
+) -> Option<Finding> {
+    let ids = if ids.is_empty() { &["unlisted"] } else { ids };
+    let first = ids.first()?;
+    #[allow(clippy::cast_precision_loss)]
+    let probability = 1.0 / ids.len() as f64;
+    let sentence = match ids {
+        ["unlisted"] => format!("not in the catalogue: {what}"),
+        [id] => format!("{id}: {what}"),
+        ids => format!("one of {}; this data cannot tell which: {what}", ids.join(", ")),
+    };
+    Some(Finding {
+        id: (*first).to_owned(),
+        names: ids.iter().map(|id| (*id).to_owned()).collect(),
+        probability,
+        z: z_of_p(p_value),
+        p_value,
+        parameters,
+        sentence,
+        unlisted_term: None,
+    })
+}

@@ -1,0 +1,169 @@
+//! Score tests: what a term would add to a fit, from one pass at the fit's values.
+//!
+//! With the normal equation (I, g) over all columns, n what the fit holds free and c a candidate's parameters: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc,
+//! g_c|n = g_c − I_cn I_nn⁻¹ g_n, and gᵀI⁻¹g is χ² without the effect and noncentral with λ = sizeᵀ I_c|n size. In units of what would be a large size,
+//! directions that even such a size would not show are left out: they cost power and show nothing.
+//! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
+
+use calib::likelihood::{Column, Evidence, Pass};
+use calib::methods::joint::JointFit;
+use dataset::TermParameter;
+use nalgebra::{DMatrix, DVector};
+
+use crate::candidate::{Choice, terms};
+use crate::statistics::p_of_statistic;
+
+/// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
+const LEAST_SHOWN: f64 = 1.0;
+/// What is left of a column beside the others, as a share of its information, below which it is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// A candidate's test.
+#[derive(Debug, Clone)]
+pub(crate) struct Scored {
+    pub(crate) choice: Choice,
+    pub(crate) parameters: &'static [TermParameter],
+    /// Its projected information.
+    pub(crate) information: DMatrix<f64>,
+    /// How many directions are tested.
+    pub(crate) dimensions: usize,
+    pub(crate) statistic: f64,
+    pub(crate) p_value: f64,
+    /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
+    pub(crate) log_odds: f64,
+}
+
+/// A sum of all runs' evidences.
+pub(crate) fn total(runs: &[Evidence]) -> Option<Evidence> {
+    let (first, others) = runs.split_first()?;
+    let mut sum = first.clone();
+    others.iter().for_each(|run| sum.add(run, 1.0));
+    Some(sum)
+}
+
+/// The basis of what a fit holds free: its columns without the directions that stay nominal.
+pub(crate) fn free_basis(fit: &JointFit<'_>) -> DMatrix<f64> {
+    let n = fit.columns.len();
+    let identity = DMatrix::identity(n, n);
+    if fit.unseen.is_empty() {
+        return identity;
+    }
+    let held = DMatrix::from_fn(n, fit.unseen.len(), |row, k| {
+        fit.unseen[k].get(fit.columns[row].index()).copied().unwrap_or(0.0)
+    });
+    let eigen = (&held * held.transpose()).symmetric_eigen();
+    let free: Vec<_> =
+        (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
+}
+
+/// What is left of some columns with the free ones at their best: information, gradient, and how much of the raw information is left of each.
+pub(crate) struct Projected {
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) gradient: DVector<f64>,
+    pub(crate) share: Vec<f64>,
+}
+
+/// Takes the free columns out of an evidence.
+pub(crate) struct Projection {
+    free: DMatrix<f64>,
+    indices: Vec<usize>,
+    inverse: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Projection {
+    pub(crate) fn of(fit: &JointFit<'_>, evidence: &Evidence) -> Option<Self> {
+        let free = free_basis(fit);
+        let own = evidence.of(&fit.columns);
+        let reduced = free.transpose() * &own.matrix * &free;
+        let inverse = inverse(&reduced)?;
+        let indices = fit.columns.iter().map(|column| column.index()).collect();
+        Some(Self { gradient: free.transpose() * own.gradient, free, indices, inverse })
+    }
+
+    pub(crate) fn of_columns(&self, evidence: &Evidence, columns: &[usize]) -> Projected {
+        let cross = DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| {
+            evidence.information[(columns[i], self.indices[j])]
+        }) * &self.free;
+        let own = DMatrix::from_fn(columns.len(), columns.len(), |i, j| evidence.information[(columns[i], columns[j])]);
+        let gradient = DVector::from_fn(columns.len(), |i, _| evidence.gradient[columns[i]]);
+        let information = &own - &cross * &self.inverse * cross.transpose();
+        let share = (0..columns.len()).map(|k| if own[(k, k)] > 0.0 { information[(k, k)] / own[(k, k)] } else { 0.0 });
+        Projected { share: share.collect(), gradient: gradient - &cross * &self.inverse * &self.gradient, information }
+    }
+}
+
+/// The inverse of an information matrix, with columns of like size; `None` when a direction is not determined.
+pub(crate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let size = matrix.diagonal().map(|diagonal| diagonal.max(f64::MIN_POSITIVE).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (size[i] * size[j]) + if i == j { 1e-12 } else { 0.0 });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (size[i] * size[j])))
+}
+
+/// A candidate's information and gradient in units of what is plausible, along its principal directions: eigenvalue and gradient of each.
+pub(crate) fn principal(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    parameters: &[TermParameter],
+) -> Vec<(f64, f64)> {
+    let plausible = DVector::from_fn(parameters.len(), |k, _| parameters[k].plausible);
+    let scaled =
+        DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| information[(i, j)] * plausible[i] * plausible[j]);
+    let scaled_gradient = gradient.component_mul(&plausible);
+    let eigen = scaled.symmetric_eigen();
+    (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
+}
+
+/// How many values the noise was estimated from, after the free columns.
+pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
+    #[allow(clippy::cast_precision_loss)]
+    let columns = fit.columns.len() as f64;
+    (evidence.count - columns).max(1.0)
+}
+
+/// Tests every candidate beside the choices that the fit already has.
+pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
+    // Outer products grow with the square of the columns: many candidates go in groups.
+    candidates.chunks(GROUP).flat_map(|group| scan_group(fit, chosen, group)).collect()
+}
+
+const GROUP: usize = 40;
+
+fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
+    let mut all = terms(chosen);
+    let first: usize = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
+    all.extend(terms(candidates));
+    let pass: Pass = fit.scan(&mut all);
+    let Some(evidence) = total(&pass.runs) else { return Vec::new() };
+    let Some(projection) = Projection::of(fit, &evidence) else { return Vec::new() };
+    let freedom = freedom(fit, &evidence);
+    // Noise is estimated by likelihood, without its degrees of freedom.
+    let shrink = freedom / evidence.count.max(1.0);
+    let mut at = first;
+    candidates
+        .iter()
+        .map(|choice| {
+            let parameters = choice.parameters();
+            let columns: Vec<usize> = (at..at + parameters.len()).collect();
+            at += parameters.len();
+            let Projected { information, gradient, share } = projection.of_columns(&evidence, &columns);
+            let shown = share.iter().any(|share| *share > ROUNDING);
+            let (mut statistic, mut dimensions, mut log_odds) = (0.0, 0, 0.0);
+            if shown {
+                for (value, gradient) in principal(&information, &gradient, parameters) {
+                    if value < LEAST_SHOWN * LEAST_SHOWN {
+                        continue;
+                    }
+                    dimensions += 1;
+                    statistic += shrink * gradient * gradient / value;
+                    log_odds += 0.5 * shrink * gradient * gradient / (value + 1.0) - 0.5 * (1.0 + value).ln();
+                }
+            }
+            let p_value = p_of_statistic(statistic, dimensions, freedom);
+            Scored { choice: choice.clone(), parameters, information, dimensions, statistic, p_value, log_odds }
+        })
+        .collect()
+}

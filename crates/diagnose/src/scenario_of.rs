@@ -1,0 +1,208 @@
+//! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry, estimated noise, found effects, and what was driven.
+
+use calib::likelihood::NoiseComponent;
+use dataset::{Dataset, Protocol, Schedule, WheelLog};
+use effects::{Effect, effect_of_sizes};
+use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
+
+use crate::candidate::Choice;
+use crate::document::Finding;
+use crate::search::Extended;
+
+/// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
+const STAND_IN: &str = include_str!("stand_in.toml");
+/// A controller regulates on counts much finer than most logs' ticks.
+const LEAST_COUNTS: f64 = 40_000.0;
+/// Looks farther apart than this, in a run of a few, are readings of a standing robot.
+const READ_STANDING_S: f64 = 2.0;
+
+/// The scenario, or why it cannot be written.
+pub(crate) fn scenario_of(
+    datasets: &[Dataset],
+    model: &Extended<'_>,
+    findings: &[Finding],
+) -> Result<Scenario, String> {
+    let first = datasets.first().ok_or("no dataset")?;
+    let nominal = first.robot;
+    let fit = &model.fit.fit;
+    let counts = nominal.ticks_per_rev.unwrap_or(LEAST_COUNTS);
+    let per_tick = (LEAST_COUNTS / counts).ceil().max(1.0);
+    let mut robot: Robot = toml::from_str(STAND_IN).map_err(|error| error.message().to_owned())?;
+    robot.left_wheel_diameter_m = nominal.left_wheel_diameter_m;
+    robot.right_wheel_diameter_m = nominal.right_wheel_diameter_m;
+    robot.wheel_separation_m = nominal.wheel_separation_m;
+    robot.encoder.gear_ratio = counts * per_tick / (scenario::QUADRATURE_DECODING * robot.encoder.lines_per_rev);
+    let pace = Pace::of(datasets, model);
+    robot.cruise_speed_m_s = pace.speed_m_s;
+    let stated =
+        first.points.iter().map(|point| Mark { id: point.id.clone(), x_m: point.body.x_m, y_m: point.body.y_m });
+    robot.points = stated.collect();
+    let sigma_xy_m = fit.noise.sigma(NoiseComponent::LookPosition);
+    let sigma_theta_rad = fit.noise.sigma(NoiseComponent::LookHeading);
+    let instrument = if pace.between_looks_s > READ_STANDING_S {
+        if robot.points.len() < 2 {
+            let half_m = 0.5 * nominal.wheel_separation_m;
+            let mark = |id: &str, y_m| Mark { id: id.to_owned(), x_m: 0.0, y_m };
+            robot.points = vec![mark("left", half_m), mark("right", -half_m)];
+        }
+        Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: sigma_xy_m }
+    } else {
+        let mounted = fit.model.body_from_sensor;
+        Instrument::MotionCapture {
+            rate_hz: 1.0 / pace.between_looks_s,
+            sigma_xy_m,
+            sigma_theta_rad,
+            latency_s: fit.model.latency_s.max(0.0),
+            lever_x_m: mounted.x_m,
+            lever_y_m: mounted.y_m,
+            lever_theta_rad: mounted.theta_rad,
+        }
+    };
+    let mut effects = geometry(model)?;
+    if per_tick > 1.0 && nominal.ticks_per_rev.is_some() {
+        effects.extend(effect_of_sizes("quantization", &[("counts_per_tick", per_tick)]));
+    }
+    let mut at = 0;
+    for choice in &model.choices {
+        let parameters = choice.parameters();
+        let fitted = parameters.iter().zip(&fit.model.sizes[at..]).map(|(parameter, size)| (parameter.name, *size));
+        at += parameters.len();
+        if let Choice::Effect { id, .. } = choice {
+            let sizes: Vec<(&str, f64)> = fitted.chain(choice.held()).collect();
+            let effect = effect_of_sizes(id, &sizes)
+                .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?;
+            effect.physical().check().map_err(|error| error.to_string())?;
+            effects.push(effect);
+        }
+    }
+    if findings.iter().any(|finding| finding.unlisted_term.is_some()) {
+        return Err("a term outside of the catalogue cannot be simulated".to_owned());
+    }
+    effects::sort_by_stage(&mut effects);
+    let name = first.provenance.name.as_deref().unwrap_or("dataset");
+    let scenario = Scenario {
+        name: format!("{name} as diagnosed"),
+        seed: 1,
+        engine: Engine::Stepping { step_s: 0.001 },
+        robot,
+        noise: Noise { wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel), sensitivity_sigma: 0.0 },
+        placement: Placement { half_width_m: 0.05, half_width_rad: 0.02 },
+        budget: None,
+        log: (pace.between_rows_s < READ_STANDING_S).then_some(Log { interval_s: pace.between_rows_s }),
+        instruments: vec![instrument],
+        effects,
+        protocols: protocols(datasets),
+        sweep: None,
+    };
+    // What is written must be readable.
+    let text = scenario.to_toml().map_err(|error| error.to_string())?;
+    Scenario::parse(&text, "extended.toml").map_err(|error| error.to_string())
+}
+
+/// The calibrated lengths as effects on the nominal ones.
+fn geometry(model: &Extended<'_>) -> Result<Vec<Effect>, String> {
+    let (found, nominal) = (&model.fit.fit.model, &model.fit.nominal);
+    let mean = |wheels: kinematics::Wheels<f64>| 0.5 * (wheels.left + wheels.right);
+    let ratio = |wheels: kinematics::Wheels<f64>| wheels.right / wheels.left;
+    let text = format!(
+        "[[effect]]\nkind = \"wheel_scale\"\nscale = {:?}\n[[effect]]\nkind = \"wheel_mismatch\"\nright_over_left = {:?}\n[[effect]]\nkind = \"wheelbase\"\nratio = {:?}\n",
+        mean(found.m_per_rad) / mean(nominal.m_per_rad),
+        ratio(found.m_per_rad) / ratio(nominal.m_per_rad),
+        found.separation_m / nominal.separation_m,
+    );
+    #[derive(serde::Deserialize)]
+    struct List {
+        effect: Vec<Effect>,
+    }
+    toml::from_str::<List>(&text).map(|list| list.effect).map_err(|error| error.message().to_owned())
+}
+
+/// How fast and how often.
+struct Pace {
+    speed_m_s: f64,
+    between_rows_s: f64,
+    between_looks_s: f64,
+}
+
+impl Pace {
+    fn of(datasets: &[Dataset], model: &Extended<'_>) -> Self {
+        let mut rows: Vec<f64> = Vec::new();
+        let mut speeds: Vec<f64> = Vec::new();
+        for dataset in datasets {
+            let Ok(geometry) = dataset.robot.geometry() else { continue };
+            for run in &dataset.runs {
+                rows.extend(run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]));
+                let m_per_count = match &run.odometry.wheels {
+                    WheelLog::Ticks(_) => {
+                        dataset.robot.ticks_per_rev.and_then(|ticks| geometry.m_per_count(ticks).ok())
+                    }
+                    _ => None,
+                };
+                if let (WheelLog::Ticks(ticks), Some(m_per_count)) = (&run.odometry.wheels, m_per_count) {
+                    let steps = ticks.right.windows(2).zip(run.odometry.t_s.windows(2));
+                    #[allow(clippy::cast_precision_loss)]
+                    speeds.extend(
+                        steps.map(|(of, t)| ((of[1] - of[0]) as f64 * m_per_count.right / (t[1] - t[0])).abs()),
+                    );
+                }
+            }
+        }
+        speeds.retain(|speed| *speed > 0.01);
+        let mut looks: Vec<f64> = model.fit.records.times_between().collect();
+        Self {
+            // Cruising is the upper end of the speeds: starts and stops are slower.
+            speed_m_s: quantile(&mut speeds, 0.75).unwrap_or(0.25).clamp(0.01, 5.0),
+            between_rows_s: quantile(&mut rows, 0.5).unwrap_or(10.0).clamp(1e-3, 1e3),
+            between_looks_s: quantile(&mut looks, 0.5).unwrap_or(10.0).clamp(1e-2, 1e3),
+        }
+    }
+}
+
+fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let at = (values.len() as f64 * share) as usize;
+    (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
+}
+
+/// What was driven, as far as schedules have words for it; squares where they have none.
+fn protocols(datasets: &[Dataset]) -> Vec<Schedule> {
+    let mut kinds: Vec<(Schedule, u32)> = Vec::new();
+    for info in datasets.iter().flat_map(|dataset| &dataset.runs).map(|run| &run.info) {
+        let settings = &info.settings;
+        let one = match info.protocol {
+            Some(Protocol::Straight) => {
+                settings.length_m.map(|length_m| Schedule::Straights { length_m: length_m.abs(), runs: 1 })
+            }
+            Some(Protocol::Spin) => {
+                settings.turn_rad.map(|turn_rad| Schedule::Spins { turn_rad: turn_rad.abs(), runs: 1 })
+            }
+            Some(Protocol::SquareCw | Protocol::SquareCcw) => {
+                settings.side_m.map(|side_m| Schedule::Squares { side_m, runs_each_way: 1 })
+            }
+            Some(Protocol::CircleCw | Protocol::CircleCcw) => {
+                settings.radius_m.map(|radius_m| Schedule::Circles { radius_m, turns: None, runs_each_way: 1 })
+            }
+            Some(Protocol::Path | Protocol::Free) | None => None,
+        };
+        let Some(one) = one else { continue };
+        match kinds.iter_mut().find(|(kind, _)| *kind == one) {
+            Some((_, runs)) => *runs += 1,
+            None => kinds.push((one, 1)),
+        }
+    }
+    if kinds.is_empty() {
+        return vec![
+            Schedule::Straights { length_m: 1.5, runs: 6 },
+            Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 6 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 3 },
+        ];
+    }
+    kinds
+        .into_iter()
+        .map(|(kind, count)| match kind {
+            Schedule::Straights { length_m, .. } => Schedule::Straights { length_m, runs: count },
+            Schedule::Spins { turn_rad, .. } => Schedule::Spins { turn_rad, runs: count },
+            other => other.with_pairs(count.div_ceil(2)),
+        })
+        .collect()
+}

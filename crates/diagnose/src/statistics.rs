@@ -1,0 +1,92 @@
+//! Distributions behind the tests: F, χ², normal, Student; and Holm's order of many tests.
+//!
+//! Reference: Holm 1979.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
+use statrs::function::erf::erfc_inv;
+
+/// Chance of a sum of `dimensions` squared normal variables over their variance this large, when the variance itself was estimated from about
+/// `freedom` values.
+pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) -> f64 {
+    if dimensions == 0 || !statistic.is_finite() {
+        return 1.0;
+    }
+    #[allow(clippy::cast_precision_loss)] // a handful of dimensions
+    let dimensions = dimensions as f64;
+    FisherSnedecor::new(dimensions, freedom.max(1.0)).map_or(1.0, |f| f.sf(statistic.max(0.0) / dimensions))
+}
+
+/// Chance of a χ² this large.
+pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom.max(1.0)).map_or(1.0, |chi| chi.sf(statistic.max(0.0)))
+}
+
+/// Two-sided chance of a normal variable this far out.
+pub(crate) fn p_of_z(z: f64) -> f64 {
+    Normal::new(0.0, 1.0).map_or(1.0, |normal| 2.0 * normal.sf(z.abs()))
+}
+
+/// How far out a normal variable of this two-sided chance is.
+pub(crate) fn z_of_p(p: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erfc_inv(p.clamp(1e-300, 1.0))
+}
+
+/// Student's quantile for a two-sided interval of 95 %.
+pub(crate) fn student_95(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
+}
+
+/// The chance that the best of so many trials is as good as `p`; Šidák 1967.
+pub(crate) fn of_trials(p: f64, trials: usize) -> f64 {
+    #[allow(clippy::cast_precision_loss)]
+    let trials = trials as f64;
+    -f64::exp_m1(trials * f64::ln_1p(-p.min(1.0 - 1e-16)))
+}
+
+/// Which of several tests fail at a family-wise level; Holm 1979.
+pub(crate) fn holm(p: &[f64], level: f64) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
+    let mut fails = vec![false; p.len()];
+    for (rank, &test) in order.iter().enumerate() {
+        #[allow(clippy::cast_precision_loss)]
+        let left = (p.len() - rank) as f64;
+        if p[test] * left > level {
+            break;
+        }
+        fails[test] = true;
+    }
+    fails
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chances_and_quantiles_are_each_others_inverse() {
+        for z in [0.5, 1.959_964, 4.0, 12.0] {
+            assert!((z_of_p(p_of_z(z)) - z).abs() < 1e-6 * z, "{z}");
+        }
+        // One dimension with many degrees of freedom is a squared normal variable.
+        assert!((p_of_statistic(1.959_964_f64.powi(2), 1, 1e7) - 0.05).abs() < 1e-6);
+        assert!((p_of_chi_square(3.841_459, 1.0) - 0.05).abs() < 1e-6);
+        assert!(
+            p_of_statistic(10.0, 1, 5.0) > p_of_statistic(10.0, 1, 500.0),
+            "few values know little of the variance"
+        );
+    }
+
+    #[test]
+    fn holm_stops_at_the_first_that_passes() {
+        assert_eq!(holm(&[0.04, 0.001, 0.012, 0.02], 0.05), [false, true, true, true]);
+        assert_eq!(holm(&[0.03, 0.02], 0.05), [true, true]);
+        assert_eq!(holm(&[0.03, 0.03], 0.05), [false, false]);
+    }
+
+    #[test]
+    fn the_best_of_trials_pays_for_them() {
+        assert!((of_trials(0.01, 1) - 0.01).abs() < 1e-15);
+        assert!((of_trials(1e-12, 40) - 4e-11).abs() < 1e-20);
+    }
+}

@@ -1,0 +1,103 @@
+//! Structure that no name of the catalogue explains: one sparse term, if it earns its place on runs that it was not fitted to.
+
+use calib::methods::joint::JointFit;
+use kinematics::Side;
+
+use crate::candidate::Choice;
+use crate::checks::of_runs;
+use crate::gain::gain;
+use crate::scan::{Scored, scan};
+use crate::search::{Extended, refit};
+use crate::sparse::{Channel, Covariate, Sparse};
+use crate::statistics::of_trials;
+
+/// Rate of false alarms of the search for a sparse term.
+pub(crate) const UNLISTED_LEVEL: f64 = 0.005;
+/// Refits of the best by their scores.
+const TRIED: usize = 3;
+
+/// A sparse term with its model.
+pub(crate) struct SparseFound<'a> {
+    pub(crate) model: Extended<'a>,
+    pub(crate) p_value: f64,
+    /// How many products were tried.
+    pub(crate) trials: usize,
+}
+
+/// Products of at most three covariates that vanish at standstill.
+fn library(fit: &JointFit<'_>) -> Vec<Choice> {
+    use Covariate::{
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
+        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+    };
+    let rates = [vec![Speed], vec![AbsSpeed], vec![YawRate], vec![AbsYawRate]];
+    let modulators = [
+        vec![AbsSpeed],
+        vec![AbsYawRate],
+        vec![Speed],
+        vec![YawRate],
+        vec![CosHeading],
+        vec![SinHeading],
+        vec![RunTime],
+        vec![SessionTime],
+        vec![Way],
+        vec![SinceReversal],
+        vec![X],
+        vec![Y],
+        vec![AbsSpeed, AbsSpeed],
+        vec![AbsYawRate, AbsYawRate],
+        vec![AbsSpeed, AbsYawRate],
+        vec![AbsSpeed, CosHeading],
+        vec![AbsSpeed, SinHeading],
+    ];
+    let mut products: Vec<Vec<Covariate>> = rates.to_vec();
+    for rate in &rates {
+        for modulator in modulators.iter().cloned().chain(of_runs(fit).into_iter().map(|covariate| vec![covariate])) {
+            products.push(rate.iter().cloned().chain(modulator).collect());
+        }
+    }
+    for alone in [Acceleration, YawAcceleration] {
+        products.push(vec![alone.clone()]);
+        products.push(vec![alone.clone(), AbsSpeed]);
+        products.push(vec![alone, AbsYawRate]);
+    }
+    for side in Side::BOTH {
+        products.push(vec![CosPhase(side)]);
+        products.push(vec![SinPhase(side)]);
+    }
+    let moved = products.into_iter().flat_map(|covariates| {
+        Channel::ALL.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+    });
+    let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading]];
+    let seen = seen.into_iter().flat_map(|covariates| {
+        Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+    });
+    moved.chain(seen).collect()
+}
+
+/// The best sparse term beside a model.
+pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) -> Option<SparseFound<'a>> {
+    let library = library(base);
+    let mut scored: Vec<Scored> =
+        scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+    let trials = scored.len();
+    scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    let best = scored.first()?;
+    if of_trials(best.p_value, trials) > level {
+        return None;
+    }
+    let p_value = of_trials(best.p_value, trials);
+    scored
+        .into_iter()
+        .take(TRIED)
+        .filter_map(|scored| {
+            let mut choices = model.choices.clone();
+            choices.push(scored.choice);
+            let extended = refit(base, choices)?;
+            let earned = gain(model, &extended).ok()?;
+            (earned.log_score_per_observation.low > 0.0)
+                .then_some((earned.log_score_per_observation.extended, extended))
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, extended)| SparseFound { model: extended, p_value, trials })
+}

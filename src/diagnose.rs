@@ -1,0 +1,89 @@
+//! `yair diagnose DATASET... [--out DIR] [--without ID]...`
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use ::diagnose::{Diagnosis, Document, Options};
+use clap::Args;
+
+use crate::simulate::write_whole;
+use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+
+/// What the calibrated model gets wrong: its name or that it cannot be told, the extended model, and the gain on runs that it has not seen.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Datasets; several are one robot's sessions, diagnosed together.
+    #[arg(required = true, value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// Folder for findings.json and extended.toml, a scenario of the robot as found.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Take an effect out of the catalogue; may be given several times.
+    #[arg(long = "without", value_name = "ID")]
+    without: Vec<String>,
+    /// Accepted for uniformity: nothing here is drawn by chance.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let _ = arguments.seed;
+    let datasets = read_datasets(&arguments.datasets, terminal)?;
+    let Diagnosis { mut document, extended } =
+        ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone() })?;
+    if let Some(out) = &arguments.out {
+        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+        if let Ok(scenario) = &extended {
+            let path = out.join("extended.toml");
+            write_whole(&path, scenario.to_toml()?.as_bytes())?;
+            document.extended_model = Some(path.display().to_string());
+        }
+        write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(&document)?)?;
+        terminal.remark(&format!("findings in {}", out.display()));
+    } else if extended.is_ok() {
+        document.extended_model_why_null = Some("it is written where --out says".to_owned());
+    }
+    show(&document, terminal)?;
+    terminal.document(&document)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.say(&document.sentence)?;
+    if !document.findings.is_empty() {
+        let mut findings = table(&["finding", "names", "probability", "z"], 2);
+        for finding in &document.findings {
+            findings.add_row([
+                finding.id.clone(),
+                finding.names.join(", "),
+                cell(Some(finding.probability), 1.0, 2),
+                cell(Some(finding.z), 1.0, 1),
+            ]);
+        }
+        terminal.say(&findings.to_string())?;
+        for finding in &document.findings {
+            terminal.say(&finding.sentence)?;
+        }
+    }
+    for check in document.checks.iter().filter(|check| !check.passes) {
+        terminal.say(&format!("fails: {} (p = {:.1e})", check.name, check.p_value))?;
+    }
+    if let Some(gain) = &document.gain {
+        let score = gain.log_score_per_observation;
+        terminal.say(&format!(
+            "held out, {} units: log score a value {:.4} → {:.4} (gain {:.4} to {:.4})",
+            gain.held_out_runs, score.base, score.extended, score.low, score.high
+        ))?;
+        if let Some(drift) = gain.drift_percent {
+            terminal.say(&format!(
+                "held out, drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
+                drift.base, drift.extended, drift.low, drift.high
+            ))?;
+        }
+    }
+    let blind: Vec<&str> = document.blind_to.iter().map(|blind| blind.id.as_str()).collect();
+    if !blind.is_empty() {
+        terminal.say(&format!("this data could not have shown: {}", blind.join(", ")))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! Effects hidden in simulated robots are found and named, nulls are left alone, and what is not in the catalogue gets no other name.
+//!
+//! The simulator's forward faces are other code and other functional forms than the hypotheses. Every case prints its seed; a case is driven once with it.
+//! Seen to fail when the scan forgets to project the calibration out, and when wheel phases start anew in every run.
+
+use dataset::{Dataset, Schedule};
+use diagnose::{Document, Options, Verdict, diagnose};
+use effects::Effect;
+use scenario::Scenario;
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+const MOTION_CAPTURE: &str = include_str!("../scenarios/motion-capture.toml");
+
+/// Straights, spins, squares and circles under motion capture, with calibration errors and one more effect.
+fn robot(extra: &str) -> Scenario {
+    #[derive(serde::Deserialize)]
+    struct List {
+        #[serde(default)]
+        effect: Vec<Effect>,
+    }
+    let mut scenario = Scenario::parse(MOTION_CAPTURE, "motion-capture.toml").expect("the shipped scenario");
+    scenario.effects.retain(|effect| ["wheel_scale", "wheel_mismatch", "wheelbase"].contains(&effect.id()));
+    scenario.effects.extend(toml::from_str::<List>(extra).expect("an effect").effect);
+    scenario.protocols = vec![
+        Schedule::Straights { length_m: 1.5, runs: 6 },
+        Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 4 },
+        Schedule::Squares { side_m: 1.0, runs_each_way: 2 },
+        Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 2 },
+    ];
+    scenario
+}
+
+fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
+    sim_yair::simulate(scenario, seed, 0).expect("simulates").dataset
+}
+
+fn diagnosed(dataset: &Dataset, without: &[&str]) -> Document {
+    let options = Options { without: without.iter().map(ToString::to_string).collect() };
+    diagnose(std::slice::from_ref(dataset), &options).expect("a diagnosis").document
+}
+
+fn shown(document: &Document) -> Vec<String> {
+    document.findings.iter().map(|finding| finding.names.join("|")).collect()
+}
+
+/// An effect with sizes that a real robot has, and the names that are right: its own, and what is the same thing to first order on every path.
+const HIDDEN: [(&str, &str, &[&str]); 12] = [
+    ("slip_speed", "slip_s_m = 0.03", &["slip_speed"]),
+    ("wheel_eccentricity", "right_amplitude = 0.004\nright_phase_rad = 1.0", &["wheel_eccentricity"]),
+    ("backlash", "left_gap_m = 0.001\nright_gap_m = 0.001", &["backlash"]),
+    ("lateral_skid", "skid_s = 0.02", &["lateral_skid"]),
+    ("truth_lever_arm", "lever_x_m = 0.01\nlever_y_m = 0.005", &["truth_lever_arm"]),
+    ("truth_latency", "delay_s = 0.03", &["truth_latency", "slip_acceleration"]),
+    ("carpet_nap", "drift_x = 0.003\ndrift_y = 0.002", &["carpet_nap"]),
+    ("direction_asymmetry", "left_asymmetry = 0.004", &["direction_asymmetry"]),
+    ("turn_rate_wheelbase", "beta_s = 0.02", &["turn_rate_wheelbase"]),
+    ("truth_outliers", "probability = 0.01\njump_m = 0.05\njump_rad = 0.05", &["truth_outliers"]),
+    ("truth_correlated_noise", "sigma_xy_m = 0.001\nsigma_theta_rad = 0.001\ntau_s = 1.0", &["truth_correlated_noise"]),
+    ("swapped_wheels", "swapped = true", &["swapped_wheels"]),
+];
+
+fn case(id: &str, sizes: &str) -> Scenario {
+    robot(&format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n"))
+}
+
+#[test]
+fn a_hidden_effect_is_named() {
+    for (number, (id, sizes, right)) in HIDDEN.iter().enumerate() {
+        let seed = 9_000 + number as u64;
+        let document = diagnosed(&simulated(&case(id, sizes), seed), &[]);
+        println!("{id} (seed {seed}): {:?}, {:?}", document.verdict, shown(&document));
+        let first = document.findings.first().unwrap_or_else(|| panic!("{id}: nothing was found"));
+        assert!(right.contains(&first.names[0].as_str()), "{id}: {:?}", shown(&document));
+        assert!(first.names.iter().any(|name| name == id), "{id}: {:?}", shown(&document));
+        if let Some(gain) = &document.gain {
+            assert!(gain.log_score_per_observation.low > 0.0, "{id}: {gain:?}");
+        }
+    }
+}
+
+/// Family-wise over all gates at most 5 %. As many nulls as YAIR_NULLS says, 40 without; the test fails where so many alarms have a chance of 1e-3 at 5 %.
+#[test]
+fn nulls_are_consistent() {
+    let nulls: u64 = std::env::var("YAIR_NULLS").ok().and_then(|text| text.parse().ok()).unwrap_or(40);
+    let scenario = robot("");
+    let mut alarms = 0;
+    for seed in 0..nulls {
+        let document = diagnosed(&simulated(&scenario, 20_000 + seed), &[]);
+        if document.verdict != Verdict::Consistent {
+            println!("alarm at seed {}: {:?}", 20_000 + seed, shown(&document));
+            alarms += 1;
+        }
+    }
+    println!("{alarms} alarms in {nulls} nulls");
+    let binomial = Binomial::new(0.05, nulls).expect("a rate");
+    let bound = (0..nulls).find(|count| binomial.sf(*count) < 1e-3).unwrap_or(nulls);
+    assert!(alarms <= bound, "{alarms} alarms in {nulls}; at 5 % more than {bound} have a chance below 1e-3");
+}
+
+/// Taken out of the catalogue, an effect may show as `unlisted`, or stay unseen, or among several names; a single other name would be a lie.
+#[test]
+fn what_is_not_in_the_catalogue_gets_no_other_name() {
+    for (number, (id, sizes, right)) in HIDDEN.iter().enumerate().filter(|(_, (id, ..))| *id != "swapped_wheels") {
+        let seed = 9_000 + number as u64;
+        let document = diagnosed(&simulated(&case(id, sizes), seed), &[id]);
+        println!("{id} taken out (seed {seed}): {:?}, {:?}", document.verdict, shown(&document));
+        let same_thing = document.findings.iter().all(|finding| right.contains(&finding.names[0].as_str()));
+        assert!(document.verdict != Verdict::Named || same_thing, "{id}: {:?}", shown(&document));
+    }
+}
+
+#[test]
+fn the_extended_scenario_shows_the_same_effect() {
+    for (id, sizes) in [("turn_rate_wheelbase", "beta_s = 0.02"), ("carpet_nap", "drift_x = 0.003\ndrift_y = 0.002")] {
+        let dataset = simulated(&case(id, sizes), 31);
+        let found = diagnose(&[dataset], &Options::default()).expect("a diagnosis");
+        let extended = found.extended.expect("a scenario");
+        assert!(extended.effects.iter().any(|effect| effect.id() == id), "{id}: {:?}", extended.effects);
+        let again = diagnosed(&simulated(&extended, 32), &[]);
+        println!("{id} again: {:?}", shown(&again));
+        assert!(again.findings.iter().any(|finding| finding.names[0] == id), "{id}: {:?}", shown(&again));
+    }
+}
