@@ -1,48 +1,181 @@
-//! The dead-reckoning core: online, and over a whole log with every pose stored.
+//! Dead reckoning against what it could cost: a plain loop with the C library's sine and cosine, and a copy of the same bytes.
+//!
+//! Every round times all contenders in turn, and what is printed are medians over rounds, of times and of ratios within a round: a machine that is busy with
+//! other things slows both sides. `docs/performance.md` has a run of it. Arguments: `--quick` for a tenth of the rounds and no log that exceeds the caches.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use kinematics::{Odometry, Pose, Rule, Wheels};
+mod plain;
+
 use std::hint::black_box;
+use std::time::Instant;
 
-const STEPS: i64 = 1_000_000;
+use kinematics::{Fleet, InstructionSet, Odometry, Pose, Rule, Wheels};
+
+/// Bytes that a step of a log moves: two counts in, a pose out.
+const BYTES_A_STEP: usize = 2 * size_of::<i64>() + size_of::<Pose>();
+
+fn odometry(rule: Rule) -> Odometry {
+    Odometry { m_per_count: Wheels { left: 1.0334e-3, right: 1.0322e-3 }, wheel_separation_m: 0.363, rule }
+}
 
 /// A wandering robot of some ten counts a step.
-fn counts() -> Wheels<Vec<i64>> {
+fn counts(steps: usize) -> Wheels<Vec<i64>> {
     let column = |bend: i64| {
-        (0..STEPS)
-            .scan(0, |sum, k| {
+        (0..)
+            .scan(0, |sum, k: i64| {
                 *sum += 10 + (k / 1000 * bend) % 7 - 3;
                 Some(*sum)
             })
+            .take(steps)
             .collect()
     };
     Wheels { left: column(3), right: column(5) }
 }
 
-fn dead_reckoning(criterion: &mut Criterion) {
-    let counts = counts();
-    let columns = Wheels { left: &counts.left[..], right: &counts.right[..] };
-    let mut group = criterion.benchmark_group("dead_reckoning");
-    group.throughput(Throughput::Elements(STEPS.unsigned_abs()));
-    group.sample_size(20);
-    for (name, rule) in [("midpoint", Rule::Midpoint), ("exact_arc", Rule::ExactArc)] {
-        let odometry =
-            Odometry { m_per_count: Wheels { left: 1.0334e-3, right: 1.0322e-3 }, wheel_separation_m: 0.363, rule };
-        group.bench_function(format!("online/{name}"), |bencher| {
-            bencher.iter(|| {
-                let mut state = odometry.start(Pose::IDENTITY, Wheels::both(0_i64));
-                for (&left, &right) in columns.left.iter().zip(columns.right) {
-                    black_box(state.update(Wheels { left, right }));
-                }
-                state.world_from_body()
-            });
-        });
-        group.bench_function(format!("whole_log/{name}"), |bencher| {
-            bencher.iter(|| odometry.trajectory(Pose::IDENTITY, black_box(columns)));
-        });
-    }
-    group.finish();
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
-criterion_group!(benches, dead_reckoning);
-criterion_main!(benches);
+/// One thing to be timed.
+struct Contender<'a> {
+    name: String,
+    run: Box<dyn FnMut() + 'a>,
+}
+
+impl<'a> Contender<'a> {
+    fn new(name: impl Into<String>, run: impl FnMut() + 'a) -> Self {
+        Self { name: name.into(), run: Box::new(run) }
+    }
+}
+
+/// Times contenders in turn and prints each beside the first and beside the last.
+#[allow(clippy::print_stdout, clippy::cast_precision_loss)]
+fn race(
+    title: &str,
+    (steps, rounds): (usize, usize),
+    (bytes_a_step, last): (usize, &str),
+    mut contenders: Vec<Contender<'_>>,
+) {
+    // A round is to take a millisecond at least.
+    let turns = (300_000 / steps).max(1);
+    let times: Vec<Vec<f64>> = (0..rounds)
+        .map(|_| {
+            let time = |contender: &mut Contender<'_>| {
+                let started = Instant::now();
+                (0..turns).for_each(|_| (contender.run)());
+                started.elapsed().as_secs_f64() / (turns * steps) as f64
+            };
+            contenders.iter_mut().map(time).collect()
+        })
+        .collect();
+    println!("\n{title}, {steps} steps");
+    println!("{:<34} {:>8} {:>7} {:>11} {:>12}", "", "ns/step", "GB/s", "x plain", last);
+    for (k, contender) in contenders.iter().enumerate() {
+        let of = |ratio: &dyn Fn(&[f64]) -> f64| median(times.iter().map(|times| ratio(times)).collect());
+        let seconds = of(&|times| times[k]);
+        let faster = of(&|times| times[0] / times[k]);
+        let of_copy = of(&|times| times[times.len() - 1] / times[k]);
+        let (ns, gb_s) = (1e9 * seconds, 1e-9 * bytes_a_step as f64 / seconds);
+        println!("{:<34} {ns:>8.2} {gb_s:>7.1} {faster:>11.2} {:>10.0} %", contender.name, 100.0 * of_copy);
+    }
+}
+
+/// A log with every pose stored, by each instruction set.
+fn whole_log(steps: usize, rounds: usize) {
+    let counts = counts(steps);
+    let columns = Wheels { left: &counts.left[..], right: &counts.right[..] };
+    // Half of the bytes are read and half written.
+    let source = vec![1_u8; steps * BYTES_A_STEP / 2];
+    for (name, rule) in [("midpoint", Rule::Midpoint), ("exact arc", Rule::ExactArc)] {
+        let odometry = odometry(rule);
+        let buffers = || (vec![Pose::IDENTITY; steps], vec![0_u8; source.len()]);
+        let ((mut plain_poses, mut copied), (mut poses, _)) = (buffers(), buffers());
+        let poses = std::cell::RefCell::new(&mut poses);
+        let mut contenders = vec![Contender::new("plain loop, C library", || {
+            plain::trajectory(&odometry, Pose::IDENTITY, black_box(columns), &mut plain_poses);
+        })];
+        for set in InstructionSet::available() {
+            let poses = &poses;
+            contenders.push(Contender::new(format!("trajectory_into, {}", set.name()), move || {
+                odometry.trajectory_into_by(set, Pose::IDENTITY, black_box(columns), &mut poses.borrow_mut());
+            }));
+        }
+        contenders.push(Contender::new("final_pose", || {
+            black_box(odometry.final_pose(Pose::IDENTITY, black_box(columns)));
+        }));
+        contenders.push(Contender::new("update, one by one", || {
+            let mut state = odometry.start(Pose::IDENTITY, Wheels::both(0_i64));
+            for ((&left, &right), pose) in columns.left.iter().zip(columns.right).zip(poses.borrow_mut().iter_mut()) {
+                *pose = state.update(Wheels { left, right });
+            }
+        }));
+        contenders.push(Contender::new("copy of the same bytes", || {
+            copied.copy_from_slice(black_box(&source));
+            black_box(&mut copied);
+        }));
+        race(&format!("Whole log, {name}"), (steps, rounds), (BYTES_A_STEP, "of a copy"), contenders);
+    }
+}
+
+/// Many robots, a row of counts at a time.
+fn fleet(robots: usize, rows: usize, rounds: usize) {
+    let odometry = odometry(Rule::ExactArc);
+    let one = counts(rows);
+    let spread = |column: &[i64]| -> Vec<i64> {
+        #[allow(clippy::cast_possible_wrap)]
+        column.iter().flat_map(|count| (0..robots).map(move |robot| count * (1 + robot as i64 % 3))).collect()
+    };
+    let counts = Wheels { left: spread(&one.left), right: spread(&one.right) };
+    let start = vec![Pose::IDENTITY; robots];
+    let first = Wheels { left: &counts.left[..robots], right: &counts.right[..robots] };
+    let row = |row: usize, lanes: std::ops::Range<usize>| {
+        let range = row * robots + lanes.start..row * robots + lanes.end;
+        Wheels { left: &counts.left[range.clone()], right: &counts.right[range] }
+    };
+    let mut contenders = vec![Contender::new("plain loop, C library", || {
+        black_box(plain::fleet(&odometry, &start, black_box(first), rows, |k| row(k, 0..robots)));
+    })];
+    for set in InstructionSet::available() {
+        let (start, row) = (&start, &row);
+        contenders.push(Contender::new(format!("Fleet, {}", set.name()), move || {
+            let mut fleet = Fleet::by(set, odometry, start, black_box(first));
+            (1..rows).for_each(|k| fleet.update(row(k, 0..robots)));
+            black_box(&fleet);
+        }));
+    }
+    for threads in [1, 2] {
+        let (start, row) = (&start, &row);
+        contenders.push(Contender::new(format!("Fleet, {threads} threads"), move || {
+            std::thread::scope(|scope| {
+                for thread in 0..threads {
+                    let lanes = thread * robots / threads..(thread + 1) * robots / threads;
+                    scope.spawn(move || {
+                        let mut fleet = Fleet::new(odometry, &start[lanes.clone()], row(0, lanes.clone()));
+                        (1..rows).for_each(|k| fleet.update(row(k, lanes.clone())));
+                        black_box(&fleet);
+                    });
+                }
+            });
+        }));
+    }
+    race(
+        &format!("{robots} robots, exact arc"),
+        (robots * rows, rounds),
+        (2 * size_of::<i64>(), "of 2 threads"),
+        contenders,
+    );
+}
+
+fn main() {
+    let quick = std::env::args().any(|argument| argument == "--quick" || argument == "--test");
+    let rounds = if quick { 5 } else { 41 };
+    for steps in [100, 1_000, 100_000] {
+        whole_log(steps, rounds);
+    }
+    if !quick {
+        whole_log(10_000_000, 9);
+    }
+    for robots in [8, 64, 1_000, 10_000] {
+        fleet(robots, 300_000 / robots, rounds);
+    }
+}

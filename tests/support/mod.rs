@@ -19,7 +19,7 @@ pub(crate) fn run_in(folder: &Path, arguments: &[&str]) -> Ended {
     let output = Command::new(env!("CARGO_BIN_EXE_yair"))
         .current_dir(folder)
         .args(arguments)
-        .timeout(std::time::Duration::from_secs(60))
+        .timeout(std::time::Duration::from_secs(240))
         .output()
         .expect("yair starts");
     let text = |bytes| String::from_utf8(bytes).expect("yair speaks UTF-8");

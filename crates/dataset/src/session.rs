@@ -1,6 +1,6 @@
 //! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies nothing.
 
-use kinematics::{Count, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near};
+use kinematics::{Count, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, atan2, unwrap_near};
 
 use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, Run, RunInfo, TruthNoise, WheelLog};
 
@@ -231,7 +231,7 @@ fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose
     if dot == 0.0 && cross == 0.0 {
         return None;
     }
-    let theta_rad = cross.atan2(dot);
+    let theta_rad = atan2(cross, dot);
     let turned = Pose::new(0.0, 0.0, theta_rad) * body;
     Some(Pose::new(room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad))
 }

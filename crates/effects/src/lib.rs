@@ -85,13 +85,14 @@ macro_rules! contents {
             }
         }
 
-        /// The effect of an id with the sizes that a fit found; `None` when they do not make one.
+        /// The effect of an id with the sizes that a fit found; `None` when they do not make a physical one.
         #[must_use]
         pub fn effect_of_sizes(id: &str, sizes: &[(&str, f64)]) -> Option<Effect> {
             match id {
                 $(stringify!($module) => <$Type as PhysicalEffect>::of_sizes(sizes).map(Effect::$Type),)*
                 _ => None,
             }
+            .filter(|effect: &Effect| effect.physical().check().is_ok())
         }
 
         /// Every id of the catalogue, in the order in which the effects act.

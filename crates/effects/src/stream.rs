@@ -57,22 +57,24 @@ impl Address {
     }
 
     /// All streams of this address: what they share is worked out once.
+    #[inline]
     #[must_use]
     pub fn streams(&self) -> Streams {
         // Point and run share a word.
         let place = u64::from(self.point) << 32 | u64::from(self.run);
         let seed = mix(self.seed);
         let trial = mix(self.trial ^ seed);
-        Streams { seed, trial, place: mix(place ^ trial) }
+        Streams { seed, trial, place: mix(place ^ trial), half_widths: &HALF_WIDTHS }
     }
 }
 
 /// The streams of one address: its words, each mixed with the ones before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Streams {
     seed: u64,
     trial: u64,
     place: u64,
+    half_widths: &'static [f64; LAYERS + 1],
 }
 
 impl Streams {
@@ -85,7 +87,7 @@ impl Streams {
         let place = mix(self.place ^ name);
         let trial = mix(self.trial ^ place);
         let seed = mix(self.seed ^ trial);
-        Stream { rng: Xoshiro256PlusPlus([seed, trial, place, name]), half_widths: &HALF_WIDTHS }
+        Stream { rng: Xoshiro256PlusPlus([seed, trial, place, name]), half_widths: self.half_widths }
     }
 }
 

@@ -11,6 +11,7 @@
 
 use nalgebra::{Matrix3, Matrix3x2, Vector2};
 
+use crate::trig::{sin_cos, sinc_given_sine};
 use crate::{Increment, Pose, Wheels, sinc, sinc_derivative};
 
 /// Random-walk noise of each wheel's travel over the ground: standard deviation per square root of travel, m/√m.
@@ -47,28 +48,45 @@ impl ArcScatter {
     #[inline]
     #[must_use]
     pub fn within(travel_m: Wheels<f64>, travel_var_m2: Wheels<f64>, wheel_separation_m: f64) -> Self {
-        let turn_rad = (travel_m.right - travel_m.left) / wheel_separation_m;
+        let per_m = 1.0 / wheel_separation_m;
+        let turn_rad = (travel_m.right - travel_m.left) * per_m;
         let weight = (travel_var_m2.right * travel_m.left * travel_m.left
             + travel_var_m2.left * travel_m.right * travel_m.right)
-            / (wheel_separation_m * wheel_separation_m);
+            * (per_m * per_m);
         let (along, across) = tangent_variance_over_turn_squared(turn_rad);
         Self { along_var_m2: weight * along, across_var_m2: weight * across }
     }
 }
 
 /// Variances of the unit tangent over an arc of turn θ, along and across the chord, divided by θ².
+#[inline]
 fn tangent_variance_over_turn_squared(turn_rad: f64) -> (f64, f64) {
-    let tt = turn_rad * turn_rad;
     if turn_rad.abs() < TANGENT_SERIES_BELOW_RAD {
-        // Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − ..., ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − ...
-        let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt * (1.0 / 119_750_400.0))));
-        let across = 1.0 / 12.0
-            - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt * (1.0 / 79_833_600.0))));
-        (along, across)
+        tangent_series(turn_rad)
     } else {
-        let (half, whole) = (sinc(0.5 * turn_rad), sinc(turn_rad));
-        ((0.5 * (1.0 + whole) - half * half) / tt, 0.5 * (1.0 - whole) / tt)
+        let (sin, cos) = sin_cos(0.5 * turn_rad);
+        tangent_closed_form(turn_rad, sin, cos)
     }
+}
+
+/// Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − …, ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − …
+#[inline(always)]
+fn tangent_series(turn_rad: f64) -> (f64, f64) {
+    let tt = turn_rad * turn_rad;
+    let along = tt * (1.0 / 720.0 - tt * (1.0 / 20_160.0 - tt * (1.0 / 1_209_600.0 - tt * (1.0 / 119_750_400.0))));
+    let across =
+        1.0 / 12.0 - tt * (1.0 / 240.0 - tt * (1.0 / 10_080.0 - tt * (1.0 / 725_760.0 - tt * (1.0 / 79_833_600.0))));
+    (along, across)
+}
+
+/// By sine and cosine of half the turn; sinc θ = sinc(θ/2)·cos(θ/2).
+#[inline(always)]
+fn tangent_closed_form(turn_rad: f64, sin: f64, cos: f64) -> (f64, f64) {
+    // The division first, which then is done when the sine is.
+    let per_tt = 1.0 / (turn_rad * turn_rad);
+    let half = sinc_given_sine(0.5 * turn_rad, sin);
+    let whole = half * cos;
+    ((0.5 * (1.0 + whole) - half * half) * per_tt, 0.5 * (1.0 - whole) * per_tt)
 }
 
 /// Covariance of a dead-reckoned pose, world axes, order x, y, θ.
@@ -111,7 +129,7 @@ impl OdometryCovariance {
         transition[(1, 2)] = displacement.x_m - world_from_body.x_m;
 
         let scatter = ArcScatter::within(travel_m, travel_var_m2, wheel_separation_m);
-        let (sin, cos) = chord_heading_rad.sin_cos();
+        let (sin, cos) = sin_cos(chord_heading_rad);
         let (along, across) = (scatter.along_var_m2, scatter.across_var_m2);
         let mut within = Matrix3::zeros();
         within[(0, 0)] = cos * cos * along + sin * sin * across;
@@ -128,7 +146,7 @@ impl OdometryCovariance {
 /// ∂(x, y, θ)/∂(s_L, s_R) of an exact arc whose chord points along `chord_heading_rad`.
 fn arc_jacobian(increment: Increment, chord_heading_rad: f64, wheel_separation_m: f64) -> Matrix3x2<f64> {
     let half_rad = 0.5 * increment.turn_rad;
-    let (sin, cos) = chord_heading_rad.sin_cos();
+    let (sin, cos) = sin_cos(chord_heading_rad);
     let chord = sinc(half_rad);
     // p = s·sinc(θ/2)·(cos, sin)(θ₀ + θ/2)
     let by_distance = Vector2::new(chord * cos, chord * sin);

@@ -3,8 +3,12 @@
 //! Position follows eq. (3), `x += ΔS cos(θ+Δθ/2)`, with the arc as the chord ([`Rule::Midpoint`], the paper) or the exact
 //! chord `ΔS·sinc(Δθ/2)` ([`Rule::ExactArc`]). Heading is *not* summed: it is a function of the counts since the start,
 //! `θ = θ₀ + (C_R N_R − C_L N_L)/B`, so ten million steps leave no rounding drift in it and steps do not wait for each other.
+//! Displacements are summed from nothing over 64 steps at a time, and what the sum of these sums drops is carried along: the place's error does not grow
+//! with the number of steps either. `whole_log.rs` does the same with columns.
 
-use crate::{Pose, Wheels, sinc};
+use crate::trig::sin_cos;
+use crate::whole_log::{self, Every, Last, Rows};
+use crate::{InstructionSet, OdometryCovariance, Pose, WheelNoise, Wheels, sinc};
 
 /// How one step's wheel travel becomes a displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,24 +22,63 @@ pub enum Rule {
 
 /// A cumulative wheel reading: integer counts or a real angle.
 pub trait Count: Copy + Send + Sync {
+    /// Does [`Self::column_since`] convert by bits, which gives nonsense beyond its range?
+    const CONVERTS_BY_BITS: bool = false;
+
     /// `self − earlier` as a real number. Integers subtract before they convert, so large counters lose nothing.
     fn since(self, earlier: Self) -> f64;
+
+    /// [`Self::since`] of a whole column, and whether the differences of these numbers are the steps between the readings, exactly.
+    #[inline(always)]
+    fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
+        for (k, (since, count)) in since.iter_mut().zip(column).enumerate() {
+            *since = count.since(earlier(k));
+        }
+        false
+    }
 }
 
 impl Count for i32 {
+    #[inline(always)]
     fn since(self, earlier: Self) -> f64 {
         f64::from(self) - f64::from(earlier)
+    }
+
+    #[inline(always)]
+    fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
+        for (k, (since, count)) in since.iter_mut().zip(column).enumerate() {
+            *since = count.since(earlier(k));
+        }
+        true
     }
 }
 
 impl Count for i64 {
+    const CONVERTS_BY_BITS: bool = true;
+
     #[allow(clippy::cast_precision_loss)] // 2^53 counts are 10^10 km of wheel travel
+    #[inline(always)]
     fn since(self, earlier: Self) -> f64 {
         self.wrapping_sub(earlier) as f64
+    }
+
+    /// Before AVX-512 no vector instruction makes doubles of 64-bit integers: the integer is added to the bits of 1.5·2⁵², and 1.5·2⁵² taken away.
+    #[inline(always)]
+    fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
+        const SHIFTER: f64 = 6_755_399_441_055_744.0;
+        let mut beyond = 0;
+        for (k, (since, count)) in since.iter_mut().zip(column).enumerate() {
+            let counts = count.wrapping_sub(earlier(k));
+            *since = f64::from_bits(SHIFTER.to_bits().wrapping_add_signed(counts)) - SHIFTER;
+            // Any bit above the 51st says that the number is not within ±2⁵¹.
+            beyond |= counts.wrapping_add(1 << 51).cast_unsigned() >> 52;
+        }
+        beyond == 0
     }
 }
 
 impl Count for f64 {
+    #[inline(always)]
     fn since(self, earlier: Self) -> f64 {
         self - earlier
     }
@@ -53,30 +96,65 @@ pub struct Odometry {
 }
 
 impl Odometry {
+    /// Turn for a count of each wheel, radians.
+    #[inline(always)]
+    pub(crate) fn rad_per_count(&self) -> Wheels<f64> {
+        self.m_per_count.map(|m_per_count| m_per_count / self.wheel_separation_m)
+    }
+
     /// Starts online dead reckoning at a pose and the counters' readings there.
     #[must_use]
     pub fn start<C: Count>(&self, world_from_body: Pose, counts: Wheels<C>) -> DeadReckoning<C> {
         DeadReckoning {
-            rad_per_count: self.m_per_count.map(|m_per_count| m_per_count / self.wheel_separation_m),
+            rad_per_count: self.rad_per_count(),
             odometry: *self,
             start_theta_rad: world_from_body.theta_rad,
             start_counts: counts,
             counts,
+            place: [Place::at(world_from_body.x_m), Place::at(world_from_body.y_m)],
+            steps: 0,
             world_from_body,
         }
     }
 
     /// The pose at every row of a log, the first being the start pose.
     ///
-    /// Cost: one sine and cosine a row; 24 bytes a row.
+    /// Cost: docs/performance.md; 24 bytes a row.
     ///
     /// # Panics
     /// When the two columns differ in length: they are columns of one table.
     #[must_use]
     pub fn trajectory<C: Count>(&self, start: Pose, counts: Wheels<&[C]>) -> Vec<Pose> {
-        let mut poses = Vec::with_capacity(counts.left.len());
-        self.for_each_pose(start, counts, |pose| poses.push(pose));
+        let mut poses = vec![start; counts.left.len()];
+        self.trajectory_into(start, counts, &mut poses);
         poses
+    }
+
+    /// [`Self::trajectory`] into poses that are there.
+    ///
+    /// # Panics
+    /// When the two columns and `poses` differ in length.
+    pub fn trajectory_into<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, poses: &mut [Pose]) {
+        self.trajectory_into_by(InstructionSet::widest(), start, counts, poses);
+    }
+
+    /// [`Self::trajectory_into`] by a given instruction set: the same bits, at another speed.
+    ///
+    /// # Panics
+    /// As [`Self::trajectory_into`].
+    pub fn trajectory_into_by<C: Count>(
+        &self,
+        set: InstructionSet,
+        start: Pose,
+        counts: Wheels<&[C]>,
+        poses: &mut [Pose],
+    ) {
+        assert_eq!(counts.left.len(), poses.len(), "one pose a row");
+        let Some((state, steps)) = self.first_row(start, counts) else { return };
+        if let Some((first, later)) = poses.split_first_mut() {
+            *first = start;
+            whole_log::walk(set, state, steps, Every(later));
+        }
     }
 
     /// The pose at the last row of a log; the start pose for an empty one.
@@ -85,9 +163,50 @@ impl Odometry {
     /// When the two columns differ in length.
     #[must_use]
     pub fn final_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>) -> Pose {
-        let mut last = start;
-        self.for_each_pose(start, counts, |pose| last = pose);
-        last
+        let Some((state, steps)) = self.first_row(start, counts) else { return start };
+        whole_log::walk(InstructionSet::widest(), state, steps, Last).world_from_body()
+    }
+
+    /// The poses at some rows of a log, nothing else being stored: `rows` count from 0 and do not fall.
+    ///
+    /// # Panics
+    /// When the two columns differ in length, or a row is not among theirs or below the one before it.
+    #[must_use]
+    pub fn poses_at<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, rows: &[usize]) -> Vec<Pose> {
+        assert!(rows.is_sorted(), "rows in their order");
+        assert!(rows.last().is_none_or(|last| *last < counts.left.len()), "rows of the log");
+        let mut poses = vec![start; rows.iter().take_while(|row| **row == 0).count()];
+        if let Some((state, steps)) = self.first_row(start, counts) {
+            let rows = &rows[poses.len()..];
+            whole_log::walk(InstructionSet::widest(), state, steps, Rows::new(rows, &mut poses));
+        }
+        poses
+    }
+
+    /// Calls `visit` with pose and covariance at every row of a log in order, storing nothing: each step an exact arc ([`OdometryCovariance::propagate`])
+    /// of wheels whose travel carries `noise`.
+    ///
+    /// # Panics
+    /// When the two columns differ in length.
+    pub fn for_each_pose_with_covariance<C: Count>(
+        &self,
+        (start, covariance): (Pose, OdometryCovariance),
+        counts: Wheels<&[C]>,
+        noise: &WheelNoise,
+        mut visit: impl FnMut(Pose, &OdometryCovariance),
+    ) {
+        let (mut covariance, mut before) = (covariance, None);
+        let mut rows = counts.left.iter().zip(counts.right);
+        self.for_each_pose(start, counts, |pose| {
+            let now = rows.next().map(|(&left, &right)| Wheels { left, right });
+            if let (Some((from, before)), Some(now)) = (before, now) {
+                let steps: Wheels<f64> = now.zip_with(before, C::since);
+                let travel_m = steps.zip_with(self.m_per_count, |counts, m_per_count| counts * m_per_count);
+                covariance.propagate(from, travel_m, self.wheel_separation_m, noise);
+            }
+            before = now.map(|now| (pose, now));
+            visit(pose, &covariance);
+        });
     }
 
     /// Calls `visit` with the pose at every row of a log in order, storing nothing.
@@ -95,25 +214,90 @@ impl Odometry {
     /// # Panics
     /// When the two columns differ in length.
     pub fn for_each_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, mut visit: impl FnMut(Pose)) {
-        assert_eq!(counts.left.len(), counts.right.len(), "left and right counts are columns of one table");
-        let (Some(&left), Some(&right)) = (counts.left.first(), counts.right.first()) else { return };
-        let mut state = self.start(start, Wheels { left, right });
+        let Some((mut state, steps)) = self.first_row(start, counts) else { return };
         visit(start);
-        for (&left, &right) in counts.left.iter().zip(counts.right).skip(1) {
-            visit(state.update(Wheels { left, right }));
+        if steps.left.len() < whole_log::FEWEST_FOR_A_BLOCK {
+            for (&left, &right) in steps.left.iter().zip(steps.right) {
+                visit(state.update(Wheels { left, right }));
+            }
+            return;
         }
+        // By blocks of a length at which the copy of the poses stays in the nearest cache.
+        let mut poses = [start; whole_log::BLOCK];
+        for (left, right) in steps.left.chunks(whole_log::BLOCK).zip(steps.right.chunks(whole_log::BLOCK)) {
+            let poses = &mut poses[..left.len()];
+            state = whole_log::walk(InstructionSet::widest(), state, Wheels { left, right }, Every(poses));
+            poses.iter().copied().for_each(&mut visit);
+        }
+    }
+
+    /// Dead reckoning at the first row of a log, and the rows that follow; `None` for an empty one.
+    fn first_row<'a, C: Count>(
+        &self,
+        start: Pose,
+        counts: Wheels<&'a [C]>,
+    ) -> Option<(DeadReckoning<C>, Wheels<&'a [C]>)> {
+        assert_eq!(counts.left.len(), counts.right.len(), "left and right counts are columns of one table");
+        let ((left, later_left), (right, later_right)) = (counts.left.split_first()?, counts.right.split_first()?);
+        Some((
+            self.start(start, Wheels { left: *left, right: *right }),
+            Wheels { left: later_left, right: later_right },
+        ))
+    }
+}
+
+/// Heading for the counts since the start: θ₀ + (C_R N_R − C_L N_L)/B, written so that only what the wheels differ by is rounded. The product of each wheel's
+/// own counts after 100 km is 3·10⁵ rad, whose last place is 6·10⁻¹¹ rad.
+#[inline(always)]
+pub(crate) fn heading_rad(start_rad: f64, rad_per_count: Wheels<f64>, left: f64, right: f64) -> f64 {
+    start_rad + (rad_per_count.right * (right - left) + (rad_per_count.right - rad_per_count.left) * left)
+}
+
+/// How many displacements are summed from nothing before they are added to the place.
+pub(crate) const GROUP: usize = 64;
+
+/// One coordinate of the robot's place, metres: where the group of steps began, what its sum dropped, and the group's own sum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) anchor_m: f64,
+    pub(crate) dropped_m: f64,
+    pub(crate) moved_m: f64,
+}
+
+impl Place {
+    const fn at(anchor_m: f64) -> Self {
+        Self { anchor_m, dropped_m: 0.0, moved_m: 0.0 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn now_m(&self) -> f64 {
+        self.anchor_m + (self.dropped_m + self.moved_m)
+    }
+
+    /// Ends a group: its sum goes to the anchor, and what the addition drops is kept (Knuth's two-sum).
+    #[inline(always)]
+    pub(crate) fn drop_anchor(&mut self) {
+        let moved_m = self.dropped_m + self.moved_m;
+        let sum_m = self.anchor_m + moved_m;
+        let of_moved_m = sum_m - self.anchor_m;
+        self.dropped_m = (self.anchor_m - (sum_m - of_moved_m)) + (moved_m - of_moved_m);
+        self.anchor_m = sum_m;
+        self.moved_m = 0.0;
     }
 }
 
 /// Online dead reckoning: feed it cumulative counts, read the pose.
 #[derive(Debug, Clone, Copy)]
 pub struct DeadReckoning<C> {
-    odometry: Odometry,
-    rad_per_count: Wheels<f64>,
-    start_theta_rad: f64,
-    start_counts: Wheels<C>,
-    counts: Wheels<C>,
-    world_from_body: Pose,
+    pub(crate) odometry: Odometry,
+    pub(crate) rad_per_count: Wheels<f64>,
+    pub(crate) start_theta_rad: f64,
+    pub(crate) start_counts: Wheels<C>,
+    pub(crate) counts: Wheels<C>,
+    pub(crate) place: [Place; 2],
+    /// In the group that is not at its end.
+    pub(crate) steps: usize,
+    pub(crate) world_from_body: Pose,
 }
 
 impl<C: Count> DeadReckoning<C> {
@@ -124,23 +308,30 @@ impl<C: Count> DeadReckoning<C> {
     }
 
     /// Takes new cumulative counts and returns the new pose (paper, eq. 1 to 3).
+    #[inline]
     pub fn update(&mut self, counts: Wheels<C>) -> Pose {
         let m_per_count = self.odometry.m_per_count;
         let distance_m = 0.5
             * (m_per_count.right * counts.right.since(self.counts.right)
                 + m_per_count.left * counts.left.since(self.counts.left));
-        let theta_rad = self.start_theta_rad
-            + (self.rad_per_count.right * counts.right.since(self.start_counts.right)
-                - self.rad_per_count.left * counts.left.since(self.start_counts.left));
+        let since = counts.zip_with(self.start_counts, C::since);
+        let theta_rad = heading_rad(self.start_theta_rad, self.rad_per_count, since.left, since.right);
         let half_turn_rad = 0.5 * (theta_rad - self.world_from_body.theta_rad);
         let chord_m = match self.odometry.rule {
             Rule::Midpoint => distance_m,
             Rule::ExactArc => distance_m * sinc(half_turn_rad),
         };
-        let (sin, cos) = (self.world_from_body.theta_rad + half_turn_rad).sin_cos();
-        self.world_from_body.x_m += chord_m * cos;
-        self.world_from_body.y_m += chord_m * sin;
-        self.world_from_body.theta_rad = theta_rad;
+        let (sin, cos) = sin_cos(self.world_from_body.theta_rad + half_turn_rad);
+        let [x, y] = &mut self.place;
+        x.moved_m += chord_m * cos;
+        y.moved_m += chord_m * sin;
+        self.world_from_body = Pose::new(x.now_m(), y.now_m(), theta_rad);
+        self.steps += 1;
+        if self.steps == GROUP {
+            x.drop_anchor();
+            y.drop_anchor();
+            self.steps = 0;
+        }
         self.counts = counts;
         self.world_from_body
     }

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use crate::angle::{sin_cos, sinc_given_sine};
-use crate::{Pose, Wheels};
+use crate::trig::{sin_cos, sinc_given_sine};
+use crate::{Frame, Pose, Wheels};
 
 /// Why a drive geometry or a count scale is not one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -126,7 +126,8 @@ impl Increment {
     pub fn from_travel(travel_m: Wheels<f64>, wheel_separation_m: f64) -> Self {
         Self {
             distance_m: 0.5 * (travel_m.right + travel_m.left),
-            turn_rad: (travel_m.right - travel_m.left) / wheel_separation_m,
+            // By the inverse, which is worked out while the travels still are.
+            turn_rad: (travel_m.right - travel_m.left) * (1.0 / wheel_separation_m),
         }
     }
 
@@ -134,22 +135,23 @@ impl Increment {
     #[inline]
     #[must_use]
     pub fn arc(self) -> Pose {
-        self.scattered_arc(0.0, 0.0)
+        self.scattered_arc(0.0, 0.0).pose()
     }
 
     /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead along it and to its left, metres.
     #[inline]
     #[must_use]
-    pub fn scattered_arc(self, along_m: f64, across_m: f64) -> Pose {
+    pub fn scattered_arc(self, along_m: f64, across_m: f64) -> Frame {
         let half_rad = 0.5 * self.turn_rad;
         let (sin, cos) = sin_cos(half_rad);
-        let chord_m = self.distance_m * sinc_given_sine(half_rad, || sin);
+        let chord_m = self.distance_m * sinc_given_sine(half_rad, sin);
         let mut before_from_after = Pose::new(chord_m * cos, chord_m * sin, self.turn_rad);
         if along_m != 0.0 || across_m != 0.0 {
             before_from_after.x_m += cos * along_m - sin * across_m;
             before_from_after.y_m += sin * along_m + cos * across_m;
         }
-        before_from_after
+        // The whole turn's from the half's: 2·sin·cos, 1 − 2·sin².
+        Frame::with_heading(before_from_after, (2.0 * sin * cos, 1.0 - 2.0 * sin * sin))
     }
 
     /// `before_from_after` by the paper's midpoint rule (eq. 3): the arc length taken for the chord.

@@ -48,6 +48,7 @@ impl<T> Wheels<T> {
         Self { left: value(Side::Left), right: value(Side::Right) }
     }
 
+    #[inline(always)]
     /// Applies `f` to each wheel's value.
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> Wheels<U> {
         Wheels { left: f(self.left), right: f(self.right) }

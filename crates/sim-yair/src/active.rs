@@ -103,6 +103,11 @@ impl ActiveEffects {
         self.at.command.is_empty() && self.at.encoder.is_empty()
     }
 
+    /// Does every row bear the time at which it is due?
+    pub(crate) fn leave_clocks_alone(&self) -> bool {
+        self.at.clock.is_empty()
+    }
+
     /// Does an effect change what the outside sees?
     #[inline]
     pub(crate) fn act_on_instruments(&self) -> bool {

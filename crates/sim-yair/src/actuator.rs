@@ -42,7 +42,11 @@ impl Actuator {
     /// Holds still.
     pub(crate) fn hold(&mut self, duration_s: f64) {
         match self {
-            Self::ClosedForm(drive) => drive.begin(Piece { rate_rad_s: Wheels::both(0.0), duration_s }),
+            Self::ClosedForm(drive) => {
+                if let Some(piece) = Piece::at_rest(duration_s) {
+                    drive.begin(piece);
+                }
+            }
             Self::Stepping(pair) => {
                 pair.hold_s = duration_s;
                 pair.sample_if_due();
@@ -72,9 +76,7 @@ impl Actuator {
     #[inline]
     pub(crate) fn count(&mut self, step: &Step) {
         match self {
-            Self::ClosedForm(drive) => {
-                drive.counts = drive.counts.zip_with(step.encoder_rad, |sum, rad| sum + rad * drive.counts_per_rad);
-            }
+            Self::ClosedForm(drive) => drive.count(step),
             Self::Stepping(pair) => pair.count(step),
         }
     }
@@ -83,7 +85,7 @@ impl Actuator {
     #[inline]
     pub(crate) fn counts(&self) -> Wheels<i64> {
         match self {
-            Self::ClosedForm(drive) => drive.counts.map(whole_counts),
+            Self::ClosedForm(drive) => drive.counts(),
             Self::Stepping(pair) => {
                 pair.servos.as_ref().map(Servo::counts).zip_with(pair.start_counts, |counts, start| counts + start)
             }
@@ -91,13 +93,24 @@ impl Actuator {
     }
 }
 
-/// The counts that a counter shows: the largest whole number not above. 2⁶³ counts are beyond any run.
+/// The counts that counters show: the largest whole numbers not above. 2⁶³ counts are beyond any run.
 #[inline]
-#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
-fn whole_counts(counts: f64) -> i64 {
-    // By the conversion, which cuts towards zero: without SSE 4.1 `floor` is a call.
-    let toward_zero = counts as i64;
-    toward_zero - i64::from(counts < toward_zero as f64)
+#[allow(clippy::cast_possible_truncation)]
+fn whole_counts(counts: Wheels<f64>) -> Wheels<i64> {
+    /// 1.5·2⁵²: what is added to it is rounded to a whole number, which stands in the low bits.
+    const SHIFTER: f64 = 6_755_399_441_055_744.0;
+    /// Below this the sum with the shifter does not leave its binade.
+    const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
+    if counts.left.abs() < SHIFTS_BELOW && counts.right.abs() < SHIFTS_BELOW {
+        // Without the calls that `floor` is before SSE 4.1, and the limits that a conversion looks at.
+        counts.map(|counts| {
+            let nearest = (counts + SHIFTER) - SHIFTER;
+            let below = if nearest > counts { nearest - 1.0 } else { nearest };
+            (below + SHIFTER).to_bits().cast_signed() - SHIFTER.to_bits().cast_signed()
+        })
+    } else {
+        counts.map(|counts| counts.floor() as i64)
+    }
 }
 
 /// The closed form: a piece of constant speed at a time.
@@ -128,6 +141,23 @@ impl ConstantSpeed {
             rate_rad_s: self.rate_rad_s,
             ..ShaftMotion::REST
         }
+    }
+
+    /// Turns the shafts for a whole piece.
+    #[inline]
+    pub(crate) fn whole(&mut self, piece: Piece) -> ShaftMotion {
+        self.begin(piece);
+        self.turn(piece.duration_s)
+    }
+
+    #[inline]
+    pub(crate) fn count(&mut self, step: &Step) {
+        self.counts = self.counts.zip_with(step.encoder_rad, |sum, rad| sum + rad * self.counts_per_rad);
+    }
+
+    #[inline]
+    pub(crate) fn counts(&self) -> Wheels<i64> {
+        whole_counts(self.counts)
     }
 }
 
@@ -198,6 +228,13 @@ impl Profile {
 pub(crate) struct Piece {
     rate_rad_s: Wheels<f64>,
     pub(crate) duration_s: f64,
+}
+
+impl Piece {
+    /// Standing still, if only for a while.
+    pub(crate) fn at_rest(duration_s: f64) -> Option<Self> {
+        (duration_s > 0.0).then_some(Self { rate_rad_s: Wheels { left: 0.0, right: 0.0 }, duration_s })
+    }
 }
 
 /// A motion in pieces of constant speed.

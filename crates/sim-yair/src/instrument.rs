@@ -47,6 +47,11 @@ impl Observer {
         }
     }
 
+    /// Does the instrument look at the robot when nobody asks it to?
+    pub(crate) const fn looks_by_itself(&self) -> bool {
+        matches!(self.instrument, Instrument::MotionCapture { .. } | Instrument::Tachometer { .. })
+    }
+
     /// A look at the moving robot at [`Self::next_look_s`], whose contacts have gone so far over the ground.
     pub(crate) fn look(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
         if let Instrument::Tachometer { rate_hz, sigma_m_s } = self.instrument {
@@ -83,32 +88,44 @@ impl Observer {
 
     /// A reading of the standing robot's marks on the floor grid.
     #[inline]
-    pub(crate) fn read_standing(&mut self, t_s: f64, world_from_body: Frame, points: &[MarkedPoint], run: &mut Run) {
+    pub(crate) fn read_standing(
+        &mut self,
+        t_s: f64,
+        world_from_body: Frame,
+        points: &[MarkedPoint],
+        readings: &mut Vec<PointReading>,
+    ) {
         let Instrument::FloorGrid { resolution_m, reading_sigma_m } = self.instrument else { return };
-        run.point_readings.reserve(points.len());
+        readings.reserve(points.len());
         for (point, mark) in points.iter().enumerate() {
             let room = world_from_body * mark.body;
             let [dx, dy] = self.stream.normals();
-            let (x_m, y_m) = (room.x_m + reading_sigma_m * dx, room.y_m + reading_sigma_m * dy);
-            let room = if resolution_m > 0.0 {
-                Point::new(round(x_m / resolution_m) * resolution_m, round(y_m / resolution_m) * resolution_m)
+            let read_m = [room.x_m + reading_sigma_m * dx, room.y_m + reading_sigma_m * dy];
+            let [x_m, y_m] = if resolution_m > 0.0 {
+                round(read_m.map(|m| m / resolution_m)).map(|m| m * resolution_m)
             } else {
-                Point::new(x_m, y_m)
+                read_m
             };
-            run.point_readings.push(PointReading { t_s, point, room });
+            let room = Point::new(x_m, y_m);
+            readings.push(PointReading { t_s, point, room });
         }
     }
 }
 
-/// [`f64::round`], the same bits without the call that it is where the processor is not known to round by an instruction (SSE 4.1).
+/// [`f64::round`] of each, the same bits without the calls that they are where the processor is not known to round by an instruction (SSE 4.1).
 #[inline]
-fn round(x: f64) -> f64 {
+fn round(numbers: [f64; 2]) -> [f64; 2] {
     /// 1.5·2⁵²: added and taken away again it rounds to whole numbers, halves to even ones.
     const SHIFTER: f64 = 6_755_399_441_055_744.0;
     /// Below this the sum with the shifter has no fractions and does not leave its binade.
     const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
-    let rounded = (x + SHIFTER) - SHIFTER;
-    if x.abs() < SHIFTS_BELOW && (x - rounded).abs() < 0.5 { rounded.copysign(x) } else { x.round() }
+    let rounded = numbers.map(|x| (x + SHIFTER) - SHIFTER);
+    let rounds = |k: usize| numbers[k].abs() < SHIFTS_BELOW && (numbers[k] - rounded[k]).abs() < 0.5;
+    if rounds(0) && rounds(1) {
+        [rounded[0].copysign(numbers[0]), rounded[1].copysign(numbers[1])]
+    } else {
+        numbers.map(f64::round)
+    }
 }
 
 #[cfg(test)]
@@ -122,8 +139,10 @@ mod tests {
             [2_f64.powi(50), 2_f64.powi(50) - 0.5, 2_f64.powi(51) + 0.5, 2_f64.powi(52) + 1.0, 1e300, f64::INFINITY];
         let small = [0.0, f64::MIN_POSITIVE, 0.499_999_999_999_999_94, 1e-9, 0.3, 1234.567];
         for x in halves.chain(large).chain(small).flat_map(|x| [x, -x, x.next_up(), x.next_down()]) {
-            assert_eq!(round(x).to_bits(), x.round().to_bits(), "{x}");
+            for pair in [[x, 0.3], [0.3, x], [x, x]] {
+                assert_eq!(round(pair).map(f64::to_bits), pair.map(|x| x.round().to_bits()), "{x}");
+            }
         }
-        assert!(round(f64::NAN).is_nan());
+        assert!(round([f64::NAN, 1.0])[0].is_nan());
     }
 }

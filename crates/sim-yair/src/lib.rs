@@ -6,7 +6,9 @@
 
 mod active;
 mod actuator;
+mod body;
 mod drive;
+mod foreseen;
 mod hctl1100;
 mod instrument;
 mod motor;

@@ -6,12 +6,15 @@ use kinematics::{DriveGeometry, Increment};
 use scenario::Robot;
 
 use crate::actuator::{Piece, Pieces};
+use crate::foreseen::Course;
 
 /// A program made ready for the robot that [`crate::SimulatedRobot::plan`] was asked of.
 #[derive(Debug, Clone)]
 pub struct Plan {
     pub(crate) program: MotionProgram,
     pub(crate) motions: Vec<PlannedMotion>,
+    /// The motions once more, where the closed form foresees all of the run.
+    pub(crate) course: Option<Course>,
 }
 
 impl Plan {

@@ -9,7 +9,7 @@
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
 use dataset::{PointReading, Protocol, RunView, Schedule, Session};
-use kinematics::{DriveGeometry, Point, Side, Wheels, sinc, unwrap_near};
+use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
 use crate::robust::{MedianMad, Summary, mean};
@@ -64,7 +64,7 @@ impl Marks {
     fn turn_rad(&self, about_rad: f64) -> f64 {
         let axle = |marks: &Wheels<Point>| (marks.left.x_m - marks.right.x_m, marks.left.y_m - marks.right.y_m);
         let ((x0, y0), (x1, y1)) = (axle(&self.start), axle(&self.end));
-        unwrap_near((x0 * y1 - y0 * x1).atan2(x0 * x1 + y0 * y1), about_rad)
+        unwrap_near(atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1), about_rad)
     }
 }
 

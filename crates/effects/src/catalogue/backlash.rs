@@ -42,8 +42,11 @@ impl PhysicalEffect for Backlash {
         Hypothesis::Terms(Shape::over("width_m", &WIDTH_M, |width_m| Term { width_m, lead: Wheels::both(0.0) }))
     }
 
+    /// A wheel whose gap was found negative has none.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { left_gap_m: size(sizes, "left_gap_m")?, right_gap_m: size(sizes, "right_gap_m")? })
+        let (left_gap_m, right_gap_m) = (size(sizes, "left_gap_m")?, size(sizes, "right_gap_m")?);
+        (left_gap_m > 0.0 || right_gap_m > 0.0)
+            .then(|| Self { left_gap_m: left_gap_m.max(0.0), right_gap_m: right_gap_m.max(0.0) })
     }
 }
 

@@ -47,7 +47,7 @@ impl PhysicalEffect for CastorKick {
 }
 
 /// A turn that makes the castor lean: what straight driving wanders by is far less.
-const LEAN_RAD: f64 = 0.1;
+const LEAN_RAD: f64 = 0.03;
 
 /// Way back that is a reversal: the last counts before a standstill are far less.
 const REVERSAL_M: f64 = 1e-3;

@@ -118,6 +118,9 @@ impl ModelTerm for Term {
 
     /// What the encoder showed too much was not rolled.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if !interval.run.continuous {
+            return; // The wheels' phases are lost in its gaps.
+        }
         for (side, gradient) in Side::BOTH.into_iter().zip(gradient.chunks_exact_mut(2)) {
             let turned_rad = interval.turned_rad[side];
             if turned_rad == 0.0 {

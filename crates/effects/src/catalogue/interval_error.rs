@@ -44,8 +44,9 @@ impl PhysicalEffect for IntervalError {
         Hypothesis::Terms(Shape::plain(Term::default()))
     }
 
+    /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { share: size(sizes, "share")?, jitter_s: size(sizes, "jitter_s").unwrap_or(USUAL_JITTER_S) })
+        Some(Self { share: size(sizes, "share")?.min(1.0), jitter_s: size(sizes, "jitter_s").unwrap_or(USUAL_JITTER_S) })
     }
 }
 

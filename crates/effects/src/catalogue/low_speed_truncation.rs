@@ -122,11 +122,12 @@ mod tests {
             let size = LowSpeedTruncation { loss_m_s: 2e-3, cycle_s: 0.02 };
             let mut state = size.forward().expect("acts on the record");
             state.start_run(Address { seed: 7, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
-            let steps = 100_000; // 5000 cycles
+            let (steps, dt_s) = (1_000_000, 1e-4); // 5000 cycles
             for k in 0..steps {
                 let mut step = specimen_step();
-                step.t_s = 1e-3 * f64::from(k);
-                step.encoder_rad = Wheels::both(sense * 0.25e-3 / 0.08);
+                (step.t_s, step.dt_s) = (dt_s * f64::from(k), dt_s);
+                // No simple ratio to the unit of 80 µm: 25 µm would make sixteenths of it only.
+                step.encoder_rad = Wheels::both(sense * 25.37e-6 / 0.08);
                 let before_rad = step.encoder_rad;
                 state.encoder(&mut step);
                 assert_eq!(step.encoder_rad, before_rad);
@@ -134,7 +135,7 @@ mod tests {
             let mut readout = Readout { ticks: Wheels::both(0), m_per_count: Wheels::both(1e-6), written: true };
             state.readout(&mut readout);
             #[allow(clippy::cast_precision_loss)]
-            let lost_m_s = -sense * 1e-6 * readout.ticks.left as f64 / (1e-3 * f64::from(steps));
+            let lost_m_s = -sense * 1e-6 * readout.ticks.left as f64 / (dt_s * f64::from(steps));
             // A uniform fraction has a standard deviation of 0.58 of its mean: five standard errors of 5000 are 4 %.
             assert!((lost_m_s / 2e-3 - 1.0).abs() < 0.04, "{lost_m_s}");
         }

@@ -48,11 +48,14 @@ impl PhysicalEffect for MissedCounts {
         Hypothesis::Terms(Shape::over("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Term { hinge_m_s }))
     }
 
+    /// A counter whose lost share was found negative loses none.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self {
-            hinge_speed_m_s: size(sizes, "hinge_speed_m_s")?,
-            left_lost_share: size(sizes, "left_lost_share")?,
-            right_lost_share: size(sizes, "right_lost_share")?,
+        let (left, right) = (size(sizes, "left_lost_share")?, size(sizes, "right_lost_share")?);
+        let hinge_speed_m_s = size(sizes, "hinge_speed_m_s")?;
+        (left > 0.0 || right > 0.0).then(|| Self {
+            hinge_speed_m_s,
+            left_lost_share: left.max(0.0),
+            right_lost_share: right.max(0.0),
         })
     }
 }

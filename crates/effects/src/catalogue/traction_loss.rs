@@ -49,7 +49,7 @@ impl PhysicalEffect for TractionLoss {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Scatter(&[Sign::WayJumps])
+        Hypothesis::Scatter(&[Sign::WayJumps, Sign::HeadingJumps])
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -102,6 +102,9 @@ impl ModelTerm for Term {
 
     /// From angle to angle, so that whole turns telescope: ∫sin φ dφ = cos φ₁ − cos φ₂, ∫cos φ dφ = sin φ₂ − sin φ₁.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if !interval.run.continuous {
+            return; // The wheels' phases are lost in its gaps.
+        }
         for (side, gradient) in Side::BOTH.into_iter().zip(gradient.chunks_exact_mut(2)) {
             let turned_rad = interval.turned_rad[side];
             if turned_rad == 0.0 {
