@@ -65,7 +65,9 @@ const CORRELATED: f64 = 0.05;
 const CORRELATED_SIGMAS: f64 = 4.0;
 
 /// A model that leaves out more of the looks is none.
-const MOST_LEFT_OUT: f64 = 0.5;
+const MOST_LEFT_OUT: f64 = 0.2;
+/// With fewer looks a run, a fit that follows nothing may have gone astray by itself: no fault is named then.
+const LEAST_LOOKS_A_RUN: f64 = 3.0;
 
 const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false };
 const THINNED: Joint = Joint { nuisances: false, thin: true };
@@ -80,6 +82,12 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     }
     let measured = sessions(datasets);
     let first = ALL_LOOKS.fit(&measured);
+    if let Ok(first) = &first
+        && left_out(first) > MOST_LEFT_OUT
+        && first.selections.first().is_some_and(|taken| taken.mean_looks() < LEAST_LOOKS_A_RUN)
+    {
+        return Err(DiagnoseError::NothingFollows { percent: 100.0 * left_out(first) });
+    }
     match fault(datasets, first.as_ref().ok(), &options.without) {
         Some(found) => {
             let rewritten = sessions(&found.records);
