@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn holm_stops_at_the_first_that_passes() {
-        assert_eq!(holm(&[0.04, 0.001, 0.012, 0.02], 0.05), [false, true, true, true]);
+        assert_eq!(holm(&[0.06, 0.001, 0.012, 0.02], 0.05), [false, true, true, true]);
         assert_eq!(holm(&[0.03, 0.02], 0.05), [true, true]);
         assert_eq!(holm(&[0.03, 0.03], 0.05), [false, false]);
     }

@@ -101,6 +101,7 @@ impl Joint {
         };
         found.look_at_the_mounting();
         found.refit(None)?;
+        found.hold_what_is_unseen()?;
         if self.thin {
             found.thin()?;
         }
@@ -268,14 +269,18 @@ impl JointFit<'_> {
         if self.unseen.is_empty() {
             return Ok(());
         }
-        let from = From {
-            model: Model {
-                m_per_rad: self.nominal.m_per_rad,
-                separation_m: self.nominal.separation_m,
-                ..self.fit.model.clone()
-            },
-            ..self.here()
-        };
+        // Back along what is not seen; what is seen stays as it was found.
+        let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
+        let mut model = self.fit.model.clone();
+        let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
+        let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));
+        for direction in &self.unseen {
+            let along = direction.dot(&moved);
+            for (column, share) in Column::GEOMETRY.into_iter().zip(direction.iter()) {
+                model.advance(column, -along * share);
+            }
+        }
+        let from = From { model, noise: None, free_headings: None };
         self.refit(Some(from))
     }
 
