@@ -70,7 +70,18 @@ impl<'a> Drive<'a> {
         // The row at t = 0 is a standing row; the clock's first is one interval later.
         let log = setup.log_interval_s.map(|interval_s| LogClock::schedule(interval_s, 1, effects));
         let body = Body::new(setup, &start);
-        Self { setup, actuator, effects, observers, run, body, streams, log, next_look_s, last_row_s: f64::NEG_INFINITY }
+        Self {
+            setup,
+            actuator,
+            effects,
+            observers,
+            run,
+            body,
+            streams,
+            log,
+            next_look_s,
+            last_row_s: f64::NEG_INFINITY,
+        }
     }
 
     pub(crate) const fn world_from_body(&self) -> Pose {

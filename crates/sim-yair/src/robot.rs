@@ -182,7 +182,8 @@ impl SimulatedRobot {
         let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, pieces);
         let motions: Vec<_> = program.motions.iter().map(planned).collect();
         let undisturbed = self.setup.log_interval_s.is_none() && !self.observers.iter().any(Observer::looks_by_itself);
-        let course = if foreseen && undisturbed && self.effects.leave_clocks_alone() { Course::new(&motions) } else { None };
+        let course =
+            if foreseen && undisturbed && self.effects.leave_clocks_alone() { Course::new(&motions) } else { None };
         Plan { program, motions, course }
     }
 
