@@ -4,7 +4,7 @@ use dataset::ModelTerm;
 use kinematics::{Increment, Pose, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use super::evidence::{Evidence, Information, total};
+use super::evidence::{Information, total};
 use super::filter::{Pass, Want, pass};
 use super::model::{Column, Model};
 use super::noise::{Noise, NoisePrior};
@@ -67,20 +67,6 @@ impl Fit {
     pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
         let pass = Pass::nothing();
         Self { model: nominal.clone(), noise: prior.noise(), free_headings: Vec::new(), pass, converged: false }
-    }
-
-    /// The evidence at the values found, each run cut into so many blocks of chains or, where it is one chain, of looks that start anew.
-    pub(crate) fn blocks(&self, records: &Records<'_>, selections: &[Selection], blocks: usize) -> Vec<Evidence> {
-        let split: Vec<Selection> = selections.to_vec();
-        (0..blocks)
-            .flat_map(|block| {
-                let part: Vec<Selection> =
-                    split.iter().map(|selection| selection.block(records, block, blocks)).collect();
-                let found =
-                    pass(records, &part, &self.model, &self.noise, &self.free_headings, &mut [], Want::default());
-                found.runs.into_iter().filter(|run| run.count > 0.0)
-            })
-            .collect()
     }
 
     /// The normal equation of some columns at the values found, over all runs.
@@ -190,7 +176,7 @@ pub(crate) fn pass_with_innovations(
 }
 
 /// An orthonormal basis of the directions that may move.
-fn basis(options: &FitOptions) -> DMatrix<f64> {
+pub(crate) fn basis(options: &FitOptions) -> DMatrix<f64> {
     let n = options.columns.len();
     if options.held.is_empty() {
         return DMatrix::identity(n, n);

@@ -187,12 +187,6 @@ impl<'a> Records<'a> {
     pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
         self.chains.iter().flat_map(|chain| chain.looks.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))
     }
-
-    /// Has any look a heading?
-    #[must_use]
-    pub fn has_headings(&self) -> bool {
-        self.chains.iter().flat_map(|chain| &chain.looks).any(|look| look.theta_rad.is_some())
-    }
 }
 
 /// The looks of a run: its truth, positions alone included, or else its marked points.

@@ -14,12 +14,10 @@ use kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Method, Mounting, NotObservable, Rejected, drive, nominal,
-    refuse_wrapped_counters,
+    CalibError, Calibration, Covariance, Method, Mounting, Rejected, drive, nominal, refuse_wrapped_counters,
 };
 use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Pass, Records, Selection, Thinning};
-use crate::likelihood::{From, NoisePrior, fit_from, pass_with_innovations};
-use crate::sensitivity::unseen;
+use crate::likelihood::{From, NoisePrior, basis, fit_from, pass_with_innovations};
 
 pub use profile::RISE_95;
 
@@ -254,7 +252,7 @@ impl JointFit<'_> {
         if self.fit.pass.runs.len() >= LEAST_RUNS {
             return self.fit.pass.runs.clone();
         }
-        self.fit.blocks(&self.records, &self.selections, LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(&mut [], LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
     }
 
     /// Names the directions of the lengths that the looks do not determine, and keeps them nominal.
@@ -262,12 +260,14 @@ impl JointFit<'_> {
         let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
         let geometry = geometry_information(&information.matrix);
         let SymmetricEigen { eigenvalues, eigenvectors } = geometry.symmetric_eigen();
+        let held_before = !self.unseen.is_empty();
         self.unseen = (0..3)
             .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
             .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
             .collect();
         if self.unseen.is_empty() {
-            return Ok(());
+            // What has come to be seen since is free again.
+            return if held_before { self.refit(Some(self.here())) } else { Ok(()) };
         }
         // Back along what is not seen; what is seen stays as it was found.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
@@ -348,17 +348,7 @@ impl JointFit<'_> {
     }
 
     fn free_basis(&self) -> DMatrix<f64> {
-        let n = self.columns.len();
-        if self.unseen.is_empty() {
-            return DMatrix::identity(n, n);
-        }
-        let held = DMatrix::from_fn(n, self.unseen.len(), |row, k| {
-            self.unseen[k].get(self.columns[row].index()).copied().unwrap_or(0.0)
-        });
-        let eigen = (&held * held.transpose()).symmetric_eigen();
-        let free: Vec<_> =
-            (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-        if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
+        basis(&FitOptions { held: self.held(), ..FitOptions::of(&self.columns) })
     }
 }
 
@@ -447,18 +437,13 @@ impl Method for Joint {
                 .as_ref()
                 .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
             mounting,
-            not_observable: found.unseen.iter().map(not_observable).collect(),
+            not_observable: found.not_observable(),
             runs_used: found.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
             runs_rejected: found.rejected(),
             converged: found.fit.converged,
             ..Calibration::new(Self::NAME, geometry, robot.ticks_per_rev)
         })
     }
-}
-
-fn not_observable(direction: &DVector<f64>) -> NotObservable {
-    let (parameter, missing) = unseen(&nalgebra::Vector3::new(direction[0], direction[1], direction[2]));
-    NotObservable { parameter, why: missing }
 }
 
 impl JointFit<'_> {
