@@ -3,7 +3,6 @@
 use calib::{Method, Parameter, method};
 use dataset::MotionProgram;
 use scenario::{Point, Scenario};
-use sim_yair::SimulationError;
 
 use super::result::{DriftResult, EstimatorResult, MethodCost, PointResult};
 use super::tally::{Bound, ChunkSum, Outcome, PointSum, Tally, estimator_result, largest_drift_error, largest_error};
@@ -262,7 +261,7 @@ impl Stand {
                 Err(no_fit) => not_applicable[number] = Some(no_fit.to_string()),
             }
         }
-        let validation = Validation::new(scenario).map_err(SimulationError::from)?;
+        let validation = Validation::new(scenario)?;
         Ok(Self { point, groups, not_applicable, validation })
     }
 

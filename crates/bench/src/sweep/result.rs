@@ -134,7 +134,7 @@ impl EstimatorResult {
     }
 }
 
-/// How far odometry drifts on the validation path when it believes a method's calibration; its counts are perfect, so all drift is the calibration's.
+/// How far odometry drifts on the validation path when it believes a method's calibration. Systematic effects act on it as on the protocols, chance does not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriftResult {
     /// The method.

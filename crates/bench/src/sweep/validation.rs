@@ -1,61 +1,80 @@
-//! From errors of parameters to drift: the scenario's validation path, driven on paper by the true robot and reckoned with a calibration.
+//! From a calibration to drift: the scenario's validation path, driven by the robot as it is but for chance, and reckoned with the calibration.
+//!
+//! Systematic effects act on the path as they acted on the protocols, so that a calibration is judged by what odometry is for; noise, scatter, faults of the records
+//! and the instrument's errors are left out, since they are not the calibration's.
 
-use dataset::{Motion, MotionProgram, Schedule};
-use kinematics::{DriveGeometry, GeometryError, Increment, Pose, Wheels};
-use scenario::Scenario;
+use dataset::{Dataset, MotionProgram, Schedule};
+use effects::{Address, Hypothesis};
+use kinematics::{DriveGeometry, Pose, Rule};
+use scenario::{Log, Noise, Placement, Scenario};
+use sim_yair::{SimulationError, simulate_programs};
 
-/// One run: how far the wheels turn motion by motion, and where the true robot ends.
-struct Drive {
-    wheel_rad: Vec<Wheels<f64>>,
-    true_end: Pose,
-}
+/// Rows this far apart mix the end of a straight with the start of a turn over millimetres only.
+const LARGEST_INTERVAL_S: f64 = 0.02;
 
 /// The validation path of a scenario.
 pub(super) struct Validation {
-    runs: Vec<Drive>,
+    dataset: Dataset,
+    /// Each run's motion from start to end.
+    true_motion: Vec<Pose>,
     length_m: f64,
 }
 
 impl Validation {
     /// The path that `[[sweep.validation]]` states; `None` when it states none.
-    pub(super) fn new(scenario: &Scenario) -> Result<Option<Self>, GeometryError> {
+    pub(super) fn new(scenario: &Scenario) -> Result<Option<Self>, SimulationError> {
         let schedules = scenario.sweep.as_ref().map_or(&[][..], |sweep| &sweep.validation[..]);
-        let (nominal, truth) = (scenario.nominal_geometry()?, scenario.true_geometry()?);
         let programs: Vec<MotionProgram> = schedules.iter().flat_map(Schedule::programs).collect();
-        let mut length_m = 0.0;
-        let runs = programs.iter().map(|program| {
-            let mut wheel_rad = Vec::with_capacity(program.motions.len());
-            for motion in &program.motions {
-                let increment = match *motion {
-                    Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
-                    Motion::Spin { turn_rad } => Increment { distance_m: 0.0, turn_rad },
-                    Motion::Arc { radius_m, turn_rad } => Increment { distance_m: radius_m * turn_rad.abs(), turn_rad },
-                    Motion::Pause { .. } | Motion::Measure => continue,
-                };
-                wheel_rad.push(nominal.travel_m(increment).zip_with(nominal.m_per_rad(), |m, m_per_rad| m / m_per_rad));
-            }
-            let true_end = reckon(&wheel_rad, &truth);
-            length_m += wheel_rad.iter().map(|rad| truth.increment(travel(*rad, &truth)).distance_m.abs()).sum::<f64>();
-            Drive { wheel_rad, true_end }
+        if programs.is_empty() {
+            return Ok(None);
+        }
+        let mut certain = scenario.clone();
+        certain.noise = Noise { wheel_sigma_m_per_sqrt_m: 0.0, sensitivity_sigma: 0.0 };
+        certain.placement = Placement { half_width_m: 0.0, half_width_rad: 0.0 };
+        let interval_s = scenario.log.map_or(LARGEST_INTERVAL_S, |log| log.interval_s.min(LARGEST_INTERVAL_S));
+        certain.log = Some(Log { interval_s });
+        certain.instruments = Vec::new();
+        certain.effects.retain(|effect| {
+            matches!(effects::hypothesis(effect.id()), Some(Hypothesis::Geometry | Hypothesis::Terms(_)))
         });
-        let runs: Vec<Drive> = runs.collect();
-        Ok((!runs.is_empty()).then_some(Self { runs, length_m }))
+        let driven = simulate_programs(&certain, &programs, Address { seed: scenario.seed, point: 0, trial: 0, run: 0 })?;
+        let true_motion = driven
+            .truth
+            .runs
+            .iter()
+            .map(|run| {
+                let start = Pose::new(run.start_x_m, run.start_y_m, run.start_theta_rad);
+                start.inverse() * Pose::new(run.end_x_m, run.end_y_m, run.end_theta_rad)
+            })
+            .collect();
+        let mut validation = Self { dataset: driven.dataset, true_motion, length_m: 0.0 };
+        validation.length_m = validation.reckon(&scenario.true_geometry()?).map(|(_, length_m)| length_m).sum();
+        Ok(Some(validation))
     }
 
-    /// Final position errors over the path's length, per cent, of odometry that believes `geometry` and counts perfectly.
+    /// Final position errors over the path's length, per cent, of odometry that believes `geometry`.
     pub(super) fn drift_percent(&self, geometry: &DriveGeometry) -> f64 {
-        let error_m = |run: &Drive| reckon(&run.wheel_rad, geometry).position().distance_m(run.true_end.position());
-        100.0 * self.runs.iter().map(error_m).sum::<f64>() / self.length_m
+        let errors = self.reckon(geometry).zip(&self.true_motion);
+        100.0 * errors.map(|((end, _), truth)| end.position().distance_m(truth.position())).sum::<f64>() / self.length_m
     }
-}
 
-fn travel(wheel_rad: Wheels<f64>, geometry: &DriveGeometry) -> Wheels<f64> {
-    wheel_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad)
-}
-
-/// The end of a drive from the origin.
-fn reckon(wheel_rad: &[Wheels<f64>], geometry: &DriveGeometry) -> Pose {
-    wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| pose * geometry.increment(travel(*rad, geometry)).arc())
+    /// Each run's end, from the origin, and its way, metres.
+    fn reckon(&self, geometry: &DriveGeometry) -> impl Iterator<Item = (Pose, f64)> {
+        let session = self.dataset.session();
+        let ends: Vec<(Pose, f64)> = session
+            .runs
+            .iter()
+            .map(|run| {
+                let (mut last, mut length_m) = (Pose::IDENTITY, 0.0);
+                run.dead_reckon(session.robot, geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| {
+                    length_m += pose.position().distance_m(last.position());
+                    last = pose;
+                });
+                (last, length_m)
+            })
+            .collect();
+        ends.into_iter()
+    }
 }
 
 #[cfg(test)]
