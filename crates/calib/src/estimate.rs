@@ -3,6 +3,7 @@
 use dataset::{NominalRobot, Schedule, Session};
 use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
 use nalgebra::{DMatrix, Matrix3};
+use serde::{Deserialize, Serialize};
 
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -24,6 +25,8 @@ pub enum Parameter {
     SensorY,
     /// Where it looks: its heading on the robot, radians.
     SensorTheta,
+    /// How late the outside instrument stamps what it sees, seconds.
+    Latency,
     /// The factor common to both wheels; only ever not observable.
     CommonScale,
 }
@@ -41,6 +44,7 @@ impl Parameter {
             Self::SensorX => "sensor_x_m",
             Self::SensorY => "sensor_y_m",
             Self::SensorTheta => "sensor_theta_rad",
+            Self::Latency => "latency_s",
             Self::CommonScale => "common_scale",
         }
     }
@@ -81,6 +85,21 @@ pub struct Mounting {
     pub covariance: Option<Matrix3<f64>>,
 }
 
+/// The instrument of a session or a run that stands apart from the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OwnInstrument {
+    /// The session's name, and the run's id where each run has its own.
+    pub of: String,
+    /// Ahead of the drive's centre, metres; `None`, as the others, where it is common to all or these runs do not show it.
+    pub sensor_x_m: Option<f64>,
+    /// To the left of the drive's centre, metres.
+    pub sensor_y_m: Option<f64>,
+    /// Its heading on the robot, radians.
+    pub sensor_theta_rad: Option<f64>,
+    /// How late it stamps what it sees, seconds.
+    pub latency_s: Option<f64>,
+}
+
 /// A parameter that the data do not determine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotObservable {
@@ -112,6 +131,10 @@ pub struct Calibration {
     pub covariance: Option<Covariance>,
     /// Where the outside instrument sits on the robot; `None` for methods that take it to be at the drive's centre.
     pub mounting: Option<Mounting>,
+    /// How late the outside instrument stamps what it sees, seconds, with one standard deviation; `None` for methods that take it to be in time.
+    pub latency_s: Option<(f64, Option<f64>)>,
+    /// Mountings and latencies that sessions or runs have for themselves; the two above are then their means.
+    pub own_instruments: Vec<OwnInstrument>,
     /// What the data do not determine.
     pub not_observable: Vec<NotObservable>,
     /// How many runs the values rest on.
@@ -133,6 +156,8 @@ impl Calibration {
             ticks_per_rev,
             covariance: None,
             mounting: None,
+            latency_s: None,
+            own_instruments: Vec::new(),
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
@@ -152,6 +177,10 @@ impl Calibration {
             Parameter::LeftPerTick => (0, diameter_m.left, per_tick()?),
             Parameter::RightPerTick => (1, diameter_m.right, per_tick()?),
             Parameter::SensorX | Parameter::SensorY | Parameter::SensorTheta => return self.mounted(parameter),
+            Parameter::Latency => {
+                let (value, sigma) = self.latency_s?;
+                return Some(Estimate { parameter, value, sigma });
+            }
             Parameter::CommonScale => return None,
         };
         let sigma = self.covariance.as_ref().map(|covariance| covariance[(row, row)].sqrt() * factor);
@@ -188,7 +217,7 @@ impl Calibration {
     /// Every value that the method has.
     pub fn estimates(&self) -> impl Iterator<Item = Estimate> + '_ {
         let all = Parameter::ESTIMATED.into_iter().chain(Parameter::MOUNTING);
-        all.filter_map(|parameter| self.estimate(parameter))
+        all.chain([Parameter::Latency]).filter_map(|parameter| self.estimate(parameter))
     }
 }
 

@@ -3,7 +3,7 @@
 use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
 
-use crate::likelihood::{Evidence, Piece, pass_with_innovations};
+use crate::likelihood::{Evidence, Fit, Gate, Instrument, Piece, Want, pass};
 use crate::methods::joint::JointFit;
 
 /// How far off dead reckoning ends.
@@ -23,13 +23,17 @@ impl JointFit<'_> {
     /// The evidence at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
     #[must_use]
     pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<Evidence> {
+        self.blocks(terms, blocks, Gate::Shut)
+    }
+
+    pub(crate) fn blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize, gate: Gate) -> Vec<Evidence> {
+        let want = Want { gate, ..Want::default() };
         (0..blocks)
             .flat_map(|block| {
                 let part: Vec<_> =
                     self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
-                let fit = &self.fit;
-                let found =
-                    pass_with_innovations(&self.records, &part, &fit.model, &fit.noise, &fit.free_headings, terms);
+                let Fit { model, noise, free_headings, .. } = &self.fit;
+                let found = pass(&self.records, &part, model, noise, free_headings, terms, want);
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
@@ -43,6 +47,7 @@ impl JointFit<'_> {
         let mut found = Vec::new();
         for chain in &self.records.chains {
             let Some((start, first, last)) = chain.ends() else { continue };
+            let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
             for term in terms.iter_mut() {
                 term.restart(chain.info);
             }
@@ -62,10 +67,10 @@ impl JointFit<'_> {
                 each(terms, gradient, |term, own| term.sight(&look, own));
                 let off = weighed(gradient, &model.sizes);
                 let late = Increment { distance_m: twist.v_m_s, turn_rad: twist.omega_rad_s };
-                (off, Pose::new(-late.distance_m * model.latency_s, 0.0, -late.turn_rad * model.latency_s))
+                (off, Pose::new(-late.distance_m * latency_s, 0.0, -late.turn_rad * latency_s))
             };
             // Where the drive's centre stands at the first look, to first order in what the terms add to it.
-            let mounted = start * model.body_from_sensor.inverse();
+            let mounted = start * body_from_sensor.inverse();
             let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
             let mut pose = mounted * add(off, late).inverse();
             let mut previous: Option<Piece> = None;
@@ -99,7 +104,7 @@ impl JointFit<'_> {
                 previous = Some(*piece);
             }
             let (off, late) = seen_from(terms, last.0, pose, chain.pieces.last(), &mut gradient);
-            let seen = pose * add(off, late) * model.body_from_sensor;
+            let seen = pose * add(off, late) * body_from_sensor;
             found.push(EndError {
                 run: chain.run,
                 position_m: seen.position().distance_m(last.1.position()),

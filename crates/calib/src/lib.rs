@@ -23,7 +23,7 @@ pub use compare::{
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
-    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, Parameter, Rejected,
+    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, OwnInstrument, Parameter, Rejected,
     refuse_wrapped_counters,
 };
 pub use extended::EndError;

@@ -8,7 +8,7 @@ use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{CalibError, Calibration, Parameter};
+use crate::estimate::{CalibError, Calibration, OwnInstrument, Parameter};
 
 /// Why a calibration file is not one.
 #[derive(Debug, thiserror::Error)]
@@ -80,6 +80,9 @@ pub struct MethodReport {
     /// The values by key.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, ReportedValue>,
+    /// Instruments that sessions or runs have for themselves, null where these runs do not show it; their means stand among the parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub own_instruments: Vec<OwnInstrument>,
     /// What the data do not determine.
     #[serde(default)]
     pub not_observable: Vec<ReportedBlindness>,
@@ -155,6 +158,7 @@ impl MethodReport {
             method: method.to_owned(),
             error: None,
             parameters: BTreeMap::new(),
+            own_instruments: Vec::new(),
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
@@ -176,6 +180,7 @@ impl MethodReport {
                 .estimates()
                 .map(|estimate| (estimate.parameter.key().to_owned(), value(estimate)))
                 .collect(),
+            own_instruments: calibration.own_instruments.clone(),
             not_observable: calibration
                 .not_observable
                 .iter()
@@ -234,7 +239,8 @@ impl CalibrationReport {
         let known: Vec<&str> = KNOWN_KEYS.to_vec();
         for method in &report.methods {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
-                let length = !Parameter::MOUNTING.iter().any(|of| of.key() == key.as_str());
+                let length =
+                    !Parameter::MOUNTING.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
                 !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
             }) {
                 let message = format!(
@@ -273,6 +279,7 @@ const KNOWN_KEYS: &[&str] = &[
     Parameter::SensorX.key(),
     Parameter::SensorY.key(),
     Parameter::SensorTheta.key(),
+    Parameter::Latency.key(),
 ];
 
 /// Values to dead reckon with, under a name.
@@ -319,6 +326,7 @@ mod tests {
         CalibrationReport {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
+                own_instruments: Vec::new(),
                 method: "umbmark".to_owned(),
                 error: None,
                 parameters: [

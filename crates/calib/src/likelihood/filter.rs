@@ -7,6 +7,7 @@ use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
+use super::apart::{Follow, Instrument};
 use super::evidence::Evidence;
 use super::model::{Column, Model};
 use super::noise::Noise;
@@ -33,13 +34,22 @@ pub struct Innovation {
     pub z: f64,
 }
 
+/// Whether looks that lie far off are left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Gate {
+    /// They are.
+    #[default]
+    Shut,
+    /// Every look is taken, however far off.
+    Open,
+}
+
 /// What to carry along in a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Want {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
-    /// Take every look, however far off.
-    pub(crate) no_gate: bool,
+    pub(crate) gate: Gate,
 }
 
 /// Score of the cost by the logarithms of the variances, and its information.
@@ -71,8 +81,21 @@ pub struct Pass {
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
     pub(crate) noise: NoiseScore,
-    /// How the free headings of chains without one follow a step of the parameters: chain, step at rest, and by each column.
-    pub(crate) headings: Vec<(usize, f64, Vec<f64>)>,
+    /// How the free headings of chains without one follow a step of the parameters.
+    pub(crate) headings: Vec<FreeHeading>,
+    /// How the instruments that groups have for themselves follow one.
+    pub(crate) own: Vec<Follow>,
+}
+
+/// How the free start heading of a chain follows a step of the parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct FreeHeading {
+    pub(crate) chain: usize,
+    pub(crate) run: (usize, usize),
+    /// Without one.
+    pub(crate) rest: f64,
+    /// By each column.
+    pub(crate) by: Vec<f64>,
 }
 
 impl Pass {
@@ -84,6 +107,7 @@ impl Pass {
             outliers: Vec::new(),
             noise: NoiseScore::zero(),
             headings: Vec::new(),
+            own: Vec::new(),
         }
     }
 }
@@ -124,7 +148,7 @@ pub(crate) fn pass(
             }
             let (evidence, heading) = sums.eliminated(chain.run, columns);
             if let (0, Some((rest, by))) = (phase, heading) {
-                result.headings.push((number, rest, by));
+                result.headings.push(FreeHeading { chain: number, run: chain.run, rest, by });
             }
             result.runs[position].add(&evidence, weight);
             result.noise.add(&of_noise, weight);
@@ -133,6 +157,9 @@ pub(crate) fn pass(
             result.innovations.push(innovations);
         }
     }
+    if let Some(own) = &model.own {
+        result.own = own.take_out(&mut result.runs, model);
+    }
     result
 }
 
@@ -140,6 +167,7 @@ struct Filter<'f, 'a> {
     chain: &'f Chain<'a>,
     number: usize,
     model: &'f Model,
+    instrument: Instrument,
     noise: &'f Noise,
     terms: &'f mut [Box<dyn ModelTerm>],
     want: Want,
@@ -183,6 +211,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             chain,
             number,
             model,
+            instrument: model.instrument(chain.run),
             noise,
             terms,
             want,
@@ -246,8 +275,8 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     fn start(&mut self, seen: Pose, var_xy: f64, var_theta: f64, next: Option<Piece>, t_s: f64) {
         let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.twist(&piece));
-        let late = self.model.latency_s;
-        let Pose { x_m: lx, y_m: ly, theta_rad: ltheta } = self.model.body_from_sensor;
+        let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
+            self.instrument;
         let theta_rad = seen.theta_rad - ltheta;
         let (sin, cos) = theta_rad.sin_cos();
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
@@ -424,8 +453,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
         let twist = self.twist(&piece);
         let sight = self.sight(seen.t_s, twist);
-        let Pose { x_m: lx, y_m: ly, theta_rad: ltheta } = self.model.body_from_sensor;
-        let late = self.model.latency_s;
+        let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
+            self.instrument;
         let (sin, cos) = self.pose.theta_rad.sin_cos();
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A look is late by the way that the instrument made in the meantime.
@@ -447,7 +476,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let components = if seen.theta_rad.is_some() { 3 } else { 2 };
         let r = [self.noise.variance[2], self.noise.variance[2], self.noise.variance[3]];
-        if !self.want.no_gate && self.distance(&axes, &rows, error, &r, components) > OUTLIER_CHI_SQUARE {
+        if self.want.gate == Gate::Shut && self.distance(&axes, &rows, error, &r, components) > OUTLIER_CHI_SQUARE {
             return false;
         }
         let direct = |column: usize, axis: &Vector3<f64>| match column {

@@ -5,7 +5,7 @@ use kinematics::{Increment, Pose, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::evidence::{Information, total};
-use super::filter::{Pass, Want, pass};
+use super::filter::{FreeHeading, Gate, Pass, Want, pass};
 use super::model::{Column, Model};
 use super::noise::{Noise, NoisePrior};
 use super::records::{Chain, Records, Start};
@@ -131,7 +131,7 @@ pub(crate) fn fit_from(
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
         for round in 1..=MOST_STARTS {
-            let want = Want { innovations: true, no_gate: true, noise_score: false };
+            let want = Want { innovations: true, gate: Gate::Open, noise_score: false };
             let found = pass(records, selections, &model, &noise, &headings, terms, want);
             let moved = step(&mut model, &mut headings, &found, options, &basis)?;
             let mut squares: Vec<f64> =
@@ -220,9 +220,26 @@ fn step(
             moved[column.index()] = by;
         }
     }
-    for (chain, rest, by) in &found.headings {
-        let follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+    let step =
+        DVector::from_iterator(options.columns.len(), options.columns.iter().map(|column| moved[column.index()]));
+    let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
+    for FreeHeading { chain, run, rest, by } in &found.headings {
+        let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+        if let Some(own) = &model.own
+            && let Some(at) = found.own.iter().position(|follow| follow.group == own.apart.group(*run))
+        {
+            follows += own
+                .columns
+                .iter()
+                .zip(own_steps[at].iter())
+                .map(|(column, step)| by[column.index()] * step)
+                .sum::<f64>();
+        }
         headings[*chain] += rest + follows;
+    }
+    for (follow, by) in found.own.iter().zip(&own_steps) {
+        size += follow.squared(by);
+        model.advance_own(follow.group, by);
     }
     Ok(size)
 }

@@ -9,6 +9,7 @@
 //! (mean-only information). A wrong noise model on 10⁵ looks would outvote the mean.
 //! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974 (scoring); Chong & Kleeman 1997 (k²|s|).
 
+mod apart;
 mod evidence;
 mod filter;
 mod fit;
@@ -20,7 +21,10 @@ mod records;
 mod tests;
 mod thinning;
 
+pub use apart::{Apart, Instrument, Own};
+pub(crate) use evidence::total;
 pub use evidence::{Evidence, Information};
+pub(crate) use filter::{Gate, Want, pass};
 pub use filter::{Innovation, Pass};
 pub use fit::{Fit, FitError, FitOptions, fit};
 pub(crate) use fit::{From, basis, fit_from, pass_with_innovations};

@@ -1,6 +1,9 @@
 //! The mean parameters: the drive's three lengths, where and how late the instrument looks, and the sizes of further terms.
 
 use kinematics::{DriveGeometry, Pose, Wheels};
+use nalgebra::DVector;
+
+use super::apart::{Instrument, Own};
 
 /// A mean parameter, in the order of the columns of every normal equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,10 +67,12 @@ pub struct Model {
     pub m_per_rad: Wheels<f64>,
     /// Distance between the wheel contacts, metres.
     pub separation_m: f64,
-    /// The instrument's frame on the robot.
+    /// The instrument's frame on the robot, where it is common to all.
     pub body_from_sensor: Pose,
-    /// How late looks bear their time, seconds.
+    /// How late looks bear their time, seconds, where it is common to all.
     pub latency_s: f64,
+    /// Instruments that sessions or runs have for themselves.
+    pub own: Option<Own>,
     /// Sizes of the further terms' parameters.
     pub sizes: Vec<f64>,
 }
@@ -81,7 +86,34 @@ impl Model {
             separation_m: geometry.wheel_separation_m(),
             body_from_sensor: Pose::IDENTITY,
             latency_s: 0.0,
+            own: None,
             sizes: vec![0.0; term_parameters],
+        }
+    }
+
+    pub(crate) const fn common_instrument(&self) -> Instrument {
+        Instrument { body_from_sensor: self.body_from_sensor, latency_s: self.latency_s }
+    }
+
+    /// Where and how late the instrument looks in a run.
+    #[must_use]
+    pub fn instrument(&self, run: (usize, usize)) -> Instrument {
+        let own = self.own.as_ref().and_then(|own| own.of.get(&own.apart.group(run)));
+        own.copied().unwrap_or(self.common_instrument())
+    }
+
+    /// Moves the columns that a group has for itself.
+    pub(crate) fn advance_own(&mut self, group: (usize, usize), by: &DVector<f64>) {
+        let common = self.common_instrument();
+        let Some(own) = &mut self.own else { return };
+        let Instrument { body_from_sensor, latency_s } = own.of.entry(group).or_insert(common);
+        for (column, by) in own.columns.iter().zip(by.iter()) {
+            match column {
+                Column::MountX => body_from_sensor.x_m += by,
+                Column::MountY => body_from_sensor.y_m += by,
+                Column::MountTheta => body_from_sensor.theta_rad += by,
+                _ => *latency_s += by,
+            }
         }
     }
 

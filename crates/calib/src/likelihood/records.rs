@@ -74,11 +74,11 @@ impl Chain<'_> {
     }
 
     fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
-        let pose =
-            |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * model.body_from_sensor.inverse());
+        let body_from_sensor = model.instrument(self.run).body_from_sensor;
+        let pose = |look: &Seen| Some(Pose::new(look.x_m, look.y_m, look.theta_rad?) * body_from_sensor.inverse());
         let start = match self.start {
             Start::Seen => pose(self.looks.first()?)?,
-            Start::Origin => model.body_from_sensor.inverse(),
+            Start::Origin => body_from_sensor.inverse(),
         };
         let end = pose(self.looks.last()?)?;
         let reckoned = self.pieces.iter().fold(start, |pose, piece| {

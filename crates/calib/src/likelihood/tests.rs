@@ -85,6 +85,7 @@ const MODEL: Model = Model {
     m_per_rad: Wheels { left: 0.0812, right: 0.0796 },
     separation_m: 0.3665,
     body_from_sensor: Pose::new(0.032, -0.019, 0.103),
+    own: None,
     latency_s: 0.003,
     sizes: Vec::new(),
 };
@@ -117,7 +118,7 @@ fn columns() -> Vec<Column> {
 fn the_gradient_is_that_of_the_cost() {
     let dataset = dataset(true);
     let headings = [0.0, 0.0];
-    let found = run(&dataset, &model(), &NOISE, &headings, Want { no_gate: true, ..Want::default() });
+    let found = run(&dataset, &model(), &NOISE, &headings, Want { gate: super::filter::Gate::Open, ..Want::default() });
     let gradient = found.runs.iter().fold(nalgebra::DVector::zeros(9), |sum, run| sum + &run.gradient);
     let information = found.runs.iter().fold(nalgebra::DMatrix::zeros(9, 9), |sum, run| sum + &run.information);
     for column in columns() {
@@ -126,7 +127,7 @@ fn the_gradient_is_that_of_the_cost() {
         let at = |by: f64| {
             let mut model = model();
             model.advance(column, by);
-            cost(&run(&dataset, &model, &NOISE, &headings, Want { no_gate: true, ..Want::default() }))
+            cost(&run(&dataset, &model, &NOISE, &headings, Want { gate: super::filter::Gate::Open, ..Want::default() }))
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
         let scale = f64::sqrt(information[(k, k)]);
@@ -141,7 +142,7 @@ fn the_gradient_is_that_of_the_cost() {
 #[test]
 fn the_noise_score_is_the_derivative_of_the_cost() {
     let dataset = dataset(true);
-    let want = Want { no_gate: true, noise_score: true, ..Want::default() };
+    let want = Want { gate: super::filter::Gate::Open, noise_score: true, ..Want::default() };
     let score = run(&dataset, &model(), &NOISE, &[0.0, 0.0], want).noise.gradient;
     for k in 0..4 {
         let h = 1e-4_f64;
@@ -162,28 +163,29 @@ fn the_noise_score_is_the_derivative_of_the_cost() {
 #[test]
 fn a_free_heading_is_at_its_best() {
     let dataset = dataset(false);
-    let want = Want { no_gate: true, ..Want::default() };
+    let want = Want { gate: super::filter::Gate::Open, ..Want::default() };
     let mut headings = [0.6, 1.6];
     for _ in 0..8 {
         let found = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
-        for (chain, rest, _) in &found.headings {
+        for super::filter::FreeHeading { chain, rest, .. } in &found.headings {
             headings[*chain] += rest;
         }
     }
     let at_best = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
-    assert!(at_best.headings.iter().all(|(_, rest, _)| rest.abs() < 1e-9), "{:?}", at_best.headings);
+    assert!(at_best.headings.iter().all(|heading| heading.rest.abs() < 1e-9), "{:?}", at_best.headings);
     // Runs start at 0.5 and 1.5 rad; looks of 3 mm over half a metre see a heading to 0.01 rad.
     assert!((headings[0] - 0.5).abs() < 0.03 && (headings[1] - 1.5).abs() < 0.03, "{headings:?}");
     let off = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &[headings[0] + 0.01, headings[1]], want);
     // To second order the elimination undoes the move.
     assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
-    assert!(off.headings[0].1 < -0.009);
+    assert!(off.headings[0].rest < -0.009);
 }
 
 const MODEL_SEEN_AT_THE_CENTRE: Model = Model {
     m_per_rad: Wheels { left: 0.0811, right: 0.0797 },
     separation_m: 0.366,
     body_from_sensor: Pose::IDENTITY,
+    own: None,
     latency_s: 0.0,
     sizes: Vec::new(),
 };

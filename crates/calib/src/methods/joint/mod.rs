@@ -7,16 +7,16 @@
 //! turns the separation.
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
 
+mod nuisances;
 mod profile;
 
 use dataset::{ModelTerm, Schedule, Session};
-use kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, Mounting, Rejected, drive, nominal, refuse_wrapped_counters,
 };
-use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Model, Pass, Records, Selection, Thinning};
+use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning};
 use crate::likelihood::{From, NoisePrior, basis, fit_from, pass_with_innovations};
 
 pub use profile::RISE_95;
@@ -45,8 +45,6 @@ const LEAST_RUNS: usize = 6;
 const FOLDS: usize = 6;
 /// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
 const SCATTER_OF_RUNS: usize = 20;
-/// A nuisance must gain by so many standard errors on what was held out.
-const GAIN_IN_SIGMAS: f64 = 2.0;
 
 /// What [`Joint::fit`] found.
 #[derive(Debug, Clone)]
@@ -100,11 +98,17 @@ impl Joint {
         found.look_at_the_mounting();
         found.refit(None)?;
         found.hold_what_is_unseen()?;
-        if self.thin {
-            found.thin()?;
-        }
-        if self.nuisances {
-            found.add_nuisances()?;
+        let explained = if self.nuisances { found.explained_by_nuisances(self.thin)? } else { None };
+        match explained {
+            Some(explained) => found = explained,
+            None => {
+                if self.thin {
+                    found.thin()?;
+                }
+                if self.nuisances {
+                    found.add_nuisances(Gate::Shut)?;
+                }
+            }
         }
         found.hold_what_is_unseen()?;
         Ok(found)
@@ -154,7 +158,7 @@ impl JointFit<'_> {
     fn thin(&mut self) -> Result<(), CalibError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
-        while self.correlation() > WHITE_BELOW {
+        while !self.is_white() {
             every_s *= 2.0;
             let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
             let selections = Selection::of(&self.records, thinning, &self.nominal);
@@ -165,6 +169,10 @@ impl JointFit<'_> {
             self.refit(Some(self.here()))?;
         }
         Ok(())
+    }
+
+    fn is_white(&self) -> bool {
+        self.correlation() <= WHITE_BELOW
     }
 
     /// The largest correlation of an innovation with the one before, over the components, in standard errors.
@@ -193,58 +201,6 @@ impl JointFit<'_> {
                 if pairs == 0.0 { 0.0 } else { products / (squares / count) / (pairs * phases).sqrt() }
             })
             .fold(0.0, |largest: f64, z| largest.max(z.abs()))
-    }
-
-    /// Lets the mounting and the latency of the instrument in where they predict what they were not fitted to: the looks by their likelihood, and the ends of
-    /// the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a calibration is for.
-    fn add_nuisances(&mut self) -> Result<(), CalibError> {
-        let sets: [&[Column]; 3] = [
-            &Column::MOUNTING,
-            &[Column::Latency],
-            &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency],
-        ];
-        let units = self.units();
-        let present = self.columns.clone();
-        let Some(base) = self.held_out(&units, &present) else { return Ok(()) };
-        let best = sets
-            .into_iter()
-            .filter_map(|set| {
-                let columns: Vec<Column> =
-                    present.iter().chain(set.iter().filter(|column| !present.contains(column))).copied().collect();
-                let found = self.held_out(&units, &columns)?;
-                let gains: Vec<f64> = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
-                let (mean, error) = mean_and_error(&gains)?;
-                let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
-                (mean > GAIN_IN_SIGMAS * error && !drifts).then_some((mean, columns))
-            })
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, columns)) = best {
-            self.columns = columns;
-            self.refit(Some(self.here()))?;
-        }
-        Ok(())
-    }
-
-    /// Fits some columns to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not determine the columns.
-    fn held_out(&self, units: &[Evidence], columns: &[Column]) -> Option<HeldOut> {
-        let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
-        for fold in 0..FOLDS.min(units.len()) {
-            let of_fold = |k: usize| k % FOLDS == fold;
-            let mut others = units.iter().enumerate().filter(|(k, _)| !of_fold(*k)).map(|(_, unit)| unit);
-            let mut sum = others.next()?.clone();
-            others.for_each(|unit| sum.add(unit, 1.0));
-            let (step, _) = sum.of(columns).solve()?;
-            let mut model = self.fit.model.clone();
-            columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
-            for (k, unit) in units.iter().enumerate().filter(|(k, _)| of_fold(*k)) {
-                found.costs[k] = unit.cost_after(columns, &step);
-                for (end_m, end_rad) in self.records.end_errors(unit.run, &model) {
-                    found.end_m += end_m;
-                    found.end_rad += end_rad;
-                }
-            }
-        }
-        Some(found)
     }
 
     /// The evidence in units that can be held out: runs, or blocks where runs are few.
@@ -375,28 +331,6 @@ fn median_between(records: &Records<'_>) -> Option<f64> {
     Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// What was predicted of runs by fits to other runs.
-#[derive(Debug, Clone, PartialEq)]
-struct HeldOut {
-    /// Each unit's cost.
-    costs: Vec<f64>,
-    /// Sum of the runs' final errors of dead reckoning, metres.
-    end_m: f64,
-    /// The same of headings, radians.
-    end_rad: f64,
-}
-
-fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
-    #[allow(clippy::cast_precision_loss)]
-    let n = values.len() as f64;
-    if n < 2.0 {
-        return None;
-    }
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Some((mean, (variance / n).sqrt()))
-}
-
 impl Method for Joint {
     fn name(&self) -> &'static str {
         Self::NAME
@@ -418,25 +352,28 @@ impl Method for Joint {
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, _) = nominal(Self::NAME, sessions)?;
         let found = self.fit(sessions)?;
-        let Model { m_per_rad, separation_m, body_from_sensor, .. } = found.fit.model.clone();
+        let Model { m_per_rad, separation_m, .. } = found.fit.model;
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
         let covariance = found.covariance();
         let diameter_m = geometry.wheel_diameter_m();
         let sizes = [diameter_m.left, diameter_m.right, separation_m];
-        let mounted = found.columns.contains(&Column::MountX);
         let at = |column: Column| found.columns.iter().position(|of| *of == column);
-        let mounting = mounted.then(|| Mounting {
-            body_from_sensor: Pose { ..body_from_sensor },
-            covariance: covariance
-                .as_ref()
-                .zip(at(Column::MountX))
-                .map(|(covariance, first)| Matrix3::from_fn(|i, j| covariance[(first + i, first + j)])),
+        let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
+        let instrument = found.mean_instrument();
+        let mounting = found.has(Column::MountX).then(|| Mounting {
+            body_from_sensor: instrument.body_from_sensor,
+            covariance: at(Column::MountX)
+                .filter(|_| covariance.is_some())
+                .map(|first| Matrix3::from_fn(|i, j| var(first + i, first + j).unwrap_or(f64::NAN))),
         });
+        let latency_sigma_s = at(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
         Ok(Calibration {
             covariance: covariance
                 .as_ref()
                 .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
             mounting,
+            latency_s: found.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
+            own_instruments: found.own_instruments(sessions),
             not_observable: found.not_observable(),
             runs_used: found.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
             runs_rejected: found.rejected(),
