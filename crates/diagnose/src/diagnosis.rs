@@ -186,10 +186,15 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
     {
         findings.extend(naming::of_sparse(model, &test, *p_value, *trials));
     }
-    findings.extend(scatter(&asked, options));
+    // Counts that were lost are restored roughly: what lies far off by them has its name already.
+    let restored = fault.is_some_and(|fault| fault.id == "dropped_samples");
+    if !restored {
+        findings.extend(scatter(&asked, options));
+    }
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let explained =
-        asked.sparse.is_some() || findings.iter().any(|finding| is_scatter(finding) || finding.id == "unlisted");
+    let explained = restored
+        || asked.sparse.is_some()
+        || findings.iter().any(|finding| is_scatter(finding) || finding.id == "unlisted");
     if !explained {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
