@@ -3,7 +3,8 @@
 use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
 
-use crate::likelihood::{Evidence, Fit, Gate, Instrument, Piece, Want, pass};
+use crate::estimate::CalibError;
+use crate::likelihood::{Evidence, Fit, Gate, Instrument, LEAST_SIGMA, NoiseComponent, Piece, Want, pass};
 use crate::methods::joint::JointFit;
 
 /// How far off dead reckoning ends.
@@ -37,6 +38,25 @@ impl JointFit<'_> {
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
+    }
+
+    /// The fit, with the terms that are in it, with next to no noise of one kind: what the data lose by it says whether they need it.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn without_noise(
+        &self,
+        component: NoiseComponent,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<Self, CalibError> {
+        let mut without = Self { prior: self.prior.without(component), ..self.clone() };
+        let mut from = self.here();
+        from.noise = from.noise.map(|mut noise| {
+            noise.variance[component as usize] = LEAST_SIGMA * LEAST_SIGMA;
+            noise
+        });
+        without.refit_with(Some(from), terms)?;
+        Ok(without)
     }
 
     /// Dead reckoning of every chain from its first look to its last under a model with terms; chains that are seen without headings are left out.

@@ -1,24 +1,22 @@
 //! The order of work.
 
-use std::collections::BTreeMap;
-
 use calib::methods::joint::{Joint, JointFit};
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
-use effects::{CATALOGUE, Sign};
+use effects::CATALOGUE;
 use kinematics::DriveGeometry;
 use nalgebra::DMatrix;
 use scenario::Scenario;
 
 use crate::blind::blind;
 use crate::candidate::{Choice, mean_terms};
-use crate::checks::{Checked, check, what_follows};
-use crate::document::{Document, Finding, Gain, Value, Verdict};
+use crate::checks::{Checked, check};
+use crate::document::{Document, Finding, Gain, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, left_out, sessions};
 use crate::naming;
+use crate::scatter::scatter;
 use crate::search::{Extended, Found, evidence, examine, reach, search};
-use crate::statistics::p_of_z;
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
 /// What to leave out.
@@ -111,14 +109,14 @@ fn is_white(checked: &Checked) -> bool {
 }
 
 /// What is left after the search, and how much of it has a name.
-struct Asked<'a> {
-    base: JointFit<'a>,
-    found: Found<'a>,
-    checked: Checked,
+pub(crate) struct Asked<'a> {
+    pub(crate) base: JointFit<'a>,
+    pub(crate) found: Found<'a>,
+    pub(crate) checked: Checked,
     /// A model with a sparse term at its end, its chance, and how many were tried.
-    sparse: Option<(Extended<'a>, f64, usize)>,
+    pub(crate) sparse: Option<(Extended<'a>, f64, usize)>,
     /// Correlation of looks that follow each other, where they had to be thinned.
-    correlated: Option<(f64, f64)>,
+    pub(crate) correlated: Option<(f64, f64)>,
 }
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
@@ -169,7 +167,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
 }
 
 /// Whether a check asks what residuals go with, not how they scatter.
-fn is_covariate(name: &str) -> bool {
+pub(crate) fn is_covariate(name: &str) -> bool {
     !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
         && name != "outliers"
         && name != "run_to_run"
@@ -229,82 +227,6 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
 
 fn is_scatter(finding: &Finding) -> bool {
     matches!(effects::hypothesis(&finding.id), Some(effects::Hypothesis::Scatter(_)))
-}
-
-/// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
-const SCATTER_LEVEL: f64 = 1e-3;
-
-/// With more, it is the model that is off, and not the looks.
-const MOST_OUTLIERS: f64 = 0.2;
-/// What follows large errors is told from chance at this many standard errors.
-const FOLLOWS: f64 = 2.6;
-
-/// Scatter that failed checks show.
-fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    let outliers = asked.checked.outliers;
-    let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
-    let far = outliers.isolated + outliers.staying;
-    #[allow(clippy::cast_precision_loss)]
-    if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
-        // The model does not follow the robot at all: that has no name.
-        return findings;
-    }
-    if asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name)) {
-        // Large errors that go with what was driven are no scatter.
-        return findings;
-    }
-    if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
-        #[allow(clippy::cast_precision_loss)]
-        let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
-        let value = Value { value: share, sigma: None, unit: "1".to_owned() };
-        let of = outliers.looks + far;
-        let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
-        let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
-        let parameters = BTreeMap::from([("probability".to_owned(), value)]);
-        findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
-    } else {
-        // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
-        let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
-        let kurtosis = |name: &str| {
-            asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
-        };
-        let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
-        let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
-        let jump = heaviest.and_then(|(name, component, sign)| {
-            let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;
-            Some((p_value, what_follows(&asked.found.model.fit, component), sign))
-        });
-        if let Some((p_value, follows, sign)) = jump {
-            let stays = naming::with_sign(sign, &options.without);
-            let errs = naming::with_sign(Sign::IsolatedLooks, &options.without);
-            let (ids, what) = if follows > FOLLOWS {
-                (stays, "single large errors that stay: the robot jumped")
-            } else if follows < -FOLLOWS {
-                (errs, "single large errors of the instrument, undone in the next look")
-            } else {
-                (
-                    [stays, errs].concat(),
-                    "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
-                )
-            };
-            findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
-        }
-    }
-    if let Some((coefficient, sigmas)) = asked.correlated
-        && coefficient > 0.0
-    {
-        let what = format!(
-            "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
-        );
-        let mut ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
-        // Where something else is found too, it may be that this is the rest of it.
-        if !ids.is_empty() && !asked.found.model.choices.is_empty() {
-            ids.push("unlisted");
-        }
-        findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
-    }
-    findings
 }
 
 fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<String>) {

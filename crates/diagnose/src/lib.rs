@@ -13,6 +13,7 @@ mod gain;
 mod gross;
 mod naming;
 mod scan;
+mod scatter;
 mod scenario_of;
 mod search;
 mod sparse;

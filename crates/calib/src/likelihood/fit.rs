@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use super::evidence::{Information, total};
 use super::filter::{FreeHeading, Gate, Pass, Want, pass};
 use super::model::{Column, Model};
-use super::noise::{Noise, NoisePrior};
+use super::noise::{LEAST_SIGMA, Noise, NoisePrior};
 use super::records::{Chain, Records, Start};
 use super::thinning::Selection;
 
@@ -16,8 +16,6 @@ const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 /// A step this small, squared and over its variance, changes nothing that a print shows.
 const SETTLED: f64 = 1e-8;
 const NOISE_SETTLED: f64 = 1e-4;
-/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
-const LEAST_SIGMA: f64 = 1e-6;
 const LARGEST_NOISE_STEP: f64 = 1.5;
 /// Steps before outliers are told: at least, and at most.
 const LEAST_STARTS: usize = 3;

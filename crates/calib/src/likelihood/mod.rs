@@ -29,7 +29,7 @@ pub use filter::{Innovation, Pass};
 pub use fit::{Fit, FitError, FitOptions, fit};
 pub(crate) use fit::{From, basis, fit_from, pass_with_innovations};
 pub use model::{Column, Model};
-pub(crate) use noise::NoisePrior;
+pub(crate) use noise::{LEAST_SIGMA, NoisePrior};
 pub use noise::{Noise, NoiseComponent};
 pub(crate) use records::Piece;
 pub use records::{Chain, Records};

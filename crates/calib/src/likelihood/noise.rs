@@ -43,6 +43,10 @@ const LOOK_SIGMA_RAD: f64 = 3e-3;
 const VAGUE: f64 = 2.0;
 /// A precision that the dataset states is believed to a factor of two: instruments are sold by their best.
 const STATED: f64 = 0.7;
+/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
+pub(crate) const LEAST_SIGMA: f64 = 1e-6;
+/// A standard deviation that is not to move stays within e^±0.01 of where it is.
+const HELD: f64 = 0.01;
 
 impl NoisePrior {
     pub(crate) fn of(stated: TruthNoise) -> Self {
@@ -53,6 +57,12 @@ impl NoisePrior {
             centre: [WHEEL_SIGMA, TURN_SIGMA, xy.unwrap_or(LOOK_SIGMA_M), theta.unwrap_or(LOOK_SIGMA_RAD)],
             log_sd: [VAGUE, VAGUE, log_sd(xy), log_sd(theta)],
         }
+    }
+
+    /// The same with one standard deviation held at next to nothing.
+    pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
+        (self.centre[component as usize], self.log_sd[component as usize]) = (LEAST_SIGMA, HELD);
+        self
     }
 
     pub(crate) fn noise(&self) -> Noise {

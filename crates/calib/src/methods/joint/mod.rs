@@ -133,7 +133,7 @@ impl JointFit<'_> {
         self.refit_with(from, &mut [])
     }
 
-    fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
+    pub(crate) fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let options = FitOptions { held: self.held(), ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
@@ -149,7 +149,7 @@ impl JointFit<'_> {
         self.unseen.iter().map(of).collect()
     }
 
-    fn here(&self) -> From {
+    pub(crate) fn here(&self) -> From {
         let Fit { model, noise, free_headings, .. } = &self.fit;
         From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }

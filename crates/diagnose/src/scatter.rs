@@ -1,0 +1,111 @@
+//! What only scatters: single looks far off, jumps that stay, looks that err alike, and turns that scatter more than the wheels explain.
+//!
+//! A scatter has no mean to be scanned: failed checks of the fit show most of it. Noise of the turns is in every fit; a fit without it says what it is worth,
+//! with half a χ² of one degree of freedom for a variance at its boundary (Chernoff 1954; Self & Liang 1987).
+
+use std::collections::BTreeMap;
+
+use calib::likelihood::NoiseComponent;
+use effects::Sign;
+
+use crate::candidate::terms;
+use crate::checks::what_follows;
+use crate::diagnosis::{Asked, Options, is_covariate};
+use crate::document::{Finding, Value};
+use crate::naming;
+use crate::search::{cost, count};
+use crate::statistics::{p_of_chi_square, p_of_z};
+
+/// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
+const SCATTER_LEVEL: f64 = 1e-3;
+
+/// With more, it is the model that is off, and not the looks.
+const MOST_OUTLIERS: f64 = 0.2;
+/// What follows large errors is told from chance at this many standard errors.
+const FOLLOWS: f64 = 2.6;
+
+/// Scatter that failed checks show.
+pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let outliers = asked.checked.outliers;
+    let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
+    let far = outliers.isolated + outliers.staying;
+    #[allow(clippy::cast_precision_loss)]
+    if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
+        // The model does not follow the robot at all: that has no name.
+        return findings;
+    }
+    if asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name)) {
+        // Large errors that go with what was driven are no scatter.
+        return findings;
+    }
+    if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
+        #[allow(clippy::cast_precision_loss)]
+        let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
+        let value = Value { value: share, sigma: None, unit: "1".to_owned() };
+        let of = outliers.looks + far;
+        let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
+        let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
+        let parameters = BTreeMap::from([("probability".to_owned(), value)]);
+        findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
+    } else {
+        // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
+        let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
+        let kurtosis = |name: &str| {
+            asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
+        };
+        let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
+        let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
+        let jump = heaviest.and_then(|(name, component, sign)| {
+            let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;
+            Some((p_value, what_follows(&asked.found.model.fit, component), sign))
+        });
+        if let Some((p_value, follows, sign)) = jump {
+            let stays = naming::with_sign(sign, &options.without);
+            let errs = naming::with_sign(Sign::IsolatedLooks, &options.without);
+            let (ids, what) = if follows > FOLLOWS {
+                (stays, "single large errors that stay: the robot jumped")
+            } else if follows < -FOLLOWS {
+                (errs, "single large errors of the instrument, undone in the next look")
+            } else {
+                (
+                    [stays, errs].concat(),
+                    "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
+                )
+            };
+            findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
+        }
+    }
+    if let Some((coefficient, sigmas)) = asked.correlated
+        && coefficient > 0.0
+    {
+        let what = format!(
+            "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
+        );
+        let mut ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
+        // Where something else is found too, it may be that this is the rest of it.
+        if !ids.is_empty() && !asked.found.model.choices.is_empty() {
+            ids.push("unlisted");
+        }
+        findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
+    }
+    findings.extend(of_turns(asked, options));
+    findings
+}
+
+/// Turns that scatter more than the wheels' noise explains, whatever else was found.
+fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
+    let model = asked.sparse.as_ref().map_or(&asked.found.model, |(model, _, _)| model);
+    let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
+    let most = count(&without).max(count(&model.fit));
+    let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
+    let p_value = 0.5 * p_of_chi_square(statistic.max(0.0), 1.0);
+    if p_value >= SCATTER_LEVEL {
+        return None;
+    }
+    let sigma = model.fit.fit.noise.sigma(NoiseComponent::Turn);
+    let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
+    let parameters = BTreeMap::from([("turn_sigma_rad_per_sqrt_rad".to_owned(), value)]);
+    let what = format!("headings scatter with the turn, by {:.1} mrad for each root of a radian", 1e3 * sigma);
+    naming::of_scatter(&naming::with_sign(Sign::ScatterWithTurn, &options.without), p_value, parameters, &what)
+}
