@@ -3,7 +3,7 @@
 //! An instrument that looks twenty times a second says little more of the wheels than one that looks once a metre, and what is wrong with its clock or with a
 //! start from standstill is in every one of its looks.
 
-use dataset::{RunView, Session};
+use dataset::{NominalRobot, RunView, Session};
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
 
 use crate::estimate::{CalibError, Rejected};
@@ -103,6 +103,37 @@ impl<'a> Looks<'a> {
             return Err(CalibError::NotApplicable { method, why });
         }
         Ok((looks, rejected))
+    }
+}
+
+/// Where a run was first and last seen, and how the wheels turned in between.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ends {
+    pub(crate) start: Pose,
+    /// Whole turns since the start are counted.
+    pub(crate) end: Pose,
+    wheel_rad: Vec<Wheels<f64>>,
+}
+
+impl Ends {
+    /// The first and the last look within the log; `None` as for [`Looks::at`].
+    pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
+        let Looks { start, mut later, .. } =
+            Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
+        let Look { wheel_rad, pose } = later.pop()?;
+        Some(Self { start, end: pose, wheel_rad })
+    }
+
+    /// Turn of each wheel, radians.
+    pub(crate) fn turned_rad(&self) -> Wheels<f64> {
+        self.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad))
+    }
+
+    /// Where the robot ends by its wheels, from the origin, by the midpoint rule.
+    pub(crate) fn reckoned(&self, geometry: &DriveGeometry) -> Pose {
+        self.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
+            pose * geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad)).midpoint()
+        })
     }
 }
 

@@ -12,6 +12,7 @@ use dataset::{PointReading, Protocol, RunView, Schedule, Session};
 use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
+use crate::looks::Ends;
 use crate::robust::{MedianMad, Summary, mean};
 
 /// The method with its outlier rule.
@@ -85,20 +86,21 @@ impl<'s, 'a> MarkReader<'s, 'a> {
     ) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
         let runs = self.session.runs.iter().filter(move |run| run.info().protocol == Some(protocol));
         runs.filter_map(|run| {
-            let wheel_rad = run.wheel_turn_rad(self.session.robot)?;
-            let marks = self.marks(run).transpose()?;
-            Some(marks.map(|marks| (run.info().id.as_str(), wheel_rad, marks)))
+            let measured = self.measured(run).transpose()?;
+            Some(measured.map(|(wheel_rad, marks)| (run.info().id.as_str(), wheel_rad, marks)))
         })
     }
 
-    fn marks(&self, run: &RunView<'_>) -> Result<Option<Marks>, CalibError> {
+    /// The wheels' turns between the first and the last look, and the marks then.
+    fn measured(&self, run: &RunView<'_>) -> Result<Option<(Wheels<f64>, Marks)>, CalibError> {
         let half_m = 0.5 * self.geometry.wheel_separation_m();
         let readings = &run.run().point_readings;
         if readings.is_empty() {
-            // Poses: the contacts themselves are the marks.
-            return Ok(run.observed_ends().map(|(start, end)| {
+            // Poses: the contacts themselves are the marks. What the wheels turned before and after was not seen.
+            return Ok(Ends::of(run, self.session.robot, &self.geometry).map(|ends| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
-                Marks { start: contacts.map(|p| start * p), end: contacts.map(|p| end * p), outside_m: Wheels::both(0.0) }
+                let (start, end) = (contacts.map(|p| ends.start * p), contacts.map(|p| ends.end * p));
+                (ends.turned_rad(), Marks { start, end, outside_m: Wheels::both(0.0) })
             }));
         }
         let Some(outermost) = self.outermost else { return Ok(None) };
@@ -113,7 +115,10 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
         let both = |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
         let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
-        Ok(Some(Marks { start, end, outside_m: Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m } }))
+        // Marks are read while the robot stands, before and after all that its log has.
+        let Some(wheel_rad) = run.wheel_turn_rad(self.session.robot) else { return Ok(None) };
+        let outside_m = Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m };
+        Ok(Some((wheel_rad, Marks { start, end, outside_m })))
     }
 }
 

@@ -16,9 +16,8 @@ use dataset::{Protocol, Schedule, Session};
 use kinematics::{Wheels, wrap_to_pi};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::looks::{Looks, Spacing};
+use crate::looks::Ends;
 use crate::robust::Summary;
-use crate::wheel_track::WheelTrack;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,9 +56,7 @@ impl Method for JungChung {
             for run in &session.runs {
                 let of_way = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
                 let Some((_, errors_rad)) = of_way else { continue };
-                let ends = WheelTrack::of(run, session.robot)
-                    .and_then(|track| Looks::at(run, &track, &geometry, Spacing::ENDS));
-                let Some(Looks { start, later, .. }) = ends else { continue };
+                let Some(ends) = Ends::of(run, session.robot, &geometry) else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
@@ -70,13 +67,9 @@ impl Method for JungChung {
                     ));
                 }
                 // The wheels at the looks' instants: what they turned after the last one was not seen.
-                errors_rad.extend(later.last().map(|end| {
-                    let increment = |rad: &Wheels<f64>| {
-                        geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad))
-                    };
-                    let reckoned_rad: f64 = end.wheel_rad.iter().map(|rad| increment(rad).turn_rad).sum();
-                    wrap_to_pi(end.pose.theta_rad - start.theta_rad - reckoned_rad)
-                }));
+                let turned_m = ends.turned_rad().zip_with(geometry.m_per_rad(), |rad, m_per_rad| m_per_rad * rad);
+                let reckoned_rad = geometry.increment(turned_m).turn_rad;
+                errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - reckoned_rad));
             }
         }
         let [cw, ccw] = errors_rad.map(|(_, errors_rad)| Summary::of(errors_rad.iter().copied()));
