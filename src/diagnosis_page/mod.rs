@@ -67,28 +67,18 @@ impl Page<'_> {
             writeln!(page, "| `{}` | {others} | {:.2} | {:.1} | {what} |", finding.id, finding.probability, finding.z)?;
         }
         writeln!(page)?;
-        match (words::gain(self.document), &self.document.gain, &self.document.gain_why_null) {
-            (Some(gain), Some(held_out), _) => {
-                let score = held_out.log_score_per_observation;
-                writeln!(
-                    page,
-                    "{gain} {} runs or blocks of runs were held out, each once; a value of a look is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
-                    held_out.held_out_runs,
-                    score.extended - score.base,
-                    score.low,
-                    score.high
-                )?;
-            }
-            (None, Some(held_out), _) => {
-                let score = held_out.log_score_per_observation;
-                writeln!(
-                    page,
-                    "On runs held out a value of a look is e^{:.4} times as likely under the extended model.\n",
-                    score.extended - score.base
-                )?;
-            }
-            (_, None, Some(why)) => writeln!(page, "No gain is stated: {why}.\n")?,
-            _ => {}
+        if let Some(gain) = &self.document.gain {
+            let score = gain.log_score_per_observation;
+            writeln!(
+                page,
+                "{} runs, or blocks of runs, were held out, each once: a value that a look sees there is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
+                gain.held_out_runs,
+                score.extended - score.base,
+                score.low,
+                score.high
+            )?;
+        } else if let Some(why) = &self.document.gain_why_null {
+            writeln!(page, "No gain is stated: {why}.\n")?;
         }
         Ok(())
     }
@@ -268,5 +258,9 @@ impl Page<'_> {
 }
 
 fn chance(p: f64) -> String {
-    if p >= 1e-3 { format!("{p:.3}") } else { format!("{p:.0e}") }
+    match p {
+        p if p >= 1e-3 => format!("{p:.3}"),
+        p if p > 0.0 => format!("{p:.0e}"),
+        _ => "< 1e-300".to_owned(),
+    }
 }

@@ -20,11 +20,11 @@ pub(super) type Picture = (&'static str, String, Figure);
 
 /// The smallest chance of a covariate's components.
 fn p_value(against: &Against) -> f64 {
-    against.components.iter().map(|component| component.before.p_value).fold(1.0, f64::min)
+    against.components.iter().map(|component| component.before.varies_p_value).fold(1.0, f64::min)
 }
 
 fn chi_square(against: &Against) -> f64 {
-    against.components.iter().map(|component| component.before.chi_square).fold(0.0, f64::max)
+    against.components.iter().map(|component| component.before.varies_chi_square).fold(0.0, f64::max)
 }
 
 /// Covariates with which the calibrated model's residuals go, the strongest first.
@@ -64,7 +64,8 @@ fn figure(title: &str, against: &[&Against], residuals: &Residuals, extended: bo
         of.filter(|component| component.component == name).map(|component| 1e3 * component.scatter).fold(0.0, f64::max)
     };
     let caption = format!(
-        "{} looks. A residual is what a look sees beyond what counts, model and the looks before predict. Points: means over bins; bars and band: 95 %. Single residuals scatter by {:.2} mm along, {:.2} mm across and \
+        "{} looks. A residual is what a look sees beyond what counts, model and the looks before predict. Points: means over bins; bars and band: 95 %, \
+         as if looks erred independently. Single residuals scatter by {:.2} mm along, {:.2} mm across and \
          {:.2} mrad of heading: each panel has its own scale.",
         residuals.looks,
         scatter("along"),
@@ -91,7 +92,7 @@ fn panel(against: &Against, component: &Component, extended: bool) -> Panel {
         Axis::new(&against.label, &against.unit)
     };
     if against.unit == "°" {
-        x = x.range(Range::Fixed { low: 0.0, high: 360.0 });
+        x = x.range(Range::Fixed { low: -180.0, high: 180.0 });
     }
     let y = Axis::new(&format!("residual {}", residual(&component.component)), unit).include(0.0);
     let mut panel = Panel::new("", x, y);

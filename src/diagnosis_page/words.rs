@@ -168,7 +168,7 @@ pub(super) fn verdict(document: &Document) -> String {
         .iter()
         .map(|finding| match &finding.names[..] {
             [_, others @ ..] if !others.is_empty() => {
-                format!("{} – or it is {}, which this data cannot tell from it", meaning(finding), others.join(" or "))
+                format!("{} – or it is {}, which this data cannot tell from it", meaning(finding), named(others))
             }
             _ => meaning(finding),
         })
@@ -181,17 +181,29 @@ pub(super) fn gain(document: &Document) -> Option<String> {
     let drift = document.gain.as_ref()?.drift_percent.filter(|drift| drift.base > 0.0)?;
     let Compared { base, extended, low, high } = drift;
     let (share, half) = (100.0 * (base - extended) / base, 50.0 * (high - low) / base);
+    let becomes = format!("{base:.3} % of the way become {extended:.3} %");
     Some(if low > 0.0 {
         format!(
-            "On runs that it was not fitted to, the extended model removes {share:.0} ± {half:.0} % of the drift (95 %): {base:.3} % of the way become {extended:.3} %."
+            "On runs that it was not fitted to, the extended model removes {share:.0} ± {half:.0} % of the drift (95 %): {becomes}."
+        )
+    } else if high < 0.0 {
+        format!(
+            "On runs that it was not fitted to, dead reckoning drifts **more** with the extended model: {becomes}. It explains what the instrument saw, and is not to be used for odometry."
         )
     } else {
         format!(
-            "What dead reckoning gains on runs that it was not fitted to is not certain: {base:.3} % of the way become {extended:.3} %, {:.0} to {:.0} % of the drift.",
+            "What dead reckoning gains on runs that it was not fitted to is not certain: {becomes}, a gain of {:.0} to {:.0} % of the drift (95 %).",
             100.0 * low / base,
             100.0 * high / base
         )
     })
+}
+
+/// Further names of a finding.
+fn named(ids: &[String]) -> String {
+    let name =
+        |id: &String| if id == "unlisted" { "something outside of the catalogue".to_owned() } else { id.clone() };
+    ids.iter().map(name).collect::<Vec<_>>().join(" or ")
 }
 
 pub(super) fn capitalised(text: &str) -> String {

@@ -5,12 +5,12 @@
 //! where the checks of whiteness pass.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use calib::methods::joint::JointFit;
 use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
-use kinematics::{Pose, Side};
+use kinematics::{Pose, Side, wrap_to_pi};
 use serde::Serialize;
 
 use crate::candidate::terms;
@@ -70,6 +70,10 @@ pub struct Profile {
     pub chi_square: f64,
     /// Its chance when all means are zero.
     pub p_value: f64,
+    /// The same about the mean of all bins: how much the residuals go with the covariate, whatever they are on the whole.
+    pub varies_chi_square: f64,
+    /// Its chance when all means are the same.
+    pub varies_p_value: f64,
 }
 
 /// A bin of a covariate.
@@ -150,6 +154,8 @@ struct Recorder {
     time_s: f64,
     gained_m_s: f64,
     phase_rad: [f64; 2],
+    /// How far each wheel turned since the last look, radians.
+    turned_rad: [f64; 2],
     session_s: f64,
     session_m: f64,
     swung_m: f64,
@@ -167,6 +173,7 @@ impl Recorder {
             time_s: 0.0,
             gained_m_s: 0.0,
             phase_rad: [0.0; 2],
+            turned_rad: [0.0; 2],
             session_s: 0.0,
             session_m: 0.0,
             swung_m: 0.0,
@@ -199,8 +206,9 @@ impl ModelTerm for Recorder {
         self.way_m += increment.distance_m;
         self.turn_rad += increment.turn_rad;
         self.time_s += interval.dt_s;
-        for (phase, side) in self.phase_rad.iter_mut().zip(Side::BOTH) {
-            *phase = interval.wheel_rad[side] + 0.5 * interval.turned_rad[side];
+        for (k, side) in Side::BOTH.into_iter().enumerate() {
+            self.phase_rad[k] = interval.wheel_rad[side] + 0.5 * interval.turned_rad[side];
+            self.turned_rad[k] += interval.turned_rad[side];
         }
         (self.session_s, self.session_m) = (interval.session_s(), interval.session_m);
         self.swung_m = (self.swung_m + increment.distance_m).clamp(-0.5 * REVERSAL_M, 0.5 * REVERSAL_M);
@@ -219,15 +227,17 @@ impl ModelTerm for Recorder {
             return;
         }
         let (v, omega) = (self.way_m / self.time_s, self.turn_rad / self.time_s);
-        let degrees = |angle_rad: f64| angle_rad.rem_euclid(TAU).to_degrees();
+        let degrees = |angle_rad: f64| wrap_to_pi(angle_rad).to_degrees();
+        // A wheel that turned on and on between two looks has no one phase.
+        let phase = |k: usize| (self.turned_rad[k].abs() < FRAC_PI_2).then(|| degrees(self.phase_rad[k]));
         let value = |key: &String| match &key[..] {
             "speed" => Some(v),
             "yaw_rate" => Some(omega),
             "speed_times_yaw_rate" => Some(v * omega),
             "acceleration" => Some(self.gained_m_s / self.time_s),
             "heading_in_the_room" => Some(degrees(look.world_from_body.theta_rad)),
-            "left_wheel_phase" => Some(degrees(self.phase_rad[0])),
-            "right_wheel_phase" => Some(degrees(self.phase_rad[1])),
+            "left_wheel_phase" => phase(0),
+            "right_wheel_phase" => phase(1),
             "time_in_run" => Some(look.t_s),
             "time_in_session" => Some(self.session_s),
             "distance" => Some(self.session_m),
@@ -241,6 +251,7 @@ impl ModelTerm for Recorder {
         let mut records = self.records.lock().unwrap_or_else(PoisonError::into_inner);
         records.entry(key(look.run, look.t_s)).or_insert(recorded);
         (self.way_m, self.turn_rad, self.time_s, self.gained_m_s) = (0.0, 0.0, 0.0, 0.0);
+        self.turned_rad = [0.0; 2];
     }
 }
 
@@ -331,7 +342,7 @@ fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<
     #[allow(clippy::cast_precision_loss)] // a dozen bins
     let share = |k: usize| k as f64 / BINS as f64;
     if round {
-        return Some((1..BINS).map(|k| 360.0 * share(k)).collect());
+        return Some((1..BINS).map(|k| 360.0 * share(k) - 180.0).collect());
     }
     let mut levels: Vec<f64> = Vec::new();
     for (value, ..) in values.iter() {
@@ -380,10 +391,14 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         let variance = own.iter().map(|(_, size, _)| (size - mean).powi(2)).sum::<f64>() / (n - 1.0);
         bins.push(Bin { at, mean, sigma: (variance / n).sqrt(), mean_z, count: own.len() });
     }
-    let chi_square = bins.iter().filter(|bin| bin.sigma > 0.0).map(|bin| (bin.mean / bin.sigma).powi(2)).sum();
+    let weight = |bin: &Bin| if bin.sigma > 0.0 { bin.sigma.powi(-2) } else { 0.0 };
+    let (sum, weights) = bins.iter().fold((0.0, 0.0), |sum, bin| (sum.0 + weight(bin) * bin.mean, sum.1 + weight(bin)));
+    let about = |centre: f64| bins.iter().map(|bin| weight(bin) * (bin.mean - centre).powi(2)).sum::<f64>();
+    let (chi_square, varies_chi_square) = (about(0.0), if weights > 0.0 { about(sum / weights) } else { 0.0 });
     #[allow(clippy::cast_precision_loss)]
     let freedom = bins.len() as f64;
-    Profile { p_value: p_of_chi_square(chi_square, freedom), bins, chi_square }
+    let varies_p_value = if freedom > 1.0 { p_of_chi_square(varies_chi_square, freedom - 1.0) } else { 1.0 };
+    Profile { p_value: p_of_chi_square(chi_square, freedom), bins, chi_square, varies_chi_square, varies_p_value }
 }
 
 #[cfg(test)]
@@ -396,7 +411,8 @@ mod tests {
         let cut = edges(&mut three, false, 0.0).expect("varies");
         assert_eq!(cut, [0.5, 1.5]);
         let means: Vec<f64> = profile(&three, &cut).bins.iter().map(|bin| bin.mean).collect();
-        assert_eq!(means, [0.0, 1.0, 2.0]);
+        // Sums of thirty thirtieths: a few roundings.
+        assert!(means.iter().zip([0.0, 1.0, 2.0]).all(|(mean, level)| (mean - level).abs() < 1e-12), "{means:?}");
         let mut many: Vec<(f64, f64, f64)> = (0..1200).map(|k| (f64::from(k), 0.0, 0.0)).collect();
         let cut = edges(&mut many, false, 0.0).expect("varies");
         assert!(profile(&many, &cut).bins.iter().all(|bin| bin.count == 100));

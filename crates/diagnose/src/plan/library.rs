@@ -301,3 +301,102 @@ pub(crate) fn of_runs(setting: &Setting, runs: Vec<Run>) -> Dataset {
         runs,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting() -> Setting {
+        Setting {
+            robot: dataset::NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: 0.36,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            top_speed_m_s: 0.25,
+            acceleration_m_s2: 0.5,
+            between_rows_s: 0.05,
+            between_looks_s: Some(0.1),
+            sees_heading: true,
+            relative: false,
+            twist: false,
+            free_m: [2.0, 1.2],
+            minutes: 10.0,
+            handling_s: 20.0,
+            within: String::new(),
+        }
+    }
+
+    fn model(setting: &Setting) -> Model {
+        Model::of(&setting.robot.geometry().expect("a drive"), 0)
+    }
+
+    #[test]
+    fn manoeuvres_fit_the_floor_and_no_time_is_no_manoeuvre() {
+        let all = library(&setting());
+        assert!(all.len() > 20);
+        for manoeuvre in &all {
+            let fits = match manoeuvre.schedule {
+                Schedule::Straights { length_m, .. } => length_m <= 2.0,
+                Schedule::Squares { side_m, .. } => side_m <= 1.2,
+                Schedule::Circles { radius_m, .. } => radius_m <= 0.6 && radius_m > 0.18,
+                _ => true,
+            };
+            assert!(fits, "{manoeuvre:?}");
+        }
+        assert!(library(&Setting { minutes: 0.5, ..setting() }).is_empty());
+    }
+
+    /// A log ends where the program ends and takes as long as the pace says, standing at both ends; its steps are no faster than the top speed.
+    #[test]
+    fn a_foreseen_run_drives_its_program() {
+        let setting = setting();
+        for manoeuvre in library(&setting) {
+            for program in manoeuvre.schedule.with_pairs(1).programs() {
+                let run = foreseen_run(
+                    &program,
+                    &setting,
+                    manoeuvre.speed_m_s,
+                    &model(&setting),
+                    phase_rad(1),
+                    Looks::AsSoFar,
+                )
+                .expect("a run");
+                let end = run.truth.last().expect("looks");
+                let turned = match program.settings {
+                    dataset::ProtocolSettings { length_m: Some(length_m), .. } => {
+                        assert!((end.x_m - length_m).abs() < 1e-9, "{program:?}: {end:?}");
+                        0.0
+                    }
+                    dataset::ProtocolSettings { turn_rad: Some(turn_rad), .. } => turn_rad,
+                    // Squares and circles close.
+                    _ => TAU.copysign(end.theta_rad().expect("a heading")),
+                };
+                // Sums of some hundred arcs: roundings of 1e-16 each.
+                assert!((end.theta_rad().expect("a heading") - turned).abs() < 1e-9, "{program:?}: {end:?}");
+                let driving_s = 60.0 * setting.pace(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
+                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDS_S;
+                assert!((-1e-9..=setting.between_rows_s + 1e-9).contains(&over_s), "{program:?}: {over_s} s more");
+                let WheelLog::Angles(angles) = &run.odometry.wheels else { panic!("angles are logged") };
+                for side in [&angles.left, &angles.right] {
+                    let fastest =
+                        side.windows(2).map(|pair| 0.08 * (pair[1] - pair[0]).abs() / 0.05).fold(0.0, f64::max);
+                    assert!(fastest < manoeuvre.speed_m_s * (1.0 + 1e-9), "{fastest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_read_standing_is_read_where_the_program_says() {
+        let setting = Setting { between_rows_s: f64::INFINITY, between_looks_s: None, ..setting() };
+        let circle = &Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 }.programs()[1];
+        let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
+        let seen: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
+        assert_eq!(seen.len(), 3);
+        // Counter-clockwise from the origin along x: half a turn later the robot is a diameter to the left.
+        assert!(seen[1].0.abs() < 1e-9 && (seen[1].1 - 1.0).abs() < 1e-9, "{seen:?}");
+    }
+}

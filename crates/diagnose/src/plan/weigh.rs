@@ -132,3 +132,46 @@ pub(crate) fn with_runs(before: &Evidence, added: &[(&Evidence, f64)]) -> Eviden
     added.iter().for_each(|(evidence, times)| all.add(evidence, *times));
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Evidence of looks whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
+    fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
+        Evidence {
+            run: (0, 0),
+            information: slopes.transpose() * slopes,
+            gradient: -(slopes.transpose() * values),
+            chi_square: values.dot(values),
+            log_det: 0.0,
+            count: 0.0,
+        }
+    }
+
+    fn rivals(before: &Evidence) -> Rivals {
+        let candidate =
+            |column| Candidate { choice: Choice::Effect { id: "slip_speed", shape: 0 }, columns: vec![column] };
+        let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
+        Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
+    }
+
+    /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
+    #[test]
+    fn what_another_name_can_say_as_well_tells_nothing() {
+        let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 10.0]));
+        let rivals = rivals(&before);
+        // Both names say 10, and nothing tells them apart.
+        assert!(rivals.sizes.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.sizes);
+        let apart = rivals.apart(&before, (0, 1)).expect("determined");
+        assert!(apart.sigmas < 1e-3 && apart.margin < 0.0, "{apart:?}");
+        // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
+        let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
+        let after = with_runs(&before, &[(&new, 1.0)]);
+        let apart = rivals.apart(&after, (0, 1)).expect("determined");
+        // To the size of the priors. Without the other name at its best both would leave 100 or more.
+        assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
+        assert!((apart.margin - (25.0 - CERTAIN * 50_f64.sqrt() - 3.0)).abs() < 1e-3, "{apart:?}");
+    }
+}
