@@ -93,11 +93,8 @@ impl Page<'_> {
                 matter.join(" and ")
             )?;
         } else {
-            writeln!(
-                page,
-                "What the calibrated model leaves, and what the extended one does, against {}:\n",
-                matter.join(", ")
-            )?;
+            let extended = if self.document.gain.is_some() { ", and what the extended one does," } else { "" };
+            writeln!(page, "What the calibrated model leaves{extended} against {}:\n", matter.join(", "))?;
         }
         for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "residuals") {
             writeln!(page, "![{alt}]({stem}.svg)\n")?;

@@ -342,7 +342,8 @@ fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<
     #[allow(clippy::cast_precision_loss)] // a dozen bins
     let share = |k: usize| k as f64 / BINS as f64;
     if round {
-        return Some((1..BINS).map(|k| 360.0 * share(k) - 180.0).collect());
+        // About the middle of a bin, not its edge: robots like to start at 0.
+        return Some((0..BINS).map(|k| 360.0 * (share(k) + 0.5 * share(1)) - 180.0).collect());
     }
     let mut levels: Vec<f64> = Vec::new();
     for (value, ..) in values.iter() {
