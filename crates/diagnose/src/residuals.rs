@@ -330,8 +330,8 @@ pub(crate) fn residuals(base: &JointFit<'_>, model: &Extended<'_>) -> Residuals 
 /// Bins no nearer to each other than this share of what a covariate spans: nearer, a picture shows a blot.
 const NEAREST: f64 = 0.025;
 
-/// Sorts values and cuts them: a turn into equal parts, few levels each for itself, others into parts of equal counts that are not too narrow. `None` when they
-/// vary by less than `least`.
+/// Sorts values and cuts them: a turn into equal parts, few levels each for itself, others into parts of equal counts, or of equal widths where those were too
+/// narrow. `None` when they vary by less than `least`.
 fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<f64>> {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (first, last) = (values.first()?.0, values.last()?.0);
@@ -363,6 +363,10 @@ fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<
         if edge - edges.last().copied().unwrap_or(first) > NEAREST * span && last - edge > NEAREST * span {
             edges.push(edge);
         }
+    }
+    if 2 * edges.len() < BINS {
+        // Most values lie in a few heaps, such as the speeds that were commanded: equal widths keep heaps whole and apart.
+        edges = (1..BINS).map(|k| first + span * share(k)).collect();
     }
     Some(edges)
 }
