@@ -9,7 +9,7 @@ mod support;
 use calib::methods::joint::Joint;
 use dataset::{Dataset, Protocol, Run, Schedule};
 use diagnose::{Document, Limits, NextExperiment, Options, Predicted, diagnose, diagnose_within, plan_scenario};
-use effects::Effect;
+use effects::{Address, Effect, StreamName};
 use scenario::Scenario;
 use support::{document, refusal, succeed};
 
@@ -17,6 +17,7 @@ const MOTION_CAPTURE: &str = include_str!("../scenarios/motion-capture.toml");
 
 const STRAIGHTS: Schedule = Schedule::Straights { length_m: 1.5, runs: 8 };
 const SPINS: Schedule = Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 8 };
+const SQUARES: Schedule = Schedule::Squares { side_m: 1.0, runs_each_way: 3 };
 const CIRCLES: Schedule = Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 4 };
 
 /// A robot under motion capture with calibration errors and one more effect, in a session that does not show which.
@@ -95,6 +96,71 @@ fn planned_runs_leave_the_right_name_alone() {
         assert_eq!(names(&after), [id], "after the planned runs");
     }
     assert!(ambiguous >= 3, "only {ambiguous} of the sessions leave names together: nothing was tested");
+}
+
+/// One of a dozen effects, its size log-uniform between what hardly shows and what is large, in one of five sessions.
+fn drawn(case: u64) -> (&'static str, Scenario) {
+    let mut stream = Address { seed: 60_000, point: 0, trial: case, run: 0 }.stream(StreamName::new("hidden"));
+    let kind = stream.uniform();
+    let session = stream.uniform();
+    let sign = if stream.uniform() < 0.5 { -1.0 } else { 1.0 };
+    let mut size = |low: f64, high: f64| low * (high / low).powf(stream.uniform());
+    let effects: [(&str, String); 12] = [
+        ("lateral_skid", format!("skid_s = {}", size(0.003, 0.03))),
+        ("truth_lever_arm", format!("lever_x_m = {}\nlever_y_m = {}", sign * size(0.001, 0.03), size(0.001, 0.03))),
+        ("truth_yaw", format!("yaw_rad = {}", sign * size(0.001, 0.03))),
+        ("carpet_nap", format!("drift_x = {}\ndrift_y = {}", sign * size(0.0005, 0.008), size(0.0005, 0.008))),
+        ("floor_slope", format!("creep_x_m_s = {}\ncreep_y_m_s = {}", sign * size(5e-5, 6e-4), size(5e-5, 6e-4))),
+        ("turn_rate_wheelbase", format!("beta_s = {}", size(0.003, 0.03))),
+        ("load_transfer", format!("compression_s2_m = {}", size(0.003, 0.02))),
+        ("slip_speed", format!("slip_s_m = {}", size(0.005, 0.05))),
+        ("castor_drag", format!("castor_behind_m = 0.2\ndrag_rad_m = {}", size(0.01, 0.15))),
+        ("wheel_eccentricity", format!("right_amplitude = {}\nright_phase_rad = 1.0", size(0.001, 0.01))),
+        ("direction_asymmetry", format!("left_asymmetry = {}", size(0.001, 0.008))),
+        ("backlash", format!("left_gap_m = {0}\nright_gap_m = {0}", size(4e-4, 2.6e-3))),
+    ];
+    let sessions: [&[Schedule]; 5] =
+        [&[STRAIGHTS], &[STRAIGHTS, SPINS], &[CIRCLES, STRAIGHTS], &[SPINS, CIRCLES], &[SQUARES]];
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // shares of a dozen and of five
+    let (effect, session) = ((12.0 * kind) as usize, (5.0 * session) as usize);
+    let (id, sizes) = &effects[effect];
+    (id, robot(&format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n"), sessions[session]))
+}
+
+/// As many random robots as YAIR_PLANS says, 15 without. Where a plan was made to tell names apart, no other name than the right one may stand alone afterwards.
+#[test]
+fn plans_for_random_robots_name_nothing_wrong() {
+    let cases: u64 = std::env::var("YAIR_PLANS").ok().and_then(|text| text.parse().ok()).unwrap_or(15);
+    let (mut ambiguous, mut planned_for, mut alone, mut shared) = (0, 0, 0, 0);
+    let mut wrong = Vec::new();
+    for case in 0..cases {
+        let (id, hidden) = drawn(case);
+        let first = simulated(&hidden, 61_000 + case);
+        let Ok(found) = diagnose_within(std::slice::from_ref(&first), &Options::default(), &ROOM) else { continue };
+        let found = found.document;
+        if found.findings.iter().all(|finding| finding.names.len() < 2) {
+            continue;
+        }
+        ambiguous += 1;
+        let Some(next) = found.next_experiment.as_ref().filter(|next| next.predicted.is_some()) else {
+            println!("case {case}, {id}: {:?}: no plan tells them apart", names(&found));
+            continue;
+        };
+        planned_for += 1;
+        let all: Vec<Dataset> = [first].into_iter().chain(driven(&hidden, next, 65_000 + 10 * case)).collect();
+        let after = diagnose(&all, &Options::default()).expect("a diagnosis").document;
+        println!("case {case}, {id}: {:?}, {} → {:?}", names(&found), next.drive, names(&after));
+        match &names(&after)[..] {
+            [one] if one == id => alone += 1,
+            [one] if !one.split('|').any(|name| name == id) => wrong.push((case, one.clone())),
+            _ => shared += 1,
+        }
+    }
+    println!(
+        "{cases} robots, {ambiguous} with names together, {planned_for} planned for: {alone} alone, {shared} not alone, {} wrong",
+        wrong.len()
+    );
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// Where the instrument sees the robot against dead reckoning by the first session's calibration: the mean over the runs that a prediction speaks of.
@@ -203,6 +269,8 @@ fn the_command_plans_from_data_and_from_a_scenario() {
     let before = document(dir, &["plan", "hidden.toml", "--room", "4,3", "--minutes", "6"]);
     let minutes = before["next_experiment"]["minutes"].as_f64().expect("a time");
     assert!(minutes > 0.0 && minutes <= 6.0, "{minutes}");
+    let why = refusal(dir, &["plan", "hidden.toml", "--room", "0.2,0.2"]);
+    assert!(why.starts_with("no run fits"), "{why}");
     let why = refusal(dir, &["plan", "hidden.toml"]);
     assert!(why.contains("--room X,Y"), "{why}");
 }

@@ -29,6 +29,8 @@ const LENGTH_WORTH: f64 = 0.3;
 const NEW_KIND: f64 = 1.3;
 /// Less than this, in effects brought into sight by a pair of runs, is not worth driving.
 const LEAST_GAIN: f64 = 0.01;
+/// A length whose relative standard deviation is larger is little better known than before.
+const UNDETERMINED: f64 = 0.02;
 /// Kinds of run that a person keeps apart.
 const MOST_KINDS: usize = 6;
 
@@ -258,7 +260,7 @@ pub struct ScenarioPlan {
     pub scenario: String,
     /// What to drive.
     pub next_experiment: NextExperiment,
-    /// Standard deviations of the three lengths that the runs will leave, by the names of `calibrate`.
+    /// Standard deviations that the runs will leave of the lengths that they determine, metres, by the names of `calibrate`.
     pub sigmas: BTreeMap<String, f64>,
     /// What will show, from which size on.
     pub shows: Vec<Blind>,
@@ -302,12 +304,15 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let setting = Setting::of_scenario(scenario, limits).ok_or(PlanError::NoRoom { scenario: name.clone() })?;
     let noise = noise(scenario).ok_or(PlanError::NoPoses { scenario: name.clone() })?;
     let geometry = scenario.nominal_geometry()?;
+    let nothing_fits = || PlanError::NothingFits { within: setting.within.clone() };
+    if setting.free_m.iter().any(|side_m| *side_m <= 0.0) {
+        return Err(nothing_fits());
+    }
     let fit: JointFit<'_> = Joint::unfitted(Model::of(&geometry, 0), noise, &[]);
     let choices: Vec<Choice> = some_shapes(&mean_terms(&[])).into_iter().filter(is_driven).collect();
     let targets = targets(&choices, Column::BASE.len());
     let frame = Frame::of(&fit, &choices);
     let options = evidences(&fit, &choices, &setting, &library(&setting));
-    let nothing_fits = || PlanError::NothingFits { within: setting.within.clone() };
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
     let worth = |evidence: &Evidence| in_sight(&frame, evidence, &targets) - LENGTH_WORTH * spread(&frame, evidence);
@@ -322,10 +327,12 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         ("right_wheel_diameter_m", diameter_m.right),
         ("wheel_separation_m", geometry.wheel_separation_m()),
     ];
+    let relative: Vec<f64> = (0..lengths.len()).map(|k| covariance[(k, k)].sqrt()).collect();
     let sigmas: BTreeMap<String, f64> = lengths
         .iter()
-        .enumerate()
-        .map(|(k, (name, value))| ((*name).to_owned(), value * covariance[(k, k)].sqrt()))
+        .zip(&relative)
+        .filter(|(_, relative)| **relative < UNDETERMINED)
+        .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
     let all = all_shown(&frame, &after, &targets);
     let (shows, blind): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, sigmas, _)| *sigmas >= SHOWS);
@@ -341,12 +348,18 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         smallest_detectable: None,
     }));
     let predicts = shows.iter().map(|shown| (shown.id.clone(), shown.why.clone())).collect();
-    let relative = |k: usize| 100.0 * covariance[(k, k)].sqrt();
+    let lengths = if sigmas.len() == relative.len() {
+        format!(
+            "determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %",
+            100.0 * relative[0],
+            100.0 * relative[1],
+            100.0 * relative[2]
+        )
+    } else {
+        "does not determine the three lengths".to_owned()
+    };
     let why = format!(
-        "it takes {minutes:.1} min, determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %, and {} of {} effects of the catalogue would show at a large size, sought {}.",
-        relative(0),
-        relative(1),
-        relative(2),
+        "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would show at a large size, sought {}.",
         shows.len(),
         shows.len() + blind_to.len(),
         setting.within
