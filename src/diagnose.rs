@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use ::diagnose::{Diagnosis, Document, Options};
 use clap::Args;
 
+use crate::diagnosis_page::Page;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
@@ -15,7 +16,7 @@ pub(crate) struct Arguments {
     /// Datasets; several are one robot's sessions, diagnosed together.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Folder for findings.json and extended.toml, a scenario of the robot as found.
+    /// Folder for report.md with its pictures, findings.json, and extended.toml, a scenario of the robot as found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take an effect out of the catalogue; may be given several times.
@@ -29,7 +30,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let _ = arguments.seed;
     let datasets = read_datasets(&arguments.datasets, terminal)?;
-    let Diagnosis { mut document, extended } =
+    let Diagnosis { mut document, extended, residuals, alternatives } =
         ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone() })?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
@@ -39,7 +40,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             document.extended_model = Some(path.display().to_string());
         }
         write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(&document)?)?;
-        terminal.remark(&format!("findings in {}", out.display()));
+        Page { document: &document, residuals: &residuals, alternatives: &alternatives }.write(out)?;
+        terminal.remark(&format!("findings in {}; report.md is to be read", out.display()));
     } else if extended.is_ok() {
         document.extended_model_why_null = Some("it is written where --out says".to_owned());
     }
@@ -80,6 +82,9 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
                 drift.base, drift.extended, drift.low, drift.high
             ))?;
         }
+    }
+    if let Some(next) = &document.next_experiment {
+        terminal.say(&format!("next experiment (yair plan tells more): {}", next.drive))?;
     }
     let blind: Vec<&str> = document.blind_to.iter().map(|blind| blind.id.as_str()).collect();
     if !blind.is_empty() {

@@ -3,9 +3,11 @@
 mod calibrate;
 mod compare;
 mod diagnose;
+mod diagnosis_page;
 mod evaluate;
 mod import;
 mod merge;
+mod plan;
 mod reproduce;
 mod simulate;
 mod sweep;
@@ -43,6 +45,7 @@ enum Command {
     Compare(compare::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
+    Plan(plan::Arguments),
     Reproduce(reproduce::Arguments),
 }
 
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
         Command::Merge(arguments) => merge::run(arguments, &terminal),
+        Command::Plan(arguments) => plan::run(arguments, &terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),
     };
     outcome.unwrap_or_else(|failure| {

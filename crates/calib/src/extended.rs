@@ -18,6 +18,8 @@ pub struct EndError {
     pub heading_rad: f64,
     /// Way of the drive's centre, metres.
     pub length_m: f64,
+    /// Where dead reckoning ends, in the frame of where the instrument saw the end: ahead, to the left, turned to the left.
+    pub off: Pose,
 }
 
 impl JointFit<'_> {
@@ -130,6 +132,7 @@ impl JointFit<'_> {
                 position_m: seen.position().distance_m(last.1.position()),
                 heading_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad).abs(),
                 length_m,
+                off: Pose { theta_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad), ..last.1.to(seen) },
             });
         }
         found

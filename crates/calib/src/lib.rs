@@ -8,6 +8,7 @@ mod drift;
 mod drive;
 mod estimate;
 mod extended;
+mod foreseen;
 pub mod likelihood;
 mod looks;
 mod report;

@@ -118,8 +118,7 @@ pub(crate) struct Ends {
 impl Ends {
     /// The first and the last look within the log; `None` as for [`Looks::at`].
     pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
-        let Looks { start, mut later, .. } =
-            Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
+        let Looks { start, mut later, .. } = Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
         let Look { wheel_rad, pose } = later.pop()?;
         Some(Self { start, end: pose, wheel_rad })
     }

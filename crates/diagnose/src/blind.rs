@@ -8,7 +8,7 @@ use crate::scan::scan;
 use crate::search::Extended;
 
 /// √λ for power 0.9 at a two-sided level of 1e-3.
-const SHOWS: f64 = 4.57;
+pub(crate) const SHOWS: f64 = 4.57;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
 pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice]) -> (Vec<Blind>, Vec<Blind>) {

@@ -8,6 +8,7 @@ use kinematics::DriveGeometry;
 use nalgebra::DMatrix;
 use scenario::Scenario;
 
+use crate::alternatives::{Alternative, alternatives};
 use crate::blind::blind;
 use crate::candidate::{Choice, mean_terms};
 use crate::checks::{Checked, check};
@@ -15,6 +16,8 @@ use crate::document::{Document, Finding, Gain, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, left_out, sessions};
 use crate::naming;
+use crate::plan::{Limits, next_experiment};
+use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
 use crate::search::{Extended, Found, evidence, examine, reach, search};
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
@@ -56,6 +59,10 @@ pub struct Diagnosis {
     pub document: Document,
     /// The simulated robot with what was found, where it can be written.
     pub extended: Result<Scenario, String>,
+    /// What the calibrated and the extended model leave, against everything recorded.
+    pub residuals: Residuals,
+    /// Every effect that was asked for, and what became of it.
+    pub alternatives: Vec<Alternative>,
 }
 
 /// Looks whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
@@ -75,6 +82,14 @@ const THINNED: Joint = Joint { nuisances: false, thin: true };
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
 pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
+    diagnose_within(datasets, options, &Limits::default())
+}
+
+/// The same, with the next experiment sought within given limits.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits) -> Result<Diagnosis, DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
@@ -90,7 +105,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         Some(found) => {
             let rewritten = sessions(&found.records);
             let base = ALL_LOOKS.fit(&rewritten)?;
-            Ok(continued(&found.records, base, Some(&found), options))
+            Ok(continued(&found.records, base, Some(&found), options, limits))
         }
         None => {
             let first = first?;
@@ -98,7 +113,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
             if share > MOST_LEFT_OUT {
                 return Err(DiagnoseError::NothingFollows { percent: 100.0 * share });
             }
-            Ok(continued(datasets, first, None, options))
+            Ok(continued(datasets, first, None, options, limits))
         }
     }
 }
@@ -173,7 +188,13 @@ pub(crate) fn is_covariate(name: &str) -> bool {
         && name != "run_to_run"
 }
 
-fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, options: &Options) -> Diagnosis {
+fn continued(
+    datasets: &[Dataset],
+    base: JointFit<'_>,
+    fault: Option<&Fault>,
+    options: &Options,
+    limits: &Limits,
+) -> Diagnosis {
     let catalogue = mean_terms(&options.without);
     let asked = ask(datasets, base, &catalogue);
     let mut findings: Vec<Finding> = fault.map(naming::of_fault).into_iter().collect();
@@ -198,8 +219,11 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
     }
     let (gain, gain_why_null) = gain_of(&asked.base, model);
     let (sensitivity, blind_to) = blind(model, &catalogue);
+    let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
     let verdict = verdict(&findings);
     let extended = crate::scenario_of::scenario_of(datasets, model, &findings);
+    let residuals = residuals(&asked.base, model);
+    let alternatives = alternatives(&asked.found, &findings);
     let names: Vec<String> = datasets
         .iter()
         .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
@@ -218,11 +242,12 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
         },
         gain,
         gain_why_null,
-        next_experiment: None,
+        next_experiment_why_null: next.as_ref().err().cloned(),
+        next_experiment: next.ok(),
         extended_model: None,
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
-    Diagnosis { document, extended }
+    Diagnosis { document, extended, residuals, alternatives }
 }
 
 fn is_scatter(finding: &Finding) -> bool {

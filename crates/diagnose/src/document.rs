@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib::{CalibrationReport, Names};
+use dataset::Schedule;
 use serde::Serialize;
 
 /// In one word.
@@ -45,6 +46,9 @@ pub struct Document {
     pub gain_why_null: Option<String>,
     /// What to drive to tell names apart.
     pub next_experiment: Option<NextExperiment>,
+    /// Why there is nothing to drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub next_experiment_why_null: Option<String>,
     /// Where the extended scenario is.
     pub extended_model: Option<String>,
     /// Why there is none.
@@ -159,10 +163,52 @@ pub struct Compared {
 /// What to drive next.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NextExperiment {
-    /// What to drive.
+    /// What to drive, as the part of a scenario that drives it (TOML).
     pub protocol: String,
-    /// Why.
+    /// Why, within which floor and time, and where to look.
     pub why: String,
-    /// What each name predicts.
+    /// What each name predicts, or from which size on an effect would show.
     pub predicts: BTreeMap<String, String>,
+    /// The predictions as numbers, where names are to be told apart.
+    pub predicted: Option<Predicted>,
+    /// What to drive, in words.
+    pub drive: String,
+    /// The same by speed: a session each.
+    pub sessions: Vec<PlannedSession>,
+    /// How many runs.
+    pub runs: u64,
+    /// Driving and handling, minutes.
+    pub minutes: f64,
+    /// One side over which the robot's centre moves, metres.
+    pub free_x_m: f64,
+    /// The other side, metres.
+    pub free_y_m: f64,
+    /// Floor and time within which it was sought, and where they come from.
+    pub within: String,
+}
+
+/// Runs at one speed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlannedSession {
+    /// Speed of the faster wheel, m/s: `cruise_speed_m_s` of a scenario's robot.
+    pub speed_m_s: f64,
+    /// The `[[protocol]]` blocks of a scenario.
+    #[serde(skip)]
+    pub protocol_toml: String,
+    /// What is driven.
+    #[serde(rename = "protocol")]
+    pub schedules: Vec<Schedule>,
+}
+
+/// What each name says that one kind of run will show: where the instrument sees the robot against dead reckoning with the calibrated lengths alone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Predicted {
+    /// `forward`, `backward`, `clockwise` or `counter-clockwise`.
+    pub direction: String,
+    /// When: a share of the run's duration.
+    pub share_of_duration: f64,
+    /// `along` (ahead is positive), `across` (left is positive) or `heading` (left is positive).
+    pub component: String,
+    /// The mean over the runs of that direction, by name.
+    pub values: BTreeMap<String, Value>,
 }

@@ -4,6 +4,7 @@
 //! rivals; checks of what is left; scatter named from failed checks; a sparse term where structure is left that no name explains; the gain on held-out runs.
 //! It never reads what a simulator hid: it depends on the measured records and the hypotheses of [`effects`] alone. docs/diagnose.md says what the numbers mean.
 
+mod alternatives;
 mod blind;
 mod candidate;
 mod checks;
@@ -12,6 +13,8 @@ mod document;
 mod gain;
 mod gross;
 mod naming;
+mod plan;
+mod residuals;
 mod scan;
 mod scatter;
 mod scenario_of;
@@ -20,7 +23,11 @@ mod sparse;
 mod statistics;
 mod unlisted;
 
-pub use diagnosis::{DiagnoseError, Diagnosis, Options, diagnose};
+pub use alternatives::{Alternative, Fate};
+pub use diagnosis::{DiagnoseError, Diagnosis, Options, diagnose, diagnose_within};
 pub use document::{
-    Blind, Check, Compared, Document, Finding, Gain, NextExperiment, Smallest, UnlistedTerm, Value, Verdict,
+    Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
+    Value, Verdict,
 };
+pub use plan::{Limits, PlanError, ScenarioPlan, plan_scenario};
+pub use residuals::{Against, Bin, Component, Profile, Residuals};

@@ -14,7 +14,7 @@ const STAND_IN: &str = include_str!("stand_in.toml");
 /// A controller regulates on counts much finer than most logs' ticks.
 const LEAST_COUNTS: f64 = 40_000.0;
 /// Looks farther apart than this, in a run of a few, are readings of a standing robot.
-const READ_STANDING_S: f64 = 2.0;
+pub(crate) const READ_STANDING_S: f64 = 2.0;
 
 /// The scenario, or why it cannot be written.
 pub(crate) fn scenario_of(
@@ -118,14 +118,14 @@ fn geometry(model: &Extended<'_>) -> Result<Vec<Effect>, String> {
 }
 
 /// How fast and how often.
-struct Pace {
-    speed_m_s: f64,
-    between_rows_s: f64,
-    between_looks_s: f64,
+pub(crate) struct Pace {
+    pub(crate) speed_m_s: f64,
+    pub(crate) between_rows_s: f64,
+    pub(crate) between_looks_s: f64,
 }
 
 impl Pace {
-    fn of(datasets: &[Dataset], model: &Extended<'_>) -> Self {
+    pub(crate) fn of(datasets: &[Dataset], model: &Extended<'_>) -> Self {
         let mut rows: Vec<f64> = Vec::new();
         let mut speeds: Vec<f64> = Vec::new();
         for dataset in datasets {

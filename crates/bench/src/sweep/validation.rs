@@ -37,7 +37,8 @@ impl Validation {
         certain.effects.retain(|effect| {
             matches!(effects::hypothesis(effect.id()), Some(Hypothesis::Geometry | Hypothesis::Terms(_)))
         });
-        let driven = simulate_programs(&certain, &programs, Address { seed: scenario.seed, point: 0, trial: 0, run: 0 })?;
+        let driven =
+            simulate_programs(&certain, &programs, Address { seed: scenario.seed, point: 0, trial: 0, run: 0 })?;
         let true_motion = driven
             .truth
             .runs

@@ -32,6 +32,8 @@ pub struct Innovation {
     pub component: usize,
     /// Over its standard deviation.
     pub z: f64,
+    /// That standard deviation: metres, or radians of a heading.
+    pub sigma: f64,
 }
 
 /// Whether looks that lie far off are left out.
@@ -501,7 +503,14 @@ impl<'f, 'a> Filter<'f, 'a> {
             }
             self.sums.add(&self.j, v, s);
             if self.want.innovations {
-                self.innovations.push(Innovation { chain: self.number, look: leg.look, component, z: v / s.sqrt() });
+                let sigma = s.sqrt();
+                self.innovations.push(Innovation {
+                    chain: self.number,
+                    look: leg.look,
+                    component,
+                    z: v / sigma,
+                    sigma,
+                });
             }
             for (by, j) in self.by.iter_mut().zip(&self.j) {
                 *by += gain * *j;

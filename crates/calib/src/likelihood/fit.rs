@@ -286,7 +286,7 @@ fn step_noise(noise: &mut Noise, pace: &mut Pace, found: &Pass, prior: &NoisePri
 }
 
 /// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
-fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
+pub(crate) fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
     let Some(first) = chain.looks.first().filter(|look| chain.start == Start::Seen && look.theta_rad.is_none()) else {
         return 0.0;
     };

@@ -145,6 +145,12 @@ impl<'a> Records<'a> {
         self.chains.iter().map(|chain| chain.looks.len()).sum()
     }
 
+    /// When a look of a chain was, seconds from the run's start.
+    #[must_use]
+    pub fn look_s(&self, chain: usize, look: usize) -> Option<f64> {
+        Some(self.chains.get(chain)?.looks.get(look)?.t_s)
+    }
+
     /// Final errors of dead reckoning in a run, from the first look of each chain to its last: of the position, metres, and of the heading, radians.
     pub(crate) fn end_errors(&self, run: (usize, usize), model: &Model) -> impl Iterator<Item = (f64, f64)> {
         self.chains.iter().filter(move |chain| chain.run == run).filter_map(|chain| chain.end_error(model))

@@ -1,0 +1,402 @@
+//! What can be driven: straights, spins, squares and circles that fit the floor, each at several speeds, as pairs of runs in both directions.
+
+use std::f64::consts::TAU;
+
+use calib::likelihood::Model;
+use dataset::{Cost, Dataset, Displacement, Motion, MotionProgram, Odometry, Provenance, Run, RunInfo, Schedule};
+use dataset::{TruthNoise, TruthSample, WheelLog};
+use kinematics::{Increment, Pose, Wheels};
+
+use super::setting::Setting;
+
+/// Shares of the largest size and of the top speed that are tried.
+const SIZES: [f64; 2] = [1.0, 0.5];
+const SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
+const TURNS: [f64; 2] = [1.0, 3.0];
+/// Shorter ways show nothing that a look does not blur, metres.
+const SHORTEST_M: f64 = 0.2;
+
+/// A pair of runs, one in each direction, at one speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Manoeuvre {
+    pub(crate) schedule: Schedule,
+    pub(crate) speed_m_s: f64,
+}
+
+impl Manoeuvre {
+    pub(crate) fn cost(&self, setting: &Setting) -> Cost {
+        let pace = setting.pace(self.speed_m_s);
+        self.schedule.with_pairs(1).programs().iter().map(|program| pace.cost(program)).sum()
+    }
+}
+
+/// Every manoeuvre that fits the floor and of which a pair of runs fits the time.
+pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
+    let (shorter_m, longer_m) = setting.sides_m();
+    let separation_m = setting.robot.wheel_separation_m;
+    let mut schedules: Vec<Schedule> = Vec::new();
+    for size in SIZES {
+        let length_m = rounded(size * longer_m);
+        if length_m >= SHORTEST_M {
+            schedules.push(Schedule::Straights { length_m, runs: 2 });
+        }
+        let side_m = rounded(size * shorter_m);
+        if side_m >= SHORTEST_M {
+            schedules.push(Schedule::Squares { side_m, runs_each_way: 1 });
+        }
+        let radius_m = rounded(0.5 * size * shorter_m);
+        // Tighter than this the inner wheel goes backward: that is nearly a spin.
+        if radius_m > 0.5 * separation_m {
+            schedules.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
+        }
+    }
+    schedules.extend(TURNS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
+    let speeds = SPEEDS.map(|share| significant(share * setting.top_speed_m_s));
+    let all = speeds
+        .into_iter()
+        .flat_map(|speed_m_s| schedules.iter().map(move |schedule| Manoeuvre { schedule: *schedule, speed_m_s }));
+    all.filter(|manoeuvre| manoeuvre.cost(setting).minutes <= setting.minutes).collect()
+}
+
+/// Down to a centimetre, as a person would mark it on the floor.
+fn rounded(length_m: f64) -> f64 {
+    (100.0 * length_m).floor() / 100.0
+}
+
+/// To three digits.
+fn significant(value: f64) -> f64 {
+    // By way of its digits: a product with a power of ten would end in a rounding that a person has to read.
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+/// Rows of a log that nobody wrote yet, and when the robot stood to be read.
+struct Log {
+    t_s: Vec<f64>,
+    angle_rad: Wheels<Vec<f64>>,
+    read_s: Vec<f64>,
+}
+
+/// How long a robot stands before and after a run that is logged at even intervals, seconds. A log that began with its motion would tell effects of starting apart
+/// that no real log does.
+const STANDS_S: f64 = 0.5;
+
+/// One motion of a program: when it begins, how it goes, and from where each wheel turns by how much.
+struct Stretch {
+    from_s: f64,
+    profile: Trapezoid,
+    from_rad: Wheels<f64>,
+    turn_rad: Wheels<f64>,
+}
+
+/// Drives a program by the nominal robot: the wheel that goes farther drives a trapezoid of speed, the other one in proportion. Rows come at even intervals, or,
+/// where a robot writes none on the way, between motions.
+fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wheels<f64>) -> Option<Log> {
+    let geometry = setting.robot.geometry().ok()?;
+    let m_per_rad = geometry.m_per_rad();
+    let even = setting.between_looks_s.is_some();
+    let stands_s = if even { STANDS_S } else { 0.0 };
+    let (mut t_s, mut angle_rad) = (stands_s, phase_rad);
+    let (mut stretches, mut read_s): (Vec<Stretch>, Vec<f64>) = (Vec::new(), vec![0.0]);
+    for motion in &program.motions {
+        let increment = match *motion {
+            Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
+            Motion::Spin { turn_rad } => Increment { distance_m: 0.0, turn_rad },
+            Motion::Arc { radius_m, turn_rad } => Increment { distance_m: radius_m * turn_rad.abs(), turn_rad },
+            Motion::Pause { duration_s } => {
+                t_s += duration_s;
+                continue;
+            }
+            Motion::Measure => {
+                read_s.push(t_s);
+                continue;
+            }
+        };
+        let travel_m = geometry.travel_m(increment);
+        let turn_rad = travel_m.zip_with(m_per_rad, |travel_m, m_per_rad| travel_m / m_per_rad);
+        let farther_m = travel_m.left.abs().max(travel_m.right.abs());
+        let profile = Trapezoid::new(farther_m, speed_m_s, setting.acceleration_m_s2);
+        let duration_s = profile.duration_s;
+        stretches.push(Stretch { from_s: t_s, profile, from_rad: angle_rad, turn_rad });
+        t_s += duration_s;
+        angle_rad = angle_rad.zip_with(turn_rad, |angle, turn| angle + turn);
+    }
+    let end_s = t_s + stands_s;
+    read_s.push(end_s);
+    let mut times: Vec<f64> = if setting.between_rows_s < end_s {
+        std::iter::successors(Some(0.0), |t_s| Some(t_s + setting.between_rows_s))
+            .take_while(|t_s| *t_s < end_s)
+            .collect()
+    } else {
+        std::iter::once(0.0).chain(stretches.iter().map(|stretch| stretch.from_s).filter(|t_s| *t_s > 0.0)).collect()
+    };
+    if even {
+        // The last row is the first at even intervals after the robot stands.
+        times.push(times.last()? + setting.between_rows_s);
+    } else {
+        times.retain(|t_s| *t_s < end_s - 1e-9);
+        times.push(end_s);
+    }
+    let mut rows = Wheels { left: Vec::with_capacity(times.len()), right: Vec::with_capacity(times.len()) };
+    for t_s in &times {
+        let at = stretches.partition_point(|stretch| stretch.from_s <= *t_s);
+        let angle_rad = at.checked_sub(1).map_or(phase_rad, |at| {
+            let Stretch { from_s, profile, from_rad, turn_rad } = &stretches[at];
+            let share = profile.share((t_s - from_s).min(profile.duration_s));
+            from_rad.zip_with(*turn_rad, |from, turn| from + share * turn)
+        });
+        rows.left.push(angle_rad.left);
+        rows.right.push(angle_rad.right);
+    }
+    Some(Log { t_s: times, angle_rad: rows, read_s })
+}
+
+/// A trapezoid of speed over a way.
+struct Trapezoid {
+    way_m: f64,
+    top_m_s: f64,
+    acceleration_m_s2: f64,
+    duration_s: f64,
+}
+
+impl Trapezoid {
+    fn new(way_m: f64, speed_m_s: f64, acceleration_m_s2: f64) -> Self {
+        let top_m_s = speed_m_s.min((way_m * acceleration_m_s2).sqrt()).max(f64::MIN_POSITIVE);
+        Self { way_m, top_m_s, acceleration_m_s2, duration_s: way_m / top_m_s + top_m_s / acceleration_m_s2 }
+    }
+
+    /// What share of the way is behind after a time.
+    fn share(&self, t_s: f64) -> f64 {
+        let ramp_s = self.top_m_s / self.acceleration_m_s2;
+        let gone_m = if t_s < ramp_s {
+            0.5 * self.acceleration_m_s2 * t_s * t_s
+        } else if t_s < self.duration_s - ramp_s {
+            self.top_m_s * (t_s - 0.5 * ramp_s)
+        } else {
+            self.way_m - 0.5 * self.acceleration_m_s2 * (self.duration_s - t_s).max(0.0).powi(2)
+        };
+        gone_m / self.way_m
+    }
+}
+
+/// When a run that is not driven yet is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Looks {
+    /// As the data's instrument looks.
+    AsSoFar,
+    /// At the start and at a share of the run's duration.
+    At(f64),
+}
+
+/// A run as it would be recorded if the robot were as the model says and nothing had noise.
+pub(crate) fn foreseen_run(
+    program: &MotionProgram,
+    setting: &Setting,
+    speed_m_s: f64,
+    model: &Model,
+    phase_rad: Wheels<f64>,
+    looks: Looks,
+) -> Option<Run> {
+    let log = log(program, setting, speed_m_s, phase_rad)?;
+    let end_s = *log.t_s.last()?;
+    let times: Vec<f64> = match (looks, setting.between_looks_s) {
+        (Looks::At(share), _) => vec![0.0, share * end_s],
+        (Looks::AsSoFar, None) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
+        (Looks::AsSoFar, Some(between_s)) => {
+            let mut times: Vec<f64> = std::iter::successors(Some(0.0), |t_s| Some(t_s + between_s))
+                .take_while(|t_s| *t_s < end_s - 0.5 * between_s)
+                .collect();
+            times.push(end_s);
+            times
+        }
+    };
+    let poses = seen(&log, &times, model);
+    let info = RunInfo {
+        id: program.id.clone(),
+        protocol: Some(program.protocol),
+        settings: program.settings,
+        ..RunInfo::default()
+    };
+    let mut run = Run { info, ..Run::default() };
+    if setting.relative && looks == Looks::AsSoFar {
+        run.displacements = poses.windows(2).map(displacement).collect();
+    } else {
+        let heading = |pose: &Pose| (setting.sees_heading || looks != Looks::AsSoFar).then_some(pose.theta_rad);
+        run.truth = poses.iter().map(|(t_s, pose)| TruthSample::new(*t_s, pose.x_m, pose.y_m, heading(pose))).collect();
+    }
+    let wheels = if setting.twist { twist(&log, setting)? } else { WheelLog::Angles(log.angle_rad) };
+    run.odometry = Odometry { t_s: log.t_s, wheels, ..Odometry::default() };
+    Some(run)
+}
+
+/// The instrument's poses at some instants.
+fn seen(log: &Log, times: &[f64], model: &Model) -> Vec<(f64, Pose)> {
+    let (mut pose, mut row) = (Pose::IDENTITY, 0);
+    let step = |row: usize, share: f64| {
+        let turned = |side: &Vec<f64>| share * (side[row + 1] - side[row]);
+        let travel_m = log.angle_rad.as_ref().map(turned).zip_with(model.m_per_rad, |rad, m_per_rad| rad * m_per_rad);
+        Increment::from_travel(travel_m, model.separation_m).arc()
+    };
+    times
+        .iter()
+        .map(|&t_s| {
+            let at_s = (t_s - model.latency_s).max(0.0);
+            while row + 1 < log.t_s.len() && log.t_s[row + 1] <= at_s {
+                pose = pose * step(row, 1.0);
+                row += 1;
+            }
+            let here = if row + 1 < log.t_s.len() {
+                pose * step(row, (at_s - log.t_s[row]) / (log.t_s[row + 1] - log.t_s[row]))
+            } else {
+                pose
+            };
+            (t_s, here * model.body_from_sensor)
+        })
+        .collect()
+}
+
+fn displacement(pair: &[(f64, Pose)]) -> Displacement {
+    let moved = pair[0].1.to(pair[1].1);
+    Displacement { t0_s: pair[0].0, t1_s: pair[1].0, dx_m: moved.x_m, dy_m: moved.y_m, dtheta_rad: moved.theta_rad }
+}
+
+fn twist(log: &Log, setting: &Setting) -> Option<WheelLog> {
+    let geometry = setting.robot.geometry().ok()?;
+    let (mut v_mps, mut omega_radps) = (vec![0.0], vec![0.0]);
+    for row in 1..log.t_s.len() {
+        let dt_s = log.t_s[row] - log.t_s[row - 1];
+        let travel_m = log
+            .angle_rad
+            .as_ref()
+            .map(|side| side[row] - side[row - 1])
+            .zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
+        let increment = geometry.increment(travel_m);
+        v_mps.push(increment.distance_m / dt_s);
+        omega_radps.push(increment.turn_rad / dt_s);
+    }
+    Some(WheelLog::Twist { v_mps, omega_radps })
+}
+
+/// Where wheels stand at the start of run after run, radians: nobody sets them, so that they are spread evenly (multiples of two irrational shares of a turn).
+pub(crate) fn phase_rad(run: u32) -> Wheels<f64> {
+    let at = |share: f64| TAU * (f64::from(run) * share).fract();
+    Wheels { left: at(0.618_034), right: at(0.414_214) }
+}
+
+/// A pair of runs of a manoeuvre.
+pub(crate) fn foreseen(manoeuvre: &Manoeuvre, setting: &Setting, model: &Model) -> Dataset {
+    let programs = manoeuvre.schedule.with_pairs(1).programs();
+    let runs = programs.iter().zip(0..).filter_map(|(program, number)| {
+        foreseen_run(program, setting, manoeuvre.speed_m_s, model, phase_rad(number), Looks::AsSoFar)
+    });
+    of_runs(setting, runs.collect())
+}
+
+/// Runs as a dataset of the setting's robot.
+pub(crate) fn of_runs(setting: &Setting, runs: Vec<Run>) -> Dataset {
+    Dataset {
+        provenance: Provenance::default(),
+        robot: setting.robot,
+        truth_noise: TruthNoise::default(),
+        points: Vec::new(),
+        runs,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting() -> Setting {
+        Setting {
+            robot: dataset::NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: 0.36,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            top_speed_m_s: 0.25,
+            acceleration_m_s2: 0.5,
+            between_rows_s: 0.05,
+            between_looks_s: Some(0.1),
+            sees_heading: true,
+            relative: false,
+            twist: false,
+            free_m: [2.0, 1.2],
+            minutes: 10.0,
+            handling_s: 20.0,
+            within: String::new(),
+        }
+    }
+
+    fn model(setting: &Setting) -> Model {
+        Model::of(&setting.robot.geometry().expect("a drive"), 0)
+    }
+
+    #[test]
+    fn manoeuvres_fit_the_floor_and_no_time_is_no_manoeuvre() {
+        let all = library(&setting());
+        assert!(all.len() > 20);
+        for manoeuvre in &all {
+            let fits = match manoeuvre.schedule {
+                Schedule::Straights { length_m, .. } => length_m <= 2.0,
+                Schedule::Squares { side_m, .. } => side_m <= 1.2,
+                Schedule::Circles { radius_m, .. } => radius_m <= 0.6 && radius_m > 0.18,
+                _ => true,
+            };
+            assert!(fits, "{manoeuvre:?}");
+        }
+        assert!(library(&Setting { minutes: 0.5, ..setting() }).is_empty());
+    }
+
+    /// A log ends where the program ends and takes as long as the pace says, standing at both ends; its steps are no faster than the top speed.
+    #[test]
+    fn a_foreseen_run_drives_its_program() {
+        let setting = setting();
+        for manoeuvre in library(&setting) {
+            for program in manoeuvre.schedule.with_pairs(1).programs() {
+                let run = foreseen_run(
+                    &program,
+                    &setting,
+                    manoeuvre.speed_m_s,
+                    &model(&setting),
+                    phase_rad(1),
+                    Looks::AsSoFar,
+                )
+                .expect("a run");
+                let end = run.truth.last().expect("looks");
+                let turned = match program.settings {
+                    dataset::ProtocolSettings { length_m: Some(length_m), .. } => {
+                        assert!((end.x_m - length_m).abs() < 1e-9, "{program:?}: {end:?}");
+                        0.0
+                    }
+                    dataset::ProtocolSettings { turn_rad: Some(turn_rad), .. } => turn_rad,
+                    // Squares and circles close.
+                    _ => TAU.copysign(end.theta_rad().expect("a heading")),
+                };
+                // Sums of some hundred arcs: roundings of 1e-16 each.
+                assert!((end.theta_rad().expect("a heading") - turned).abs() < 1e-9, "{program:?}: {end:?}");
+                let driving_s = 60.0 * setting.pace(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
+                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDS_S;
+                assert!((-1e-9..=setting.between_rows_s + 1e-9).contains(&over_s), "{program:?}: {over_s} s more");
+                let WheelLog::Angles(angles) = &run.odometry.wheels else { panic!("angles are logged") };
+                for side in [&angles.left, &angles.right] {
+                    let fastest =
+                        side.windows(2).map(|pair| 0.08 * (pair[1] - pair[0]).abs() / 0.05).fold(0.0, f64::max);
+                    assert!(fastest < manoeuvre.speed_m_s * (1.0 + 1e-9), "{fastest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_read_standing_is_read_where_the_program_says() {
+        let setting = Setting { between_rows_s: f64::INFINITY, between_looks_s: None, ..setting() };
+        let circle = &Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 }.programs()[1];
+        let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
+        let seen: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
+        assert_eq!(seen.len(), 3);
+        // Counter-clockwise from the origin along x: half a turn later the robot is a diameter to the left.
+        assert!(seen[1].0.abs() < 1e-9 && (seen[1].1 - 1.0).abs() < 1e-9, "{seen:?}");
+    }
+}

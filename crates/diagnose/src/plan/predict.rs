@@ -1,0 +1,193 @@
+//! What each name says that the planned runs will show, written down before they are driven.
+//!
+//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
+//! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
+
+use calib::likelihood::{Column, Evidence, Model};
+use calib::methods::joint::JointFit;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::library::{Looks, foreseen_run, of_runs, phase_rad};
+use super::setting::Setting;
+use super::weigh::Rivals;
+use super::{Part, words};
+use crate::candidate::{Choice, terms};
+use crate::document::{Predicted, Value};
+use crate::search::Extended;
+
+/// Instants of a run at which a prediction is made: shares of its duration.
+const INSTANTS: u32 = 12;
+/// How the wheels stand at the start is not known: so many ways are averaged.
+const PHASES: u32 = 4;
+/// A difference of so many standard deviations shows in a single kind of look; with less, only all looks together tell.
+const SHOWS: f64 = 2.0;
+
+/// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the name, and variance by the noise.
+#[derive(Debug, Clone)]
+struct Seen {
+    mean: Vector3<f64>,
+    known_var: Vector3<f64>,
+    noise_var: Vector3<f64>,
+}
+
+/// Where to look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Where {
+    pub(super) direction: usize,
+    /// Share of the run's duration.
+    pub(super) share: f64,
+    /// 0 along, 1 across, 2 heading.
+    pub(super) component: usize,
+}
+
+/// A sentence of what is predicted, and the prediction of each name.
+pub(super) fn predictions(
+    base: &JointFit<'_>,
+    without: &Extended<'_>,
+    rivals: &Rivals,
+    before: &Evidence,
+    told: &[(usize, usize)],
+    parts: &[Part],
+    setting: &Setting,
+) -> Option<(String, Predicted)> {
+    let all: Vec<Choice> =
+        without.choices.iter().cloned().chain(rivals.candidates.iter().map(|name| name.choice.clone())).collect();
+    let mut best: Option<(f64, Part, Where, Vec<Seen>)> = None;
+    for part in parts {
+        let run = Foreseen::new(base, part, setting)?;
+        let of_names: Vec<Vec<Seen>> = rivals
+            .candidates
+            .iter()
+            .map(|candidate| {
+                let columns = rivals.frame.with(candidate);
+                let (step, covariance) = rivals.frame.estimate(before, &columns)?;
+                run.of(&without.fit.fit.model, &all, &columns, (&step, &covariance))
+            })
+            .collect::<Option<_>>()?;
+        let components = if setting.sees_heading { 3 } else { 2 };
+        for place in 0..of_names[0].len() {
+            for component in 0..components {
+                let seen: Vec<Seen> = of_names.iter().map(|name| name[place].clone()).collect();
+                let apart = |(a, b): &(usize, usize)| {
+                    let (a, b) = (&seen[*a], &seen[*b]);
+                    let var = a.known_var[component] + b.known_var[component] + a.noise_var[component];
+                    (a.mean[component] - b.mean[component]).abs() / var.max(f64::MIN_POSITIVE).sqrt()
+                };
+                let sigmas = told.iter().map(apart).fold(f64::INFINITY, f64::min);
+                if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
+                    let at = Where { direction: place / INSTANTS as usize, share: share(place), component };
+                    best = Some((sigmas, *part, at, seen));
+                }
+            }
+        }
+    }
+    let (sigmas, part, at, seen) = best?;
+    let unit = if at.component == 2 { "rad" } else { "m" };
+    let values = rivals.candidates.iter().zip(&seen).map(|(candidate, seen)| {
+        let (value, var) = (seen.mean[at.component], (seen.known_var + seen.noise_var)[at.component]);
+        (candidate.choice.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
+    });
+    let predicted = Predicted {
+        direction: words::direction(&part.manoeuvre.schedule, at.direction).to_owned(),
+        share_of_duration: at.share,
+        component: ["along", "across", "heading"][at.component].to_owned(),
+        values: values.collect(),
+    };
+    let mut sentence = words::where_to_look(&part, &at);
+    if sigmas < SHOWS {
+        sentence.push_str(" No single look tells them apart: all looks of the runs together do.");
+    }
+    Some((sentence, predicted))
+}
+
+#[allow(clippy::cast_precision_loss)] // a dozen
+fn share(place: usize) -> f64 {
+    (place % INSTANTS as usize + 1) as f64 / f64::from(INSTANTS)
+}
+
+/// Runs of a part, each seen at its start and at one instant, by direction, instant and phase.
+struct Foreseen {
+    dataset: dataset::Dataset,
+    reference: Model,
+    noise: Vec<Vector3<f64>>,
+    runs: f64,
+}
+
+impl Foreseen {
+    fn new(base: &JointFit<'_>, part: &Part, setting: &Setting) -> Option<Self> {
+        let programs = part.manoeuvre.schedule.with_pairs(1).programs();
+        let mut runs = Vec::new();
+        for program in &programs {
+            for instant in 1..=INSTANTS {
+                for phase in 0..PHASES {
+                    let at = Looks::At(f64::from(instant) / f64::from(INSTANTS));
+                    let model = &base.fit.model;
+                    let phase = phase_rad(phase);
+                    let mut run = foreseen_run(program, setting, part.manoeuvre.speed_m_s, model, phase, at)?;
+                    run.info.id = format!("{}_{}", program.id, runs.len());
+                    runs.push(run);
+                }
+            }
+        }
+        let dataset = of_runs(setting, runs);
+        let noise = base.foreseeing(&[dataset.session()]).end_variances();
+        (noise.len() == dataset.runs.len()).then(|| Self {
+            reference: base.fit.model.clone(),
+            noise,
+            runs: f64::from(part.pairs),
+            dataset,
+        })
+    }
+
+    /// What a name says of every direction and instant.
+    fn of(
+        &self,
+        model: &Model,
+        all: &[Choice],
+        columns: &[usize],
+        (step, covariance): (&DVector<f64>, &DMatrix<f64>),
+    ) -> Option<Vec<Seen>> {
+        let parameters: usize = all.iter().map(|choice| choice.parameters().len()).sum();
+        let mut named = model.clone();
+        named.sizes.resize(parameters, 0.0);
+        columns.iter().zip(step.iter()).for_each(|(column, by)| named.advance(column_at(*column), *by));
+        let noise = calib::likelihood::Noise { variance: [1.0; 4] };
+        // Only the records matter here: dead reckoning takes the model that it is given.
+        let fit = calib::methods::joint::Joint::unfitted(self.reference.clone(), noise, &[self.dataset.session()]);
+        let ends = |model: &Model| -> Option<Vec<Vector3<f64>>> {
+            let ends = fit.reckoned(model, &mut terms(all));
+            let vector = |end: &calib::EndError| Vector3::new(end.off.x_m, end.off.y_m, end.off.theta_rad);
+            (ends.len() == self.dataset.runs.len()).then(|| ends.iter().map(vector).collect())
+        };
+        let here = ends(&named)?;
+        let mut slopes: Vec<Vec<Vector3<f64>>> = Vec::new();
+        for (k, column) in columns.iter().enumerate() {
+            let by = 0.1 * covariance[(k, k)].sqrt();
+            let mut beside = named.clone();
+            beside.advance(column_at(*column), by);
+            slopes.push(ends(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect());
+        }
+        let group = PHASES as usize;
+        #[allow(clippy::cast_precision_loss)]
+        let n = group as f64;
+        let seen = (0..here.len() / group).map(|place| {
+            let own = place * group..(place + 1) * group;
+            let mean = here[own.clone()].iter().sum::<Vector3<f64>>() / n;
+            let spread =
+                here[own.clone()].iter().map(|end| (end - mean).component_mul(&(end - mean))).sum::<Vector3<f64>>() / n;
+            let noise = self.noise[own.clone()].iter().sum::<Vector3<f64>>() / n;
+            let slope: Vec<Vector3<f64>> =
+                slopes.iter().map(|of| of[own.clone()].iter().sum::<Vector3<f64>>() / n).collect();
+            let known_var = Vector3::from_fn(|component, _| {
+                let slope = DVector::from_fn(slope.len(), |k, _| slope[k][component]);
+                (slope.transpose() * covariance * &slope)[0].max(0.0)
+            });
+            Seen { mean, known_var, noise_var: (noise + spread) / self.runs }
+        });
+        Some(seen.collect())
+    }
+}
+
+fn column_at(index: usize) -> Column {
+    Column::BASE.get(index).copied().unwrap_or_else(|| Column::Term(index - Column::BASE.len()))
+}

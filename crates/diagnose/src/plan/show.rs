@@ -1,0 +1,397 @@
+//! What to drive to see what would not have shown: manoeuvres are added as long as they bring something into sight, by what they bring a minute.
+//!
+//! An effect is in sight when a size that would be large for a real robot shows with nine chances in ten (√λ = 4.57). Before there is any data the three lengths of
+//! the drive count too, by the logarithm of their standard deviations (Wald 1943, D-optimum designs); adding the best run again and again is Wynn's rule (1970).
+
+use std::collections::BTreeMap;
+
+use calib::likelihood::{Column, Evidence, Model, Noise};
+use calib::methods::joint::{Joint, JointFit};
+use scenario::{Instrument, Scenario};
+use serde::Serialize;
+
+use super::library::{Manoeuvre, library};
+use super::setting::{Limits, Setting};
+use super::weigh::{Frame, with_runs};
+use super::words::Predictions;
+use super::{Part, evidences, words};
+use crate::blind::SHOWS;
+use crate::candidate::{Choice, mean_terms, terms};
+use crate::document::{Blind, NextExperiment, Smallest};
+use crate::scan::total;
+use crate::search::Extended;
+
+/// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
+const SHAPES: usize = 3;
+/// What a factor e in the precision of one length is worth, in effects brought into sight.
+const LENGTH_WORTH: f64 = 0.3;
+/// A new kind of run must bring this much more a minute than more of the same.
+const NEW_KIND: f64 = 1.3;
+/// Less than this, in effects brought into sight by a pair of runs, is not worth driving.
+const LEAST_GAIN: f64 = 0.01;
+/// A length whose relative standard deviation is larger is little better known than before.
+const UNDETERMINED: f64 = 0.02;
+/// Kinds of run that a person keeps apart.
+const MOST_KINDS: usize = 6;
+
+/// Effects that go with other things than what is driven, and what shows them.
+const NOT_BY_DRIVING: [(&str, &str); 5] = [
+    ("payload_compression", "drive the same runs with another payload, its covariate stated"),
+    ("thermal_drift", "drive the same runs cold and an hour later"),
+    ("wear", "drive the same runs again after some kilometres"),
+    ("interval_error", "log at intervals that differ"),
+    ("clock_rate", "log speeds beside an instrument with a clock of its own"),
+];
+
+fn is_driven(choice: &Choice) -> bool {
+    NOT_BY_DRIVING.iter().all(|(id, _)| *id != choice.id())
+}
+
+/// What stays out of sight, and what would show it.
+fn out_of_sight(ids: &[&str]) -> String {
+    if ids.is_empty() {
+        return String::new();
+    }
+    let each = ids.iter().map(|id| match NOT_BY_DRIVING.iter().find(|(of, _)| of == id) {
+        Some((_, how)) => format!("{id} ({how})"),
+        None => (*id).to_owned(),
+    });
+    format!(" Still out of sight: {}.", each.collect::<Vec<_>>().join(", "))
+}
+
+/// An effect at one of its shapes.
+struct Target {
+    id: &'static str,
+    choice: Choice,
+    columns: Vec<usize>,
+}
+
+fn targets(choices: &[Choice], first: usize) -> Vec<Target> {
+    let mut at = first;
+    let target = |choice: &Choice| {
+        let columns: Vec<usize> = (at..at + choice.parameters().len()).collect();
+        at += columns.len();
+        Target { id: choice.id(), choice: choice.clone(), columns }
+    };
+    choices.iter().map(target).collect()
+}
+
+/// The first, the middle and the last shape of each effect.
+fn some_shapes(choices: &[Choice]) -> Vec<Choice> {
+    choices
+        .chunk_by(|a, b| a.id() == b.id())
+        .flat_map(|shapes| {
+            let last = shapes.len() - 1;
+            let mut places: Vec<usize> = (0..SHAPES).map(|k| k * last / (SHAPES - 1)).collect();
+            places.dedup();
+            places.into_iter().map(|place| shapes[place].clone())
+        })
+        .collect()
+}
+
+/// How well a target's most telling parameter shows at a size that would be large, in standard deviations, and the smallest size that would show.
+fn shown(frame: &Frame, evidence: &Evidence, target: &Target) -> Option<(f64, Smallest)> {
+    let information = frame.information(evidence, &target.columns, &frame.free)?;
+    let parameters = target.choice.parameters().iter().enumerate();
+    parameters
+        .map(|(k, parameter)| {
+            let root = information[(k, k)].max(0.0).sqrt();
+            let (name, unit) = (parameter.name.to_owned(), parameter.unit.to_owned());
+            (parameter.plausible * root, Smallest { value: SHOWS / root, unit, parameter: name })
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// For each effect its best shape.
+fn all_shown(frame: &Frame, evidence: &Evidence, targets: &[Target]) -> Vec<(&'static str, f64, Smallest)> {
+    targets
+        .chunk_by(|a, b| a.id == b.id)
+        .filter_map(|shapes| {
+            let best = shapes.iter().filter_map(|target| shown(frame, evidence, target));
+            let (sigmas, smallest) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some((shapes[0].id, sigmas, smallest))
+        })
+        .collect()
+}
+
+/// How many effects are in sight, those half in sight in part.
+fn in_sight(frame: &Frame, evidence: &Evidence, targets: &[Target]) -> f64 {
+    all_shown(frame, evidence, targets).iter().map(|(_, sigmas, _)| (sigmas / SHOWS).min(1.0)).sum()
+}
+
+/// Runs added one pair after the other, by what they bring a minute, as long as there is time.
+fn mix(
+    options: &[(Manoeuvre, Evidence)],
+    before: &Evidence,
+    setting: &Setting,
+    worth: impl Fn(&Evidence) -> f64,
+) -> (Vec<Part>, Evidence, f64) {
+    let (mut parts, mut evidence, mut minutes): (Vec<Part>, _, _) = (Vec::new(), before.clone(), 0.0);
+    let mut here = worth(&evidence);
+    loop {
+        let best = options
+            .iter()
+            .filter_map(|(manoeuvre, of)| {
+                let cost = manoeuvre.cost(setting).minutes;
+                let known = parts.iter().any(|part| part.manoeuvre == *manoeuvre);
+                if minutes + cost > setting.minutes || !(known || parts.len() < MOST_KINDS) {
+                    return None;
+                }
+                let after = with_runs(&evidence, &[(of, 1.0)]);
+                let there = worth(&after);
+                let preferred = if known { NEW_KIND } else { 1.0 };
+                (there - here > LEAST_GAIN).then_some((
+                    preferred * (there - here) / cost,
+                    manoeuvre,
+                    after,
+                    there,
+                    cost,
+                ))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, manoeuvre, after, there, cost)) = best else { break };
+        match parts.iter_mut().find(|part| part.manoeuvre == *manoeuvre) {
+            Some(part) => part.pairs += 1,
+            None => parts.push(Part { manoeuvre: *manoeuvre, pairs: 1 }),
+        }
+        (evidence, here) = (after, there);
+        minutes += cost;
+    }
+    (parts, evidence, minutes)
+}
+
+/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into sight late makes earlier runs needless, and what never did
+/// made some in vain.
+fn pruned<'i>(
+    parts: &mut Vec<Part>,
+    options: &[(Manoeuvre, Evidence)],
+    before: &Evidence,
+    after: &Evidence,
+    shown: impl Fn(&Evidence) -> Vec<&'i str>,
+) -> Evidence {
+    let all = shown(after);
+    let of = |parts: &[Part]| {
+        let added: Vec<(&Evidence, f64)> = parts
+            .iter()
+            .filter_map(|part| {
+                let (_, evidence) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
+                Some((evidence, f64::from(part.pairs)))
+            })
+            .collect();
+        with_runs(before, &added)
+    };
+    for place in (0..parts.len()).rev() {
+        while parts[place].pairs > 0 {
+            parts[place].pairs -= 1;
+            if shown(&of(parts)) != all {
+                parts[place].pairs += 1;
+                break;
+            }
+        }
+    }
+    parts.retain(|part| part.pairs > 0);
+    of(parts)
+}
+
+/// What to drive to bring into sight what the data were blind to; the error says why nothing does.
+pub(super) fn show(
+    model: &Extended<'_>,
+    catalogue: &[Choice],
+    blind: &[Blind],
+    setting: &Setting,
+    manoeuvres: &[Manoeuvre],
+) -> Result<NextExperiment, String> {
+    let hidden: Vec<Choice> = catalogue
+        .iter()
+        .filter(|choice| is_driven(choice) && blind.iter().any(|blind| blind.id == choice.id()))
+        .cloned()
+        .collect();
+    let hidden = some_shapes(&hidden);
+    let all: Vec<Choice> = model.choices.iter().chain(&hidden).cloned().collect();
+    let own: usize = model.choices.iter().map(|choice| choice.parameters().len()).sum();
+    let targets = targets(&hidden, Column::BASE.len() + own);
+    let before = total(&model.fit.scan(&mut terms(&all)).runs).ok_or("no run has looks")?;
+    let frame = Frame::of(&model.fit, &all);
+    let options = evidences(&model.fit, &all, setting, manoeuvres);
+    let (mut parts, after, _) = mix(&options, &before, setting, |evidence| in_sight(&frame, evidence, &targets));
+    let after =
+        pruned(&mut parts, &options, &before, &after, |evidence| ids_shown(&all_shown(&frame, evidence, &targets)));
+    let minutes: f64 = parts.iter().map(|part| f64::from(part.pairs) * part.manoeuvre.cost(setting).minutes).sum();
+    let was: Vec<&str> = ids_shown(&all_shown(&frame, &before, &targets));
+    let now: Vec<_> = all_shown(&frame, &after, &targets)
+        .into_iter()
+        .filter(|(id, sigmas, _)| *sigmas >= SHOWS && !was.contains(id))
+        .collect();
+    if parts.is_empty() || now.is_empty() {
+        let ids: Vec<&str> = blind.iter().map(|blind| &blind.id[..]).collect();
+        return Err(format!(
+            "nothing that can be driven {} brings anything else into sight.{}",
+            setting.within,
+            out_of_sight(&ids)
+        ));
+    }
+    let predicts: BTreeMap<String, String> =
+        now.iter().map(|(id, _, smallest)| ((*id).to_owned(), from_size(smallest))).collect();
+    let still: Vec<&str> =
+        blind.iter().map(|blind| &blind.id[..]).filter(|id| !predicts.contains_key(*id) && !was.contains(id)).collect();
+    let still = out_of_sight(&still);
+    let ids: Vec<&str> = now.iter().map(|(id, ..)| *id).collect();
+    let why = format!(
+        "it takes {minutes:.1} min and brings {} into sight, sought {}. Diagnose the new runs together with the old ones.{still}",
+        ids.join(", "),
+        setting.within
+    );
+    Ok(words::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
+}
+
+fn from_size(smallest: &Smallest) -> String {
+    let unit = if smallest.unit == "1" { String::new() } else { format!(" {}", smallest.unit) };
+    format!("shows from {} = {:.2e}{unit} on", smallest.parameter, smallest.value)
+}
+
+fn ids_shown<'s>(shown: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
+    shown.iter().filter(|(_, sigmas, _)| *sigmas >= SHOWS).map(|(id, ..)| *id).collect()
+}
+
+/// What to drive before there is any data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScenarioPlan {
+    /// The scenario's name.
+    pub scenario: String,
+    /// What to drive.
+    pub next_experiment: NextExperiment,
+    /// Standard deviations that the runs will leave of the lengths that they determine, metres, by the names of `calibrate`.
+    pub sigmas: BTreeMap<String, f64>,
+    /// What will show, from which size on.
+    pub shows: Vec<Blind>,
+    /// What will not, though it were large.
+    pub blind_to: Vec<Blind>,
+}
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// Nobody said how much floor there is.
+    #[error("{scenario}: it has no [budget]: say what floor there is with --room X,Y")]
+    NoRoom {
+        /// The scenario's name.
+        scenario: String,
+    },
+    /// The robot's drive is not physical.
+    #[error(transparent)]
+    Geometry(#[from] kinematics::GeometryError),
+    /// No runs fit.
+    #[error("no run fits {within}")]
+    NothingFits {
+        /// Floor and time.
+        within: String,
+    },
+    /// The instruments see no poses.
+    #[error("{scenario}: no instrument sees where the robot is; a floor grid or motion capture does")]
+    NoPoses {
+        /// The scenario's name.
+        scenario: String,
+    },
+}
+
+/// What to drive with a scenario's robot before there is any data, so that its three lengths are determined well and few effects stay out of sight.
+///
+/// # Errors
+/// [`PlanError`] when floor, time or instruments allow nothing.
+pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPlan, PlanError> {
+    let name = scenario.name.clone();
+    let setting = Setting::of_scenario(scenario, limits).ok_or(PlanError::NoRoom { scenario: name.clone() })?;
+    let noise = noise(scenario).ok_or(PlanError::NoPoses { scenario: name.clone() })?;
+    let geometry = scenario.nominal_geometry()?;
+    let nothing_fits = || PlanError::NothingFits { within: setting.within.clone() };
+    if setting.free_m.iter().any(|side_m| *side_m <= 0.0) {
+        return Err(nothing_fits());
+    }
+    let fit: JointFit<'_> = Joint::unfitted(Model::of(&geometry, 0), noise, &[]);
+    let choices: Vec<Choice> = some_shapes(&mean_terms(&[])).into_iter().filter(is_driven).collect();
+    let targets = targets(&choices, Column::BASE.len());
+    let frame = Frame::of(&fit, &choices);
+    let options = evidences(&fit, &choices, &setting, &library(&setting));
+    let (_, first) = options.first().ok_or_else(nothing_fits)?;
+    let before = with_runs(first, &[(first, -1.0)]);
+    let worth = |evidence: &Evidence| in_sight(&frame, evidence, &targets) - LENGTH_WORTH * spread(&frame, evidence);
+    let (parts, after, minutes) = mix(&options, &before, &setting, worth);
+    if parts.is_empty() {
+        return Err(nothing_fits());
+    }
+    let (_, covariance) = frame.estimate(&after, &frame.free).ok_or_else(nothing_fits)?;
+    let diameter_m = geometry.wheel_diameter_m();
+    let lengths = [
+        ("left_wheel_diameter_m", diameter_m.left),
+        ("right_wheel_diameter_m", diameter_m.right),
+        ("wheel_separation_m", geometry.wheel_separation_m()),
+    ];
+    let relative: Vec<f64> = (0..lengths.len()).map(|k| covariance[(k, k)].sqrt()).collect();
+    let sigmas: BTreeMap<String, f64> = lengths
+        .iter()
+        .zip(&relative)
+        .filter(|(_, relative)| **relative < UNDETERMINED)
+        .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
+        .collect();
+    let all = all_shown(&frame, &after, &targets);
+    let (shows, blind): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, sigmas, _)| *sigmas >= SHOWS);
+    let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
+        let why = if sigmas > 1e-3 { from_size(&smallest) } else { "no run excites it".to_owned() };
+        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > 1e-3).then_some(smallest) }
+    };
+    let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
+    let mut blind_to: Vec<Blind> = blind.into_iter().map(entry).collect();
+    blind_to.extend(NOT_BY_DRIVING.iter().map(|(id, how)| Blind {
+        id: (*id).to_owned(),
+        why: format!("it does not go with what is driven: {how}"),
+        smallest_detectable: None,
+    }));
+    let predicts = shows.iter().map(|shown| (shown.id.clone(), shown.why.clone())).collect();
+    let lengths = if sigmas.len() == relative.len() {
+        format!(
+            "determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %",
+            100.0 * relative[0],
+            100.0 * relative[1],
+            100.0 * relative[2]
+        )
+    } else {
+        "does not determine the three lengths".to_owned()
+    };
+    let why = format!(
+        "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would show at a large size, sought {}.",
+        shows.len(),
+        shows.len() + blind_to.len(),
+        setting.within
+    );
+    let next_experiment = words::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
+    Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
+}
+
+/// Sum of the logarithms of the lengths' relative standard deviations.
+fn spread(frame: &Frame, evidence: &Evidence) -> f64 {
+    frame
+        .estimate(evidence, &frame.free)
+        .map_or(0.0, |(_, covariance)| (0..Column::GEOMETRY.len()).map(|k| 0.5 * covariance[(k, k)].ln()).sum())
+}
+
+/// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the least that anything errs.
+fn noise(scenario: &Scenario) -> Option<Noise> {
+    const LEAST: f64 = 1e-6;
+    let (xy_m, theta_rad) = scenario.instruments.iter().find_map(|instrument| match *instrument {
+        Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => Some((sigma_xy_m, sigma_theta_rad)),
+        Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
+            let of_mark_m = reading_sigma_m.hypot(resolution_m / 12_f64.sqrt());
+            let marks = &scenario.robot.points;
+            #[allow(clippy::cast_precision_loss)] // a handful of marks
+            let n = marks.len() as f64;
+            let mean = |of: &dyn Fn(&scenario::Mark) -> f64| marks.iter().map(of).sum::<f64>() / n;
+            let (x_m, y_m) = (mean(&|mark| mark.x_m), mean(&|mark| mark.y_m));
+            let moment: f64 = marks.iter().map(|mark| (mark.x_m - x_m).powi(2) + (mark.y_m - y_m).powi(2)).sum();
+            Some((of_mark_m / n.sqrt(), of_mark_m / moment.sqrt()))
+        }
+        Instrument::Tachometer { .. } => None,
+    })?;
+    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, LEAST, xy_m, theta_rad];
+    Some(Noise { variance: sigmas.map(|sigma| sigma.max(LEAST).powi(2)) })
+}

@@ -1,0 +1,177 @@
+//! What evidence says of names: sizes under each, and how far off one name's prediction stays when another may do its best.
+//!
+//! With Î the information of old and planned runs together, n what is free beside and b another name's sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s,
+//! the noncentrality of the test of b against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
+
+use calib::likelihood::{Column, Evidence};
+use calib::methods::joint::JointFit;
+use nalgebra::{DMatrix, DVector};
+
+use crate::candidate::Choice;
+use crate::scan::inverse;
+use crate::search::reach;
+
+/// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
+/// mounting, seconds.
+const LENGTH_SD: f64 = 0.05;
+const MOUNT_SD_M: f64 = 0.2;
+const MOUNT_SD_RAD: f64 = 0.3;
+const LATENCY_SD_S: f64 = 0.2;
+/// The log of the odds is normal with mean λ/2 and variance λ: with 19 chances in 20 it is not lower than this many standard deviations below.
+const CERTAIN: f64 = 1.645;
+
+/// One of several names, with its columns of the normal equation.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) choice: Choice,
+    pub(crate) columns: Vec<usize>,
+}
+
+/// Columns that are free beside the candidates', and the weight of what is plausible of every column.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    pub(crate) free: Vec<usize>,
+    pub(crate) prior: DVector<f64>,
+}
+
+impl Frame {
+    /// Of a fit with further terms: first those of the fit, then those of the candidates.
+    pub(crate) fn of(fit: &JointFit<'_>, terms: &[Choice]) -> Self {
+        let base = Column::BASE.map(|column| match column {
+            Column::LeftWheel | Column::RightWheel | Column::Separation => LENGTH_SD,
+            Column::MountX | Column::MountY => MOUNT_SD_M,
+            Column::MountTheta => MOUNT_SD_RAD,
+            Column::Latency | Column::Term(_) => LATENCY_SD_S,
+        });
+        let of_terms = terms.iter().flat_map(Choice::parameters).map(|parameter| parameter.plausible);
+        let weights: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();
+        Self { free: fit.columns.iter().map(|column| column.index()).collect(), prior: DVector::from_vec(weights) }
+    }
+
+    /// The normal equation of some columns with what is plausible of them.
+    fn matrix(&self, evidence: &Evidence, columns: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+            evidence.information[(columns[i], columns[j])] + if i == j { self.prior[columns[i]] } else { 0.0 }
+        })
+    }
+
+    /// Estimates of some columns from evidence, as steps from the model in force, and their covariance.
+    pub(crate) fn estimate(&self, evidence: &Evidence, columns: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let covariance = inverse(&self.matrix(evidence, columns))?;
+        let gradient = DVector::from_fn(columns.len(), |k, _| evidence.gradient[columns[k]]);
+        Some((-(&covariance * gradient), covariance))
+    }
+
+    /// The information on some columns with others at their best.
+    pub(crate) fn information(&self, evidence: &Evidence, own: &[usize], others: &[usize]) -> Option<DMatrix<f64>> {
+        let inverse = inverse(&self.matrix(evidence, others))?;
+        let cross = DMatrix::from_fn(own.len(), others.len(), |i, j| evidence.information[(own[i], others[j])]);
+        let raw = DMatrix::from_fn(own.len(), own.len(), |i, j| evidence.information[(own[i], own[j])]);
+        Some(raw - &cross * inverse * cross.transpose())
+    }
+
+    /// Free columns and a candidate's.
+    pub(crate) fn with(&self, candidate: &Candidate) -> Vec<usize> {
+        self.free.iter().chain(&candidate.columns).copied().collect()
+    }
+}
+
+/// How well two names are told apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Apart {
+    /// √λ: in standard deviations, of the name that is harder to tell from the other.
+    pub(crate) sigmas: f64,
+    /// By how much the log of the odds, at worst, exceeds what diagnosis asks before it drops a name.
+    pub(crate) margin: f64,
+}
+
+/// Names with the sizes that the old data give them.
+pub(crate) struct Rivals {
+    pub(crate) frame: Frame,
+    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) sizes: Vec<DVector<f64>>,
+}
+
+impl Rivals {
+    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence) -> Option<Self> {
+        let sizes = candidates
+            .iter()
+            .map(|candidate| {
+                let (step, _) = frame.estimate(before, &frame.with(candidate))?;
+                Some(step.rows(frame.free.len(), candidate.columns.len()).into_owned())
+            })
+            .collect::<Option<_>>()?;
+        Some(Self { frame, candidates, sizes })
+    }
+
+    /// Every pair of names.
+    pub(crate) fn pairs(&self) -> Vec<(usize, usize)> {
+        let n = self.candidates.len();
+        (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect()
+    }
+
+    /// What evidence makes of a pair, whichever of the two is true.
+    pub(crate) fn apart(&self, evidence: &Evidence, (a, b): (usize, usize)) -> Option<Apart> {
+        let one_way = |a: usize, b: usize| {
+            let (own, size) = (&self.candidates[a].columns, &self.sizes[a]);
+            let left = self.frame.information(evidence, own, &self.frame.with(&self.candidates[b]))?;
+            let alone = self.frame.information(evidence, own, &self.frame.free)?;
+            let lambda = (size.transpose() * left * size)[0].max(0.0);
+            let explained = 0.5 * (size.transpose() * alone * size)[0].max(0.0);
+            let margin = 0.5 * lambda - CERTAIN * lambda.sqrt() - reach(explained);
+            Some(Apart { sigmas: lambda.sqrt(), margin })
+        };
+        let (there, back) = (one_way(a, b)?, one_way(b, a)?);
+        Some(if there.margin < back.margin { there } else { back })
+    }
+}
+
+/// Evidence with so many times a pair of runs added.
+pub(crate) fn with_runs(before: &Evidence, added: &[(&Evidence, f64)]) -> Evidence {
+    let mut all = before.clone();
+    added.iter().for_each(|(evidence, times)| all.add(evidence, *times));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Evidence of looks whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
+    fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
+        Evidence {
+            run: (0, 0),
+            information: slopes.transpose() * slopes,
+            gradient: -(slopes.transpose() * values),
+            chi_square: values.dot(values),
+            log_det: 0.0,
+            count: 0.0,
+        }
+    }
+
+    fn rivals(before: &Evidence) -> Rivals {
+        let candidate =
+            |column| Candidate { choice: Choice::Effect { id: "slip_speed", shape: 0 }, columns: vec![column] };
+        let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
+        Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
+    }
+
+    /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
+    #[test]
+    fn what_another_name_can_say_as_well_tells_nothing() {
+        let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 10.0]));
+        let rivals = rivals(&before);
+        // Both names say 10, and nothing tells them apart.
+        assert!(rivals.sizes.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.sizes);
+        let apart = rivals.apart(&before, (0, 1)).expect("determined");
+        assert!(apart.sigmas < 1e-3 && apart.margin < 0.0, "{apart:?}");
+        // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
+        let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
+        let after = with_runs(&before, &[(&new, 1.0)]);
+        let apart = rivals.apart(&after, (0, 1)).expect("determined");
+        // To the size of the priors. Without the other name at its best both would leave 100 or more.
+        assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
+        assert!((apart.margin - (25.0 - CERTAIN * 50_f64.sqrt() - 3.0)).abs() < 1e-3, "{apart:?}");
+    }
+}

@@ -1,0 +1,263 @@
+//! What `yair diagnose --out DIR` writes for people: report.md with its pictures, to be read from top to bottom.
+
+mod pictures;
+mod words;
+
+use std::fmt::Write;
+use std::path::Path;
+
+use diagnose::{Alternative, Document, Fate, Residuals, Verdict};
+
+use crate::simulate::write_whole;
+use crate::terminal::Failure;
+use pictures::{Picture, pictures, that_matter};
+
+/// What is drawn and told.
+pub(crate) struct Page<'d> {
+    pub(crate) document: &'d Document,
+    pub(crate) residuals: &'d Residuals,
+    pub(crate) alternatives: &'d [Alternative],
+}
+
+/// Alternatives that are told: those that do not stand out at all are one line.
+const MOST_ALTERNATIVES: usize = 12;
+
+impl Page<'_> {
+    /// Writes report.md, its pictures and residuals.json.
+    pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
+        let extended = self.document.gain.is_some();
+        let pictures = pictures(self.residuals, self.document.next_experiment.as_ref(), extended);
+        for (stem, _, figure) in &pictures {
+            figure.write(out, stem)?;
+        }
+        write_whole(&out.join("residuals.json"), &serde_json::to_vec_pretty(self.residuals)?)?;
+        let mut text = String::new();
+        // Writing to a String does not fail.
+        let _ = self.text(&mut text, &pictures);
+        write_whole(&out.join("report.md"), text.as_bytes())
+    }
+
+    fn text(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
+        let names = match &self.document.dataset {
+            calib::Names::One(name) => name.clone(),
+            calib::Names::Several(names) => names.join(", "),
+        };
+        writeln!(page, "# Diagnosis of {names}\n\n{}\n", words::verdict(self.document))?;
+        self.findings(page)?;
+        self.evidence(page, pictures)?;
+        self.checks(page)?;
+        self.alternatives(page)?;
+        self.blind(page)?;
+        self.next(page, pictures)?;
+        self.calibration(page)
+    }
+
+    fn findings(&self, page: &mut String) -> std::fmt::Result {
+        if self.document.findings.is_empty() {
+            return Ok(());
+        }
+        writeln!(page, "## What was found\n")?;
+        writeln!(
+            page,
+            "| finding | names that would do as well | probability of the first | z | what it is |\n| --- | --- | --- | --- | --- |"
+        )?;
+        for finding in &self.document.findings {
+            let others = if finding.names.len() > 1 { finding.names[1..].join(", ") } else { "–".to_owned() };
+            let what = words::meaning(finding).replace('|', "\\|");
+            writeln!(page, "| `{}` | {others} | {:.2} | {:.1} | {what} |", finding.id, finding.probability, finding.z)?;
+        }
+        writeln!(page)?;
+        if let Some(gain) = &self.document.gain {
+            let score = gain.log_score_per_observation;
+            writeln!(
+                page,
+                "{} runs, or blocks of runs, were held out, each once: a value that a look sees there is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
+                gain.held_out_runs,
+                score.extended - score.base,
+                score.low,
+                score.high
+            )?;
+        } else if let Some(why) = &self.document.gain_why_null {
+            writeln!(page, "No gain is stated: {why}.\n")?;
+        }
+        Ok(())
+    }
+
+    fn evidence(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
+        writeln!(page, "## Evidence\n")?;
+        let matter: Vec<&str> = that_matter(self.residuals).iter().map(|against| &against.label[..]).collect();
+        if self.document.verdict == Verdict::Consistent {
+            writeln!(
+                page,
+                "Residuals of the calibrated model go with nothing that was recorded. The largest accident, {}:\n",
+                matter.join(" and ")
+            )?;
+        } else {
+            let extended = if self.document.gain.is_some() { ", and what the extended one does," } else { "" };
+            writeln!(page, "What the calibrated model leaves{extended} against {}:\n", matter.join(", "))?;
+        }
+        for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "residuals") {
+            writeln!(page, "![{alt}]({stem}.svg)\n")?;
+        }
+        if !self.residuals.against.is_empty() {
+            writeln!(
+                page,
+                "Every covariate is drawn in [residuals-all.svg](residuals-all.svg); the numbers are in [residuals.json](residuals.json).\n"
+            )?;
+        }
+        Ok(())
+    }
+
+    fn checks(&self, page: &mut String) -> std::fmt::Result {
+        let checks = &self.document.checks;
+        let failed = checks.iter().filter(|check| !check.passes).count();
+        writeln!(page, "## Checks of what is left\n")?;
+        let of = if self.document.gain.is_some() { "extended" } else { "calibrated" };
+        writeln!(
+            page,
+            "Residuals of the {of} model; {failed} of {} checks fail, together at 1 % (Holm).\n",
+            checks.len()
+        )?;
+        writeln!(page, "| question | answer | statistic | chance |\n| --- | --- | --- | --- |")?;
+        for check in checks {
+            let answer = if check.passes { "yes" } else { "**no**" };
+            writeln!(
+                page,
+                "| {} | {answer} | {:.2} | {} |",
+                words::question(check),
+                check.statistic,
+                chance(check.p_value)
+            )?;
+        }
+        writeln!(page)
+    }
+
+    fn alternatives(&self, page: &mut String) -> std::fmt::Result {
+        let asked = self.alternatives.iter().filter(|alternative| alternative.fate != Fate::NotShown);
+        let (standing, others): (Vec<_>, Vec<_>) =
+            asked.partition(|alternative| alternative.fate != Fate::DoesNotStandOut);
+        if standing.is_empty() && others.is_empty() {
+            return Ok(());
+        }
+        writeln!(page, "## Alternatives\n")?;
+        if !standing.is_empty() {
+            writeln!(
+                page,
+                "Each effect alone beside the calibration, before any other was in the model: how far out it stands, and by how much it makes the data less likely than the best \
+                 (logarithms, to second order).\n"
+            )?;
+            writeln!(page, "| effect | z | log odds to the best | what became of it |\n| --- | --- | --- | --- |")?;
+            for alternative in standing.iter().take(MOST_ALTERNATIVES) {
+                writeln!(
+                    page,
+                    "| `{}` | {:.1} | {:.1} | {} |",
+                    alternative.id,
+                    alternative.z,
+                    alternative.to_the_best,
+                    words::fate(alternative)
+                )?;
+            }
+            writeln!(page)?;
+        }
+        if !others.is_empty() {
+            let ids: Vec<String> = others.iter().map(|other| format!("`{}` (z = {:.1})", other.id, other.z)).collect();
+            writeln!(page, "Asked for and not seen: {}.\n", ids.join(", "))?;
+        }
+        Ok(())
+    }
+
+    fn blind(&self, page: &mut String) -> std::fmt::Result {
+        let blind = &self.document.blind_to;
+        writeln!(page, "## What these data could not have shown\n")?;
+        if blind.is_empty() {
+            writeln!(
+                page,
+                "Every effect of the catalogue that goes with what is driven would have shown at a size that is large for a real robot.\n"
+            )?;
+        } else {
+            writeln!(page, "| effect | smallest size that would have shown | why |\n| --- | --- | --- |")?;
+            for blind in blind {
+                let size = blind.smallest_detectable.as_ref().map_or_else(
+                    || "none".to_owned(),
+                    |size| {
+                        format!(
+                            "{} = {:.1e} {}",
+                            size.parameter,
+                            size.value,
+                            if size.unit == "1" { "" } else { &size.unit }
+                        )
+                    },
+                );
+                writeln!(page, "| `{}` | {} | {} |", blind.id, size.trim_end(), blind.why)?;
+            }
+            writeln!(page, "\nWith nine chances in ten, at a rate of false alarms of 1e-3.\n")?;
+        }
+        let shows: Vec<String> = self
+            .document
+            .sensitivity
+            .iter()
+            .filter(|entry| blind.iter().all(|blind| blind.id != entry.id))
+            .filter_map(|entry| {
+                let size = entry.smallest_detectable.as_ref()?;
+                let unit = if size.unit == "1" { String::new() } else { format!(" {}", size.unit) };
+                Some(format!("`{}` from {} = {:.1e}{unit} on", entry.id, size.parameter, size.value))
+            })
+            .collect();
+        if !shows.is_empty() {
+            writeln!(page, "Would have shown, and did not: {}.\n", shows.join("; "))?;
+        }
+        Ok(())
+    }
+
+    fn next(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
+        writeln!(page, "## Next experiment\n")?;
+        let Some(next) = &self.document.next_experiment else {
+            let why = self.document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
+            return writeln!(page, "None: {why}.\n");
+        };
+        writeln!(page, "{}\n", words::capitalised(&next.why))?;
+        writeln!(page, "| effect | predicts |\n| --- | --- |")?;
+        for (id, prediction) in &next.predicts {
+            writeln!(page, "| `{id}` | {prediction} |")?;
+        }
+        writeln!(page)?;
+        for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "next-experiment") {
+            writeln!(page, "![{alt}]({stem}.svg)\n")?;
+        }
+        writeln!(
+            page,
+            "```toml\n{}\n```\n\n`yair plan` seeks it in another room or time (`--room X,Y --minutes M`).\n",
+            next.protocol.trim_end()
+        )
+    }
+
+    fn calibration(&self, page: &mut String) -> std::fmt::Result {
+        writeln!(page, "## Calibration\n\nWith what was found in the model.\n")?;
+        writeln!(page, "| parameter | value | sigma |\n| --- | --- | --- |")?;
+        for method in &self.document.calibration.methods {
+            for (name, value) in &method.parameters {
+                let sigma = value.sigma.map_or_else(|| "–".to_owned(), |sigma| format!("{sigma:.1e}"));
+                writeln!(page, "| `{name}` | {:.7} | {sigma} |", value.value)?;
+            }
+            for unseen in &method.not_observable {
+                writeln!(page, "\nNot observable: {} – {}", unseen.parameter, unseen.why)?;
+            }
+        }
+        match (&self.document.extended_model, &self.document.extended_model_why_null) {
+            (Some(_), _) => writeln!(
+                page,
+                "\nThe robot as found, with its effects, is [extended.toml](extended.toml): `yair simulate` drives it."
+            ),
+            (None, Some(why)) => writeln!(page, "\nThere is no extended scenario: {why}."),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+fn chance(p: f64) -> String {
+    match p {
+        p if p >= 1e-3 => format!("{p:.3}"),
+        p if p > 0.0 => format!("{p:.0e}"),
+        _ => "< 1e-300".to_owned(),
+    }
+}

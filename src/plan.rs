@@ -1,0 +1,160 @@
+//! `yair plan DATASET...|SCENARIO [--room X,Y] [--minutes M] [--speed V] [--out DIR]`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use ::diagnose::{Diagnosis, Limits, NextExperiment, Options, Verdict, plan_scenario};
+use clap::Args;
+use scenario::Scenario;
+use serde::Serialize;
+
+use crate::simulate::write_whole;
+use crate::terminal::{Failure, Terminal, read_datasets, table};
+
+/// The next experiment: what tells apart the names that a diagnosis leaves, or shows what it could not see; from a scenario, what to drive before there is any data.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Datasets of one robot, or a scenario file.
+    #[arg(required = true, value_name = "DATASET|SCENARIO")]
+    sources: Vec<PathBuf>,
+    /// Sides of the floor, metres; without it what the robot moved over so far, or the scenario's budget.
+    #[arg(long, value_name = "X,Y", value_parser = room)]
+    room: Option<[f64; 2]>,
+    /// Time for driving and placing the robot; without it the scenario's budget, or 10.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    minutes: Option<f64>,
+    /// Fastest wheel that may be commanded, m/s; without it how fast the robot cruised so far.
+    #[arg(long, value_name = "V", value_parser = positive)]
+    speed: Option<f64>,
+    /// Take an effect out of the catalogue; may be given several times.
+    #[arg(long = "without", value_name = "ID")]
+    without: Vec<String>,
+    /// Folder for plan.toml, a scenario that drives the plan with the robot as it is known; one for each speed.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Accepted for uniformity: nothing here is drawn by chance.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err("it must be positive".to_owned()) }
+}
+
+fn room(text: &str) -> Result<[f64; 2], String> {
+    let sides: Vec<f64> = text.split(',').map(|side| positive(side.trim())).collect::<Result<_, _>>()?;
+    <[f64; 2]>::try_from(sides).map_err(|_| "two sides in metres, as 4,3".to_owned())
+}
+
+#[derive(Serialize)]
+struct OfData {
+    dataset: calib::Names,
+    verdict: Verdict,
+    sentence: String,
+    next_experiment: Option<NextExperiment>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_experiment_why_null: Option<String>,
+    scenarios: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct OfScenario {
+    #[serde(flatten)]
+    plan: ::diagnose::ScenarioPlan,
+    scenarios: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let _ = arguments.seed;
+    let limits = Limits { room_m: arguments.room, minutes: arguments.minutes, top_speed_m_s: arguments.speed };
+    match &arguments.sources[..] {
+        [file] if file.is_file() => of_scenario(file, &limits, arguments, terminal),
+        sources => of_data(sources, &limits, arguments, terminal),
+    }
+}
+
+fn of_data(
+    sources: &[PathBuf],
+    limits: &Limits,
+    arguments: &Arguments,
+    terminal: &Terminal,
+) -> Result<ExitCode, Failure> {
+    let datasets = read_datasets(sources, terminal)?;
+    let options = Options { without: arguments.without.clone() };
+    let Diagnosis { document, extended, .. } = ::diagnose::diagnose_within(&datasets, &options, limits)?;
+    terminal.say(&document.sentence)?;
+    let mut scenarios = Vec::new();
+    match &document.next_experiment {
+        Some(next) => {
+            show(next, terminal)?;
+            if let Some(out) = &arguments.out {
+                let scenario = extended.map_err(|why| format!("{}: no plan.toml: {why}", out.display()))?;
+                scenarios = write_scenarios(out, &scenario, next, terminal)?;
+            }
+        }
+        None => {
+            terminal
+                .say(&format!("no next experiment: {}", document.next_experiment_why_null.as_deref().unwrap_or("–")))?;
+        }
+    }
+    terminal.document(&OfData {
+        dataset: document.dataset,
+        verdict: document.verdict,
+        sentence: document.sentence,
+        next_experiment: document.next_experiment,
+        next_experiment_why_null: document.next_experiment_why_null,
+        scenarios,
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let scenario = Scenario::read(file)?;
+    let plan = plan_scenario(&scenario, limits)?;
+    show(&plan.next_experiment, terminal)?;
+    let blind: Vec<&str> = plan.blind_to.iter().map(|blind| &blind.id[..]).collect();
+    if !blind.is_empty() {
+        terminal.say(&format!("will not show, though it were large: {}", blind.join(", ")))?;
+    }
+    let scenarios = match &arguments.out {
+        Some(out) => write_scenarios(out, &scenario, &plan.next_experiment, terminal)?,
+        None => Vec::new(),
+    };
+    terminal.document(&OfScenario { plan, scenarios })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The plan for people.
+pub(crate) fn show(next: &NextExperiment, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.say(&format!("next experiment: {}", next.why))?;
+    let mut predicts = table(&["effect", "predicts"], 2);
+    for (id, prediction) in &next.predicts {
+        predicts.add_row([id, prediction]);
+    }
+    terminal.say(&predicts.to_string())?;
+    terminal.say(next.protocol.trim_end())
+}
+
+/// A scenario for each speed of a plan.
+fn write_scenarios(
+    out: &Path,
+    robot: &Scenario,
+    next: &NextExperiment,
+    terminal: &Terminal,
+) -> Result<Vec<String>, Failure> {
+    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    let mut written = Vec::new();
+    for (number, session) in next.sessions.iter().enumerate() {
+        let mut scenario =
+            Scenario { protocols: session.schedules.clone(), budget: None, sweep: None, ..robot.clone() };
+        scenario.name = format!("{}, planned", robot.name);
+        scenario.robot.cruise_speed_m_s = session.speed_m_s;
+        let name = if next.sessions.len() == 1 { "plan.toml".to_owned() } else { format!("plan-{}.toml", number + 1) };
+        let path = out.join(name);
+        write_whole(&path, scenario.to_toml()?.as_bytes())?;
+        terminal.remark(&format!("plan in {}", path.display()));
+        written.push(path.display().to_string());
+    }
+    Ok(written)
+}
