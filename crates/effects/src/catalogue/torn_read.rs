@@ -77,6 +77,8 @@ impl Forward for State {
 
 /// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median stands most of them.
 const AROUND: usize = 4;
+/// Rows that are torn one after the other, at most.
+const MOST_ROWS: usize = 2;
 
 /// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
 /// their neighbours, and jumps that are not undone, are none of this fault.
@@ -95,25 +97,64 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> usize {
     if median(all.iter().map(|off| off.abs()).collect()).is_none_or(|usual| usual > step / 8.0) {
         return 0;
     }
-    let mut astray = vec![0.0];
-    for off in all {
-        let jumps = (off / step).round();
-        let jumps = if (off - jumps * step).abs() < step / 4.0 { jumps } else { 0.0 };
-        astray.push(astray[astray.len() - 1] + jumps);
-    }
-    // The first sample may be the torn one.
-    let usual = median(astray.clone()).unwrap_or(0.0);
-    if astray.iter().any(|jumps| (jumps - usual).abs() > 1.0) {
-        return 0;
-    }
+    let jumps: Vec<f64> = all
+        .into_iter()
+        .map(|off| {
+            let jumps = (off / step).round();
+            if (off - jumps * step).abs() < step / 4.0 { jumps } else { 0.0 }
+        })
+        .collect();
     let mut mended = 0;
-    for (count, jumps) in ticks.iter_mut().zip(astray) {
-        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
-        let off = (jumps - usual) as i64;
-        *count -= off * jump;
-        mended += usize::from(off != 0);
+    let (mut at, mut used, mut first_used) = (0, 0, false);
+    while at < last {
+        // A wheel that starts or stops is out of line as well, but what a tear does is undone a row or two later.
+        let Some(back) = undone(&jumps[at..]) else {
+            at += 1;
+            continue;
+        };
+        first_used |= at == 0;
+        let mut astray = 0.0;
+        for (count, jumps) in ticks[at + 1..=at + back].iter_mut().zip(&jumps[at..]) {
+            astray += jumps;
+            #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
+            let off = astray as i64;
+            *count -= off * jump;
+            mended += usize::from(off != 0);
+        }
+        at += back + 1;
+        used = at;
+    }
+    // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after to undo them.
+    if mended > 0 {
+        let ends = [(0, -jumps[0], !first_used), (last, jumps[last - 1], used < last)];
+        for (row, astray, free) in ends {
+            if free && astray.abs() == 1.0 {
+                #[allow(clippy::cast_possible_truncation)] // −1 or 1
+                let off = astray as i64;
+                ticks[row] -= off * jump;
+                mended += 1;
+            }
+        }
     }
     mended
+}
+
+/// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so, or is not back in time.
+fn undone(jumps: &[f64]) -> Option<usize> {
+    let mut astray = *jumps.first()?;
+    if astray.abs() != 1.0 {
+        return None;
+    }
+    for (rows, jumps) in jumps.iter().enumerate().skip(1).take(MOST_ROWS) {
+        astray += jumps;
+        if astray == 0.0 {
+            return Some(rows);
+        }
+        if astray.abs() > 1.0 {
+            break;
+        }
+    }
+    None
 }
 
 fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
