@@ -32,4 +32,4 @@ pub use record::{
 pub use session::{RunView, Session};
 pub use term::{Interval, Look, ModelTerm, TermParameter};
 pub use warning::Warning;
-pub use write::{Existing, write};
+pub use write::{Existing, Writer, write};

@@ -108,11 +108,10 @@ impl Iterator for RunByRun {
     type Item = Result<Loaded, DatasetError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let header = || Dataset { runs: Vec::new(), ..self.header.clone() };
         match &mut self.rest {
             Rest::Grouped(grouped) => match grouped.next(self.header.robot.counter_bits)? {
                 Ok(run) => {
-                    let dataset = Dataset { runs: vec![run], ..header() };
+                    let dataset = Dataset { runs: vec![run], ..self.header.clone() };
                     let warnings = counter::wrap_warnings(&dataset);
                     Some(Ok(Loaded { dataset, warnings }))
                 }
@@ -123,7 +122,7 @@ impl Iterator for RunByRun {
             },
             // What was noticed of all was said before the first.
             Rest::Mixed(runs) => {
-                let dataset = Dataset { runs: vec![runs.next()?], ..header() };
+                let dataset = Dataset { runs: vec![runs.next()?], ..self.header.clone() };
                 Some(Ok(Loaded { dataset, warnings: Vec::new() }))
             }
             Rest::Failed => None,
