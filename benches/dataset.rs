@@ -104,7 +104,7 @@ fn main() {
         calib::CalibrationDrift::of_runs(None, runs.collect())
     });
     show("evaluated", evaluated, parse.0);
-    for name in ["linear", "segments", "joint"] {
+    for name in ["linear", "joint"] {
         let method = calib::method(name).expect("there");
         let calibrated = measured(|| {
             let dataset = dataset::read(&set).expect("readable").dataset;

@@ -349,6 +349,6 @@ mod tests {
         let mut writer = begin();
         writer.push(run).expect("sound");
         writer.finish().expect("written");
-        assert_eq!(crate::read(&target).expect("readable").dataset.runs, [run.clone()]);
+        assert_eq!(crate::read(&target).expect("readable").dataset.runs, std::slice::from_ref(run));
     }
 }

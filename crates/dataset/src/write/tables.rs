@@ -11,8 +11,7 @@ use crate::table::quoted_where_needed;
 /// A number as `{}` prints it, in a third of the time: of two texts equally near, which numbers above 10¹² may have, it is the even one. Nothing for `None`.
 fn number(out: &mut impl Write, number: impl Into<Option<f64>>) -> io::Result<()> {
     let Some(number) = number.into() else { return Ok(()) };
-    let size = number.abs();
-    if size < LEAST_PLAIN || size >= MOST_PLAIN {
+    if !PLAIN.contains(&number.abs()) {
         return write!(out, "{number}");
     }
     let mut digits = zmij::Buffer::new();
@@ -20,9 +19,8 @@ fn number(out: &mut impl Write, number: impl Into<Option<f64>>) -> io::Result<()
     out.write_all(text.strip_suffix(".0").unwrap_or(text).as_bytes())
 }
 
-/// From here to there zmij prints no exponent, which `{}` never does. Numbers that are none do not get here.
-const LEAST_PLAIN: f64 = 1e-4;
-const MOST_PLAIN: f64 = 1e15;
+/// Where zmij prints no exponent, which `{}` never does.
+const PLAIN: std::ops::Range<f64> = 1e-4..1e15;
 
 /// Numbers, each behind a comma.
 fn numbers<const N: usize>(out: &mut impl Write, values: [f64; N]) -> io::Result<()> {
