@@ -52,10 +52,26 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let importer = importer(&arguments.format).ok_or("no such format")?;
     let sources = (importer.open)(&arguments.source)?;
     let dirs = folders(arguments, &sources)?;
-    // All are written before the first is put into its place.
+    let was_there = arguments.out.exists();
+    let datasets = write(sources, dirs, arguments.force, terminal).inspect_err(|_| {
+        // Nothing of a failed import stays, not even the folder that was to hold its sessions.
+        if !was_there {
+            let _ = std::fs::remove_dir(&arguments.out);
+        }
+    })?;
+    terminal.document(&Document {
+        format: arguments.format.clone(),
+        source: arguments.source.display().to_string(),
+        datasets,
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes all datasets, a run at a time, before the first is put into its place.
+fn write(sources: Vec<Source>, dirs: Vec<PathBuf>, force: bool, terminal: &Terminal) -> Result<Vec<Imported>, Failure> {
     let mut written = Vec::with_capacity(sources.len());
     for (source, dir) in sources.into_iter().zip(dirs) {
-        let mut writer = begin_dataset(source.header, &dir, arguments.force)?;
+        let mut writer = begin_dataset(source.header, &dir, force)?;
         let (mut runs, mut odometry_rows) = (0, 0);
         for loaded in source.runs {
             let Loaded { dataset, warnings } = loaded?;
@@ -76,12 +92,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows in {}", dir.display()))?;
         datasets.push(Imported { dataset: dir.display().to_string(), runs, odometry_rows });
     }
-    terminal.document(&Document {
-        format: arguments.format.clone(),
-        source: arguments.source.display().to_string(),
-        datasets,
-    })?;
-    Ok(ExitCode::SUCCESS)
+    Ok(datasets)
 }
 
 /// A folder for each session. Refuses before the first is written, so that an import is done as a whole.
