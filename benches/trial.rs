@@ -1,7 +1,10 @@
 //! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, calibrated by each method, all of it together
-//! beside a bare loop that does the same, and a point of a sweep.
+//! beside a bare loop that does the same, and a point of a sweep. At last the ratios of these, timed in turn: medians over rounds of the fastest of five.
 
 mod yardstick;
+
+use std::hint::black_box;
+use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use dataset::Schedule;
@@ -77,5 +80,57 @@ fn sweep(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, trial, sweep);
+/// Seconds of one call, the fastest of five times some.
+fn fastest_s(calls: u32, mut call: impl FnMut()) -> f64 {
+    let time = |_| {
+        let started = Instant::now();
+        (0..calls).for_each(|_| call());
+        started.elapsed().as_secs_f64() / f64::from(calls)
+    };
+    (0..5).map(time).fold(f64::INFINITY, f64::min)
+}
+
+/// What a trial costs beside stepping through it and beside the bare loop. In turn in every round: a busy machine slows all of them.
+#[allow(clippy::print_stdout)]
+fn ratios(_: &mut Criterion) {
+    const ROUNDS: usize = 9;
+    let [mut closed, mut whole] =
+        [(); 2].map(|()| bench::Trial::new(&paper(Engine::ClosedForm), 1).expect("simulates"));
+    let mut stepped = bench::Trial::new(&paper(Engine::Stepping { step_s: 1e-3 }), 1).expect("simulates");
+    let methods = ["direct", "umbmark"].map(|name| calib::method(name).expect("there"));
+    let mut bare = yardstick::Yardstick::new(1);
+    let mut number = 0;
+    let mut rounds = Vec::with_capacity(ROUNDS);
+    for _ in 0..ROUNDS {
+        let of_closed_s = fastest_s(100, || {
+            number += 1;
+            black_box(closed.drive(number).expect("drives"));
+        });
+        let of_stepping_s = fastest_s(1, || {
+            number += 1;
+            black_box(stepped.drive(number).expect("drives"));
+        });
+        let of_whole_s = fastest_s(100, || {
+            number += 1;
+            let session = [whole.drive(number).expect("drives")];
+            black_box(methods.map(|method| method.calibrate(&session).expect("applies")));
+        });
+        let of_bare_s = fastest_s(100, || {
+            black_box(bare.trial());
+        });
+        rounds.push([of_closed_s, of_stepping_s, of_whole_s, of_bare_s]);
+    }
+    let median = |of: &dyn Fn(&[f64; 4]) -> f64| {
+        let mut values: Vec<f64> = rounds.iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    println!("\nratios of a trial, medians of {ROUNDS} rounds");
+    println!("closed form              {:8.1} us", 1e6 * median(&|times| times[0]));
+    println!("stepping / closed form   {:8.0}", median(&|times| times[1] / times[0]));
+    println!("with calibration         {:8.1} us", 1e6 * median(&|times| times[2]));
+    println!("  of it the bare loop    {:8.0} %", 100.0 * median(&|times| times[3] / times[2]));
+}
+
+criterion_group!(benches, trial, sweep, ratios);
 criterion_main!(benches);

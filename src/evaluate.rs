@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::{CalibrationDrift, CalibrationReport, Names, ReportError};
+use calib::{CalibrationDrift, CalibrationReport, NamedCalibration, Names, ReportError};
 use clap::Args;
-use dataset::Session;
+use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
 
-use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+use crate::terminal::{Failure, Terminal, cell, folder_name, refuse_doubles, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
 #[derive(Args)]
@@ -39,25 +39,21 @@ struct Document {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let datasets = read_datasets(&arguments.datasets, terminal)?;
-    let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
-    let several = sessions.len() > 1;
-    let mut calibrations = vec![calib::evaluate(&sessions, None, several)];
+    refuse_doubles(&arguments.datasets)?;
+    let mut found = vec![None];
     for path in &arguments.calibrations {
-        let found = CalibrationReport::read(path)?.calibrations();
-        if found.is_empty() {
+        let calibrations = CalibrationReport::read(path)?.calibrations();
+        if calibrations.is_empty() {
             let message = "it holds no values".to_owned();
             return Err(ReportError::NotACalibration { place: path.display().to_string(), message }.into());
         }
-        calibrations.extend(found.iter().map(|calibration| calib::evaluate(&sessions, Some(calibration), several)));
+        found.extend(calibrations.into_iter().map(Some));
     }
+    let (names, calibrations) = evaluate(&arguments.datasets, &found, terminal)?;
     show(&calibrations, terminal)?;
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
-    terminal.document(&Document {
-        dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
-        calibrations,
-    })?;
+    terminal.document(&Document { dataset: Names::of(names), calibrations })?;
     match (arguments.max_drift, last_percent) {
         (Some(_), None) => Err("--max-drift: the drift of these runs is not known (see why_null)".into()),
         (Some(allowed), Some(percent)) if percent > allowed => {
@@ -66,6 +62,39 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         }
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+/// Names of the datasets, and the drift under each calibration. One run is held at a time: logs may be larger than the memory.
+fn evaluate(
+    paths: &[PathBuf],
+    calibrations: &[Option<NamedCalibration>],
+    terminal: &Terminal,
+) -> Result<(Vec<String>, Vec<CalibrationDrift>), Failure> {
+    let several = paths.len() > 1;
+    let mut names = Vec::with_capacity(paths.len());
+    let mut runs = vec![Vec::new(); calibrations.len()];
+    for path in paths {
+        let opened = RunByRun::open(path)?;
+        let warn = |warnings: &[Warning]| {
+            for warning in warnings {
+                terminal.remark(&format!("warning: {}: {warning}", path.display()));
+            }
+        };
+        warn(opened.warnings());
+        let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
+        for run in opened {
+            let Loaded { mut dataset, warnings } = run?;
+            warn(&warnings);
+            dataset.provenance.name = Some(name.clone());
+            let session = [dataset.session()];
+            for (calibration, runs) in calibrations.iter().zip(&mut runs) {
+                runs.extend(calib::evaluate(&session, calibration.as_ref(), several).runs);
+            }
+        }
+        names.push(name);
+    }
+    let drifts = calibrations.iter().zip(runs);
+    Ok((names, drifts.map(|(calibration, runs)| CalibrationDrift::of_runs(calibration.as_ref(), runs)).collect()))
 }
 
 fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {

@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::import::{IMPORTERS, importer};
+use dataset::Loaded;
+use dataset::import::{IMPORTERS, Source, importer};
 use serde::Serialize;
 
-use crate::simulate::write_dataset;
+use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
 
 /// Other people's logs into datasets.
@@ -49,19 +50,15 @@ struct Imported {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let importer = importer(&arguments.format).ok_or("no such format")?;
-    let sessions = (importer.read)(&arguments.source)?;
-    let dirs = folders(arguments, &sessions)?;
-    let mut datasets = Vec::with_capacity(sessions.len());
-    for (session, dir) in sessions.iter().zip(dirs) {
-        for warning in &session.warnings {
-            terminal.remark(&format!("warning: {}: {warning}", session.name));
+    let sources = (importer.open)(&arguments.source)?;
+    let dirs = folders(arguments, &sources)?;
+    let was_there = arguments.out.exists();
+    let datasets = write(sources, dirs, arguments.force, terminal).inspect_err(|_| {
+        // Nothing of a failed import stays, not even the folder that was to hold its sessions.
+        if !was_there {
+            let _ = std::fs::remove_dir(&arguments.out);
         }
-        write_dataset(&session.dataset, &dir, arguments.force)?;
-        let runs = &session.dataset.runs;
-        let odometry_rows = runs.iter().map(|run| run.odometry.t_s.len()).sum();
-        terminal.say(&format!("{} runs, {odometry_rows} odometry rows in {}", runs.len(), dir.display()))?;
-        datasets.push(Imported { dataset: dir.display().to_string(), runs: runs.len(), odometry_rows });
-    }
+    })?;
     terminal.document(&Document {
         format: arguments.format.clone(),
         source: arguments.source.display().to_string(),
@@ -70,8 +67,36 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
+/// Writes all datasets, a run at a time, before the first is put into its place.
+fn write(sources: Vec<Source>, dirs: Vec<PathBuf>, force: bool, terminal: &Terminal) -> Result<Vec<Imported>, Failure> {
+    let mut written = Vec::with_capacity(sources.len());
+    for (source, dir) in sources.into_iter().zip(dirs) {
+        let mut writer = begin_dataset(source.header, &dir, force)?;
+        let (mut runs, mut odometry_rows) = (0, 0);
+        for loaded in source.runs {
+            let Loaded { dataset, warnings } = loaded?;
+            for warning in &warnings {
+                terminal.remark(&format!("warning: {}: {warning}", source.name));
+            }
+            for run in &dataset.runs {
+                writer.push(run)?;
+                runs += 1;
+                odometry_rows += run.odometry.t_s.len();
+            }
+        }
+        written.push((writer, dir, runs, odometry_rows));
+    }
+    let mut datasets = Vec::with_capacity(written.len());
+    for (writer, dir, runs, odometry_rows) in written {
+        writer.finish()?;
+        terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows in {}", dir.display()))?;
+        datasets.push(Imported { dataset: dir.display().to_string(), runs, odometry_rows });
+    }
+    Ok(datasets)
+}
+
 /// A folder for each session. Refuses before the first is written, so that an import is done as a whole.
-fn folders(arguments: &Arguments, sessions: &[dataset::import::Imported]) -> Result<Vec<PathBuf>, Failure> {
+fn folders(arguments: &Arguments, sessions: &[Source]) -> Result<Vec<PathBuf>, Failure> {
     let [_, _, ..] = sessions else { return Ok(vec![arguments.out.clone()]) };
     let dirs: Vec<PathBuf> = sessions.iter().map(|session| arguments.out.join(&session.name)).collect();
     for (position, dir) in dirs.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use dataset::{Dataset, DatasetError, Existing};
+use dataset::{Dataset, DatasetError, Existing, Writer};
 use effects::Address;
 use scenario::Scenario;
 use serde::Serialize;
@@ -125,12 +125,24 @@ fn simulate(arguments: &Arguments, scenario: &Scenario, seed: u64) -> Result<Sim
 }
 
 /// Writes a dataset; where one stands in the way, says how it is replaced.
-pub(crate) fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
-    let existing = if force { Existing::ReplaceDataset } else { Existing::Refuse };
-    dataset::write(dataset, dir, existing).map_err(|error| match error {
+fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
+    dataset::write(dataset, dir, existing(force)).map_err(|error| say_how_to_replace(error, force))
+}
+
+/// Begins a dataset that is written a run at a time; where one stands in the way, says how it is replaced.
+pub(crate) fn begin_dataset(header: Dataset, dir: &Path, force: bool) -> Result<Writer, Failure> {
+    Writer::create(header, dir, existing(force)).map_err(|error| say_how_to_replace(error, force))
+}
+
+const fn existing(force: bool) -> Existing {
+    if force { Existing::ReplaceDataset } else { Existing::Refuse }
+}
+
+fn say_how_to_replace(error: DatasetError, force: bool) -> Failure {
+    match error {
         DatasetError::AlreadyExists { .. } if !force => format!("{error}; --force replaces a dataset").into(),
         other => other.into(),
-    })
+    }
 }
 
 /// `DIR.truth.json`, the dataset folder's sibling, also where DIR is `.` or ends in `..`.

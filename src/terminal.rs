@@ -100,11 +100,7 @@ pub(crate) fn table(headers: &[&str], left: usize) -> Table {
 
 /// Reads datasets and passes their warnings on.
 pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
-    // The same runs twice would halve every variance.
-    let mut seen = BTreeSet::new();
-    if let Some(twice) = paths.iter().find(|path| path.canonicalize().is_ok_and(|real| !seen.insert(real))) {
-        return Err(format!("{}: the same dataset is given twice; give each session once", twice.display()).into());
-    }
+    refuse_doubles(paths)?;
     paths
         .iter()
         .map(|path| {
@@ -119,7 +115,18 @@ pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Ve
         .collect()
 }
 
-fn folder_name(path: &Path) -> String {
+/// The same runs twice would halve every variance.
+pub(crate) fn refuse_doubles(paths: &[PathBuf]) -> Result<(), Failure> {
+    let mut seen = BTreeSet::new();
+    match paths.iter().find(|path| path.canonicalize().is_ok_and(|real| !seen.insert(real))) {
+        None => Ok(()),
+        Some(twice) => {
+            Err(format!("{}: the same dataset is given twice; give each session once", twice.display()).into())
+        }
+    }
+}
+
+pub(crate) fn folder_name(path: &Path) -> String {
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -243,7 +243,7 @@ fn published_optiodom_sessions_are_met_or_beaten() {
     for (kind, most_mm, most_deg) in
         [("square", 4.4 * 1.05, 0.55 * 1.05), ("circular", 5.6 * 0.9, 0.94 * 0.9), ("ivanjko", 3.3 * 1.05, 0.36 * 1.05)]
     {
-        let imported = (importer("optiodom").expect("the importer").read)(&folder.join(kind)).expect("sessions");
+        let imported = importer("optiodom").expect("the importer").read(&folder.join(kind)).expect("sessions");
         let sessions: Vec<_> = imported.iter().map(|imported| imported.dataset.session()).collect();
         let found = compare(&sessions, &[&Joint::DEFAULT], || ()).expect("several sessions");
         let joint = found.methods.iter().find(|method| method.method == "joint").expect("compared");
@@ -267,7 +267,7 @@ fn published_khepera_lies_within_the_intervals() {
     let Some(folder) = real_data("published_khepera_lies_within_the_intervals", "khepera") else { return };
     for name in ["l90", "lstraight"] {
         let mut imported =
-            (importer("censi").expect("the importer").read)(&folder.join(format!("{name}.tuple"))).expect("a log");
+            importer("censi").expect("the importer").read(&folder.join(format!("{name}.tuple"))).expect("a log");
         let dataset = imported.remove(0).dataset;
         let text = std::fs::read_to_string(folder.join(format!("{name}_results.json"))).expect("their result");
         let published: Value = serde_json::from_str(&text).expect("JSON");

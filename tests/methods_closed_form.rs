@@ -476,7 +476,7 @@ fn jung_chung_divides_once_and_does_not_couple_the_corner() {
 }
 
 fn optiodom(session: &Path) -> Dataset {
-    let mut imported = (importer("optiodom").expect("the importer").read)(session).expect("a session");
+    let mut imported = importer("optiodom").expect("the importer").read(session).expect("a session");
     assert_eq!(imported.len(), 1);
     imported.remove(0).dataset
 }

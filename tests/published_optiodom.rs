@@ -66,7 +66,7 @@ fn published(folder: &Path) -> Vec<Row> {
 }
 
 fn import(session: &Path) -> Dataset {
-    let mut imported = (importer("optiodom").expect("the importer").read)(session).expect("a session");
+    let mut imported = importer("optiodom").expect("the importer").read(session).expect("a session");
     assert_eq!(imported.len(), 1);
     imported.remove(0).dataset
 }

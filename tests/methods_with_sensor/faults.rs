@@ -97,7 +97,7 @@ fn optiodoms_descent_ends_where_it_bounces() {
 }
 
 fn optiodom(session: &std::path::Path) -> Dataset {
-    (importer("optiodom").expect("the importer").read)(session).expect("a session").remove(0).dataset
+    importer("optiodom").expect("the importer").read(session).expect("a session").remove(0).dataset
 }
 
 /// Newton's steps on the cost by its exact gradient, whose derivative is taken by differences: the minimum of positions alone near the published values.

@@ -16,7 +16,7 @@ const LOGS: [&str; 2] = ["l90", "lstraight"];
 
 fn log(folder: &Path, name: &str) -> Dataset {
     let mut imported =
-        (importer("censi").expect("the importer").read)(&folder.join(format!("{name}.tuple"))).expect("a log");
+        importer("censi").expect("the importer").read(&folder.join(format!("{name}.tuple"))).expect("a log");
     imported.remove(0).dataset
 }
 

@@ -83,8 +83,16 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
             runs.push(drift);
         }
     }
-    let name = calibration.map_or_else(|| "nominal".to_owned(), |calibration| calibration.name.clone());
-    summarise(name, runs)
+    CalibrationDrift::of_runs(calibration, runs)
+}
+
+impl CalibrationDrift {
+    /// What runs evaluated under one calibration say together.
+    #[must_use]
+    pub fn of_runs(calibration: Option<&NamedCalibration>, runs: Vec<RunDrift>) -> Self {
+        let name = calibration.map_or_else(|| "nominal".to_owned(), |calibration| calibration.name.clone());
+        summarise(name, runs)
+    }
 }
 
 fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {

@@ -24,7 +24,7 @@ pub use counter::suspected_wrap;
 pub use error::DatasetError;
 pub use platform::{Platform, record_session};
 pub use program::{Motion, MotionProgram, Schedule};
-pub use read::{Loaded, read};
+pub use read::{Loaded, RunByRun, read};
 pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
@@ -32,4 +32,4 @@ pub use record::{
 pub use session::{RunView, Session};
 pub use term::{Interval, Look, ModelTerm, TermParameter};
 pub use warning::Warning;
-pub use write::{Existing, write};
+pub use write::{Existing, Writer, write};

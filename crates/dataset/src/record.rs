@@ -20,6 +20,21 @@ pub struct Dataset {
     pub runs: Vec<Run>,
 }
 
+impl Dataset {
+    /// All but the runs.
+    #[must_use]
+    pub fn header(&self) -> Self {
+        let Self { provenance, robot, truth_noise, points, runs: _ } = self;
+        Self {
+            provenance: provenance.clone(),
+            robot: *robot,
+            truth_noise: *truth_noise,
+            points: points.clone(),
+            runs: Vec::new(),
+        }
+    }
+}
+
 /// Where a dataset comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Provenance {

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
-use dataset::{DatasetError, read};
+use dataset::{DatasetError, RunByRun, read};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -74,6 +74,18 @@ fn columns_are_all_that_is_held_and_garbage_is_not_held_at_all() {
         assert!(peak_bytes >= ROW_BYTES * rows, "the columns alone take more: the measurement is wrong");
         assert!(peak_bytes <= BYTES_PER_ROW_LIMIT * rows, "{} bytes a row", peak_bytes / rows);
     }
+
+    // One run at a time: the columns of one, and half a megabyte of buffers.
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    write_manifest(temp.path(), 100);
+    write_odometry(temp.path(), ROWS / 5, 100, ROWS / 500);
+    let before = PEAK.current_usage();
+    PEAK.reset_peak_usage();
+    let loaded = RunByRun::open(temp.path()).expect("readable").map(|loaded| loaded.expect("readable"));
+    let rows: usize = loaded.map(|loaded| loaded.dataset.runs[0].odometry.t_s.len()).sum();
+    let peak_bytes = PEAK.peak_usage().saturating_sub(before);
+    assert_eq!(rows, ROWS / 5);
+    assert!(peak_bytes < BYTES_PER_ROW_LIMIT * ROWS / 500 + (1 << 20), "{peak_bytes} bytes");
 
     for file in ["odometry.csv", "truth.csv", "dataset.toml"] {
         let temp = tempfile::tempdir().expect("a temporary folder");

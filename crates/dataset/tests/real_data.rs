@@ -22,7 +22,7 @@ fn real_data(test: &str, part: &str) -> Option<PathBuf> {
 }
 
 fn import(format: &str, source: &Path) -> Vec<Imported> {
-    (importer(format).expect("a known format").read)(source).expect("importable")
+    importer(format).expect("a known format").read(source).expect("importable")
 }
 
 /// Writes, reads back and compares.

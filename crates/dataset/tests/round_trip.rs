@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use dataset::{
     Dataset, Displacement, Existing, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed, read, write,
+    ProtocolSettings, Provenance, Run, RunByRun, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
+    read, write,
 };
 use kinematics::{Point, Wheels};
 use proptest::collection::{btree_map, vec};
@@ -199,6 +200,44 @@ fn datasets() -> impl Strategy<Value = Dataset> {
     })
 }
 
+/// What a dataset gives one run at a time.
+fn run_by_run(dir: &std::path::Path) -> (Vec<Run>, Vec<dataset::Warning>) {
+    let opened = RunByRun::open(dir).expect("readable");
+    let (mut runs, mut warnings) = (Vec::new(), opened.warnings().to_vec());
+    for loaded in opened {
+        let mut loaded = loaded.expect("readable");
+        assert_eq!(loaded.dataset.runs.len(), 1);
+        runs.append(&mut loaded.dataset.runs);
+        warnings.append(&mut loaded.warnings);
+    }
+    (runs, warnings)
+}
+
+/// Runs in another order than the manifest's, rows of runs mixed, and a fault in the second run.
+#[test]
+fn runs_are_found_one_at_a_time_wherever_their_rows_are() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let robot = "format = 1\n[robot]\nleft_wheel_diameter_m = 0.1\nright_wheel_diameter_m = 0.1\nwheel_separation_m = 0.3\n\
+                 ticks_per_rev = 500\ncounter_bits = 16\n";
+    let runs: String = ["a", "b", "c"].map(|id| format!("[[run]]\nid = \"{id}\"\n")).concat();
+    std::fs::write(temp.path().join("dataset.toml"), robot.to_owned() + &runs).expect("written");
+    let truth = "run,t_s,x_m,y_m,theta_rad\nb,0,1,0,0\nc,0,2,0,0\na,0,3,0,0\n";
+    std::fs::write(temp.path().join("truth.csv"), truth).expect("written");
+    let rows = |run: &str| (0..5000).map(|k| format!("{run},{k},{},{}\n", 7 * k % 65_536, k)).collect::<String>();
+    let (a, b, c) = (rows("a"), rows("b"), rows("c"));
+    let interleaved: String = a.lines().zip(b.lines()).flat_map(|(a, b)| [a, "\n", b, "\n"]).collect();
+    for table in [a.clone() + &b + &c, c.clone() + &a + &b, interleaved + &c] {
+        std::fs::write(temp.path().join("odometry.csv"), format!("run,t_s,left_ticks,right_ticks\n{table}"))
+            .expect("written");
+        assert_eq!(run_by_run(temp.path()).0, read(temp.path()).expect("readable").dataset.runs);
+    }
+    let faulty = format!("run,t_s,left_ticks,right_ticks\n{a}b,0,1,1\nb,1,x,1\n{c}");
+    std::fs::write(temp.path().join("odometry.csv"), faulty).expect("written");
+    let found: Vec<_> = RunByRun::open(temp.path()).expect("readable").map(|loaded| loaded.map(|_| ())).collect();
+    let expected = read(temp.path()).expect_err("a fault").to_string();
+    assert!(matches!(&found[..], [Ok(()), Err(error)] if error.to_string() == expected), "{found:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
@@ -210,6 +249,9 @@ proptest! {
         prop_assert_eq!(&loaded.dataset, &dataset);
         // Equality takes −0 for 0; the text of a number does not.
         prop_assert_eq!(format!("{:?}", loaded.dataset), format!("{dataset:?}"));
+        let (runs, warnings) = run_by_run(&dir);
+        prop_assert_eq!(format!("{runs:?}"), format!("{:?}", dataset.runs));
+        prop_assert_eq!(&warnings, &loaded.warnings);
         // And again, over itself.
         write(&loaded.dataset, &dir, Existing::ReplaceDataset).expect("replaced");
         prop_assert_eq!(read(&dir).expect("readable"), loaded);

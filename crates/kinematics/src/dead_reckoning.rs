@@ -6,9 +6,9 @@
 //! Displacements are summed from nothing over 64 steps at a time, and what the sum of these sums drops is carried along: the place's error does not grow
 //! with the number of steps either. `whole_log.rs` does the same with columns.
 
-use crate::trig::sin_cos;
+use crate::trig::{SHIFTER, along, step_sinc};
 use crate::whole_log::{self, Every, Last, Rows};
-use crate::{InstructionSet, OdometryCovariance, Pose, WheelNoise, Wheels, sinc};
+use crate::{InstructionSet, OdometryCovariance, Pose, WheelNoise, Wheels};
 
 /// How one step's wheel travel becomes a displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,15 +65,14 @@ impl Count for i64 {
     /// Before AVX-512 no vector instruction makes doubles of 64-bit integers: the integer is added to the bits of 1.5·2⁵², and 1.5·2⁵² taken away.
     #[inline(always)]
     fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
-        const SHIFTER: f64 = 6_755_399_441_055_744.0;
         let mut beyond = 0;
         for (k, (since, count)) in since.iter_mut().zip(column).enumerate() {
-            let counts = count.wrapping_sub(earlier(k));
-            *since = f64::from_bits(SHIFTER.to_bits().wrapping_add_signed(counts)) - SHIFTER;
-            // Any bit above the 51st says that the number is not within ±2⁵¹.
-            beyond |= counts.wrapping_add(1 << 51).cast_unsigned() >> 52;
+            let shifted = SHIFTER.to_bits().wrapping_add_signed(count.wrapping_sub(earlier(k)));
+            *since = f64::from_bits(shifted) - SHIFTER;
+            // Sign and exponent differ where the number is not within ±2⁵¹.
+            beyond |= shifted ^ SHIFTER.to_bits();
         }
-        beyond == 0
+        beyond >> 52 == 0
     }
 }
 
@@ -271,7 +270,13 @@ impl Place {
 
     #[inline(always)]
     pub(crate) fn now_m(&self) -> f64 {
-        self.anchor_m + (self.dropped_m + self.moved_m)
+        self.after_m(self.moved_m)
+    }
+
+    /// Where a sum of displacements since the anchor leads.
+    #[inline(always)]
+    pub(crate) fn after_m(&self, moved_m: f64) -> f64 {
+        self.anchor_m + (self.dropped_m + moved_m)
     }
 
     /// Ends a group: its sum goes to the anchor, and what the addition drops is kept (Knuth's two-sum).
@@ -319,12 +324,12 @@ impl<C: Count> DeadReckoning<C> {
         let half_turn_rad = 0.5 * (theta_rad - self.world_from_body.theta_rad);
         let chord_m = match self.odometry.rule {
             Rule::Midpoint => distance_m,
-            Rule::ExactArc => distance_m * sinc(half_turn_rad),
+            Rule::ExactArc => distance_m * step_sinc(half_turn_rad),
         };
-        let (sin, cos) = sin_cos(self.world_from_body.theta_rad + half_turn_rad);
+        let [dx_m, dy_m] = along(self.world_from_body.theta_rad + half_turn_rad, chord_m);
         let [x, y] = &mut self.place;
-        x.moved_m += chord_m * cos;
-        y.moved_m += chord_m * sin;
+        x.moved_m += dx_m;
+        y.moved_m += dy_m;
         self.world_from_body = Pose::new(x.now_m(), y.now_m(), theta_rad);
         self.steps += 1;
         if self.steps == GROUP {

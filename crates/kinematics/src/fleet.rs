@@ -3,11 +3,9 @@
 //! Robots stand in blocks of 64, each quantity of a block in one column, so that every stage of a step is a loop over lanes without branches. A robot has the
 //! bits that it has alone ([`DeadReckoning`]); a block in which one is beyond the loops' range goes through that robot by robot.
 
-use std::f64::consts::FRAC_PI_4;
-
 use crate::dead_reckoning::{GROUP, Place, heading_rad};
 use crate::instruction_set::Kernel;
-use crate::trig::{LARGEST_RAD, exceeds, reduced, small_sinc};
+use crate::trig::{Direction, short_sinc};
 use crate::{Count, DeadReckoning, InstructionSet, Odometry, Pose, Rule, Wheels};
 
 const LANES: usize = 64;
@@ -201,25 +199,32 @@ impl<C: Count> Block<C> {
                         + per_left * counts.left[k].since(self.counts.left[k]));
             }
         }
-        let mut beyond = 0;
         for k in 0..LANES {
             theta_rad[k] = heading_rad(self.start_theta_rad[k], rad_per_count, left[k], right[k]);
             half_rad[k] = 0.5 * (theta_rad[k] - self.theta_rad[k]);
-            beyond |= exceeds(half_rad[k], FRAC_PI_4) | exceeds(self.theta_rad[k] + half_rad[k], LARGEST_RAD);
         }
-        if (beyond >> 63 != 0) | (C::CONVERTS_BY_BITS & !differences_are_steps) {
+        let (mut turns, mut ranges) = (0, 0);
+        if odometry.rule == Rule::ExactArc {
+            for k in 0..LANES {
+                let (sinc, turn) = short_sinc(half_rad[k]);
+                turns |= turn;
+                chord_m[k] *= sinc;
+            }
+        }
+        let mut moved_m = [[0.0; LANES]; 2];
+        for k in 0..LANES {
+            let direction = Direction::of(self.theta_rad[k] + half_rad[k]);
+            ranges |= direction.range();
+            [moved_m[0][k], moved_m[1][k]] = direction.along(chord_m[k]);
+        }
+        let is_beyond = (turns >> 63 != 0) | !Direction::is_found(ranges);
+        if is_beyond | (C::CONVERTS_BY_BITS & !differences_are_steps) {
             self.one_by_one(odometry, counts, LANES, ends_group);
             return;
         }
-        if odometry.rule == Rule::ExactArc {
-            for k in 0..LANES {
-                chord_m[k] *= small_sinc(half_rad[k]);
-            }
-        }
         for k in 0..LANES {
-            let (sin, cos) = reduced(self.theta_rad[k] + half_rad[k]);
-            self.x.moved_m[k] += chord_m[k] * cos;
-            self.y.moved_m[k] += chord_m[k] * sin;
+            self.x.moved_m[k] += moved_m[0][k];
+            self.y.moved_m[k] += moved_m[1][k];
         }
         self.theta_rad = theta_rad;
         self.since = since;

@@ -2,20 +2,19 @@
 //!
 //! Headings follow from the counts since the start, chords from headings; neither waits for the step before it. What is left of the chain are the sums of
 //! displacements, and these start from nothing in every group of 64 steps, four groups at a time. The bits are those of
-//! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, a quarter
-//! turn in a step) goes through it instead.
+//! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
+//! turned in a step) goes through it instead.
 
-use std::f64::consts::FRAC_PI_4;
-
-use crate::dead_reckoning::{GROUP, heading_rad};
+use crate::dead_reckoning::{GROUP, Place, heading_rad};
 use crate::instruction_set::Kernel;
-use crate::trig::{LARGEST_RAD, exceeds, reduced, small_sinc};
+use crate::trig::{Direction, short_sinc};
 use crate::{Count, DeadReckoning, InstructionSet, Pose, Rule, Wheels};
 
-/// Steps of a block: its dozen columns of doubles stay in the nearest cache.
-pub(crate) const BLOCK: usize = 256;
+/// Groups of a block: their sums do not wait for each other.
+const GROUPS: usize = 4;
 
-const GROUPS: usize = BLOCK / GROUP;
+/// Steps of a block.
+pub(crate) const BLOCK: usize = GROUPS * GROUP;
 
 /// Fewer steps than this are not worth a block.
 pub(crate) const FEWEST_FOR_A_BLOCK: usize = 24;
@@ -30,7 +29,7 @@ pub(crate) trait Sink {
 
     /// Room for the next poses, where they are stored one after the other.
     #[inline(always)]
-    fn room(&mut self) -> Option<&mut [Pose; BLOCK]> {
+    fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         None
     }
 }
@@ -49,7 +48,7 @@ impl Sink for Every<'_> {
     }
 
     #[inline(always)]
-    fn room(&mut self) -> Option<&mut [Pose; BLOCK]> {
+    fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         let (now, later) = std::mem::take(&mut self.0).split_first_chunk_mut()?;
         self.0 = later;
         Some(now)
@@ -127,23 +126,36 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         let begun = (GROUP - self.state.steps) % GROUP;
         let (first, counts) = split(self.counts, begun);
         self.one_by_one(first);
-        let ((left, left_rest), (right, right_rest)) = (counts.left.as_chunks(), counts.right.as_chunks());
         let mut columns = Columns::EMPTY;
-        for (left, right) in left.iter().zip(right) {
+        columns.start_from(&self.state);
+        let ((left, left_rest), (right, right_rest)) = (counts.left.as_chunks(), counts.right.as_chunks());
+        let (mut left, mut right) = (left.chunks_exact(GROUPS), right.chunks_exact(GROUPS));
+        for (left, right) in (&mut left).zip(&mut right) {
             self.block(&mut columns, Wheels { left, right }, BLOCK);
         }
-        let rest = Wheels { left: left_rest, right: right_rest };
-        if rest.left.len() < FEWEST_FOR_A_BLOCK {
-            self.one_by_one(rest);
-        } else {
-            // Standing still after the last step.
-            let filled = rest.map(|rest| {
-                let mut filled = [rest[rest.len() - 1]; BLOCK];
-                filled[..rest.len()].copy_from_slice(rest);
-                filled
-            });
-            self.block(&mut columns, filled.as_ref(), rest.left.len());
+        // The groups that are left, and the last filled up by standing still.
+        let mut groups = Wheels { left: left.remainder(), right: right.remainder() }.map(|groups| {
+            let mut filled = [[counts.left[0]; GROUP]; GROUPS];
+            filled[..groups.len()].copy_from_slice(groups);
+            filled
+        });
+        let whole = left.remainder().len();
+        let mut rest = Wheels { left: left_rest, right: right_rest };
+        let mut steps = whole * GROUP;
+        if rest.left.len() >= FEWEST_FOR_A_BLOCK {
+            for (filled, rest) in [(&mut groups.left, rest.left), (&mut groups.right, rest.right)] {
+                filled[whole] = [rest[rest.len() - 1]; GROUP];
+                filled[whole][..rest.len()].copy_from_slice(rest);
+            }
+            steps += rest.left.len();
+            rest = Wheels::both(&[]);
         }
+        if steps > 0 {
+            let used = ..steps.div_ceil(GROUP);
+            self.block(&mut columns, Wheels { left: &groups.left[used], right: &groups.right[used] }, steps);
+        }
+        self.place_waiting(&mut columns);
+        self.one_by_one(rest);
         self.state
     }
 }
@@ -154,91 +166,197 @@ fn split<C>(counts: Wheels<&[C]>, at: usize) -> (Wheels<&[C]>, Wheels<&[C]>) {
     (Wheels { left, right }, Wheels { left: later_left, right: later_right })
 }
 
-/// A block's columns. Those with a further row have the block before's last in the first.
+/// The last row of the group before, and a group's rows, which begin where a vector does.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Column([f64; BEFORE + GROUP]);
+
+/// Rows before a group's own.
+const BEFORE: usize = 8;
+
+impl Column {
+    const EMPTY: Self = Self([0.0; BEFORE + GROUP]);
+
+    #[inline(always)]
+    const fn set_before(&mut self, value: f64) {
+        self.0[BEFORE - 1] = value;
+    }
+
+    #[inline(always)]
+    const fn keep_last(&mut self) {
+        self.0[BEFORE - 1] = self.0[BEFORE + GROUP - 1];
+    }
+}
+
+/// What is known of a group before its place is.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Moved {
+    theta_rad: [f64; GROUP],
+    /// Displacement of each step, along x and y; then their sums.
+    moved_m: [[f64; 2]; GROUP],
+}
+
+impl Moved {
+    const EMPTY: Self = Self { theta_rad: [0.0; GROUP], moved_m: [[0.0; 2]; GROUP] };
+}
+
+/// The columns of the group at hand, the block at hand, and the block that waits for its place.
 struct Columns {
-    since: Wheels<[f64; BLOCK + 1]>,
-    theta_rad: [f64; BLOCK + 1],
-    /// Displacement of each step, along x and y; then their sums within the group.
-    moved_m: [[f64; 2]; BLOCK],
-    poses: [Pose; BLOCK],
+    /// Counts since the start; where these do not tell the steps, the steps.
+    since: Wheels<Column>,
+    theta_rad: Column,
+    blocks: [[Moved; GROUPS]; 2],
+    /// Which of the two is at hand.
+    at_hand: usize,
+    /// Steps of the one that waits.
+    waiting: usize,
+    poses: [Pose; GROUP],
 }
 
 impl Columns {
     const EMPTY: Self = Self {
-        since: Wheels { left: [0.0; BLOCK + 1], right: [0.0; BLOCK + 1] },
-        theta_rad: [0.0; BLOCK + 1],
-        moved_m: [[0.0; 2]; BLOCK],
-        poses: [Pose::IDENTITY; BLOCK],
+        since: Wheels { left: Column::EMPTY, right: Column::EMPTY },
+        theta_rad: Column::EMPTY,
+        blocks: [[Moved::EMPTY; GROUPS]; 2],
+        at_hand: 0,
+        waiting: 0,
+        poses: [Pose::IDENTITY; GROUP],
     };
 
-    /// Displacement of every step; false where a number is beyond the loops' range.
     #[inline(always)]
-    fn displace<C: Count>(&mut self, state: &DeadReckoning<C>, counts: Wheels<&[C; BLOCK]>) -> bool {
-        let Wheels { left: since_left, right: since_right } = &mut self.since;
-        since_left[0] = state.counts.left.since(state.start_counts.left);
-        since_right[0] = state.counts.right.since(state.start_counts.right);
-        let differences_are_steps = C::column_since(counts.left, |_| state.start_counts.left, &mut since_left[1..])
-            & C::column_since(counts.right, |_| state.start_counts.right, &mut since_right[1..]);
-        self.theta_rad[0] = state.world_from_body.theta_rad;
-        let since = since_left[1..].iter().zip(&since_right[1..]);
-        for (theta_rad, (left, right)) in self.theta_rad[1..].iter_mut().zip(since) {
-            *theta_rad = heading_rad(state.start_theta_rad, state.rad_per_count, *left, *right);
-        }
+    fn start_from<C: Count>(&mut self, state: &DeadReckoning<C>) {
+        self.since.left.set_before(state.counts.left.since(state.start_counts.left));
+        self.since.right.set_before(state.counts.right.since(state.start_counts.right));
+        self.theta_rad.set_before(state.world_from_body.theta_rad);
+    }
+
+    /// Displacement of every step of a group, the readings before it being `before`; false where a number is beyond the loops' range.
+    #[inline(always)]
+    fn displace<C: Count>(
+        &mut self,
+        state: &DeadReckoning<C>,
+        before: Wheels<C>,
+        counts: Wheels<&[C; GROUP]>,
+        group: usize,
+    ) -> bool {
+        let moved = &mut self.blocks[self.at_hand][group];
+        let (Wheels { left, right }, theta_rad) = (&mut self.since, &mut self.theta_rad);
+        let differences_are_steps = since_start(state, counts, left, right, theta_rad, &mut moved.theta_rad);
         if !differences_are_steps {
             if C::CONVERTS_BY_BITS {
                 return false;
             }
-            let (mut left, mut right) = (state.counts.left, state.counts.right);
-            for k in 0..BLOCK {
-                since_left[k] = counts.left[k].since(left);
-                since_right[k] = counts.right[k].since(right);
-                (left, right) = (counts.left[k], counts.right[k]);
+            let mut before = before;
+            for k in 0..GROUP {
+                left.0[BEFORE + k] = counts.left[k].since(before.left);
+                right.0[BEFORE + k] = counts.right[k].since(before.right);
+                before = Wheels { left: counts.left[k], right: counts.right[k] };
             }
         }
-        let m_per_count = state.odometry.m_per_count;
+        let (m_per_count, moved_m) = (state.odometry.m_per_count, &mut moved.moved_m);
         match (state.odometry.rule, differences_are_steps) {
-            (Rule::Midpoint, true) => self.displace_by::<false, true>(m_per_count),
-            (Rule::Midpoint, false) => self.displace_by::<false, false>(m_per_count),
-            (Rule::ExactArc, true) => self.displace_by::<true, true>(m_per_count),
-            (Rule::ExactArc, false) => self.displace_by::<true, false>(m_per_count),
+            (Rule::Midpoint, true) => displace::<false, true>(m_per_count, left, right, theta_rad, moved_m),
+            (Rule::Midpoint, false) => displace::<false, false>(m_per_count, left, right, theta_rad, moved_m),
+            (Rule::ExactArc, true) => displace::<true, true>(m_per_count, left, right, theta_rad, moved_m),
+            (Rule::ExactArc, false) => displace::<true, false>(m_per_count, left, right, theta_rad, moved_m),
         }
     }
 
-    /// Displacements from headings and steps, which are the differences of `since` or stand in it.
+    /// The group at hand is the one before the next.
     #[inline(always)]
-    fn displace_by<const EXACT_ARC: bool, const DIFFERENCES: bool>(&mut self, m_per_count: Wheels<f64>) -> bool {
-        // Halving is exact before and after.
-        let half_m_per_count = m_per_count.map(|m_per_count| 0.5 * m_per_count);
-        let mut beyond = 0;
-        for k in 0..BLOCK {
-            let step = |since: &[f64; BLOCK + 1]| if DIFFERENCES { since[k + 1] - since[k] } else { since[k] };
-            let distance_m =
-                half_m_per_count.right * step(&self.since.right) + half_m_per_count.left * step(&self.since.left);
-            let half_rad = 0.5 * (self.theta_rad[k + 1] - self.theta_rad[k]);
-            let chord_rad = self.theta_rad[k] + half_rad;
-            let chord_m = if EXACT_ARC {
-                beyond |= exceeds(half_rad, FRAC_PI_4);
-                distance_m * small_sinc(half_rad)
-            } else {
-                distance_m
-            };
-            beyond |= exceeds(chord_rad, LARGEST_RAD);
-            let (sin, cos) = reduced(chord_rad);
-            self.moved_m[k] = [chord_m * cos, chord_m * sin];
-        }
-        beyond >> 63 == 0
+    const fn next_group(&mut self) {
+        self.since.left.keep_last();
+        self.since.right.keep_last();
+        self.theta_rad.keep_last();
     }
+}
 
-    /// Sums of the displacements, from nothing in each group.
-    #[inline(always)]
-    fn sum_up(&mut self) {
-        let mut sums_m = [[0.0; 2]; GROUPS];
-        for step in 0..GROUP {
-            for (group, [x_m, y_m]) in sums_m.iter_mut().enumerate() {
-                let [dx_m, dy_m] = &mut self.moved_m[group * GROUP + step];
-                (*x_m, *y_m) = (*x_m + *dx_m, *y_m + *dy_m);
-                (*dx_m, *dy_m) = (*x_m, *y_m);
-            }
+/// Counts since the start and headings of a group; are the differences of those counts the steps between the readings? Columns are arguments of their own:
+/// compilers know of these that none overlaps another.
+#[inline(always)]
+fn since_start<C: Count>(
+    state: &DeadReckoning<C>,
+    counts: Wheels<&[C; GROUP]>,
+    since_left: &mut Column,
+    since_right: &mut Column,
+    theta_rad: &mut Column,
+    kept_theta_rad: &mut [f64; GROUP],
+) -> bool {
+    let (start, start_rad, rad_per_count) = (state.start_counts, state.start_theta_rad, state.rad_per_count);
+    let differences_are_steps = C::column_since(counts.left, |_| start.left, &mut since_left.0[BEFORE..])
+        & C::column_since(counts.right, |_| start.right, &mut since_right.0[BEFORE..]);
+    for (k, kept) in kept_theta_rad.iter_mut().enumerate() {
+        let now = BEFORE + k;
+        theta_rad.0[now] = heading_rad(start_rad, rad_per_count, since_left.0[now], since_right.0[now]);
+        *kept = theta_rad.0[now];
+    }
+    differences_are_steps
+}
+
+/// Displacements from headings and steps, which are the differences of `since` or stand in it; false where a number is beyond the loop's range.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)] // one step of several columns; compilers make no vectors of it otherwise
+fn displace<const EXACT_ARC: bool, const DIFFERENCES: bool>(
+    m_per_count: Wheels<f64>,
+    since_left: &Column,
+    since_right: &Column,
+    theta_rad: &Column,
+    moved_m: &mut [[f64; 2]; GROUP],
+) -> bool {
+    // Halving is exact before and after.
+    let half_m_per_count = m_per_count.map(|m_per_count| 0.5 * m_per_count);
+    let (mut turns, mut ranges) = (0, 0);
+    for k in 0..GROUP {
+        let now = BEFORE + k;
+        let (mut left, mut right) = (since_left.0[now], since_right.0[now]);
+        if DIFFERENCES {
+            (left, right) = (left - since_left.0[now - 1], right - since_right.0[now - 1]);
+        }
+        let distance_m = half_m_per_count.right * right + half_m_per_count.left * left;
+        let before_rad = theta_rad.0[now - 1];
+        let half_rad = 0.5 * (theta_rad.0[now] - before_rad);
+        let chord_m = if EXACT_ARC {
+            let (sinc, turn) = short_sinc(half_rad);
+            turns |= turn;
+            distance_m * sinc
+        } else {
+            distance_m
+        };
+        let direction = Direction::of(before_rad + half_rad);
+        ranges |= direction.range();
+        moved_m[k] = direction.along(chord_m);
+    }
+    (turns >> 63 == 0) & Direction::is_found(ranges)
+}
+
+/// Sums of the displacements, from nothing in each group.
+#[inline(always)]
+fn sum_up(block: &mut [Moved; GROUPS]) {
+    let mut sums_m = [[0.0; 2]; GROUPS];
+    for step in 0..GROUP {
+        for (group, [x_m, y_m]) in block.iter_mut().zip(&mut sums_m) {
+            let [dx_m, dy_m] = &mut group.moved_m[step];
+            (*x_m, *y_m) = (*x_m + *dx_m, *y_m + *dy_m);
+            (*dx_m, *dy_m) = (*x_m, *y_m);
+        }
+    }
+}
+
+/// Poses of a group whose place is known.
+#[inline(always)]
+fn fill(poses: &mut [Pose; GROUP], [x, y]: [Place; 2], Moved { theta_rad, moved_m }: &Moved) {
+    let moved = moved_m.as_chunks().0.iter().zip(theta_rad.as_chunks().0);
+    // Eight by eight: vectors of the widest set are put together, then stored.
+    for (poses, (moved_m, theta_rad)) in poses.as_chunks_mut::<8>().0.iter_mut().zip(moved) {
+        let moved_m: &[[f64; 2]; 8] = moved_m;
+        let theta_rad: &[f64; 8] = theta_rad;
+        let mut places = [[0.0; 2]; 8];
+        for k in 0..8 {
+            places[k] = [x.after_m(moved_m[k][0]), y.after_m(moved_m[k][1])];
+        }
+        for k in 0..8 {
+            poses[k] = Pose::new(places[k][0], places[k][1], theta_rad[k]);
         }
     }
 }
@@ -254,45 +372,61 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
         }
     }
 
-    /// A block of which `used` steps are steps, from the beginning of a group.
+    /// A block of which `used` steps are steps. Its displacements are found while the block before is placed and its poses are written, group by group: the
+    /// memory writes while the processor computes.
     #[inline(always)]
-    fn block(&mut self, columns: &mut Columns, counts: Wheels<&[C; BLOCK]>, used: usize) {
-        if !columns.displace(&self.state, counts) {
-            self.one_by_one(Wheels { left: &counts.left[..used], right: &counts.right[..used] });
+    fn block(&mut self, columns: &mut Columns, counts: Wheels<&[[C; GROUP]]>, used: usize) {
+        let (mut before, mut is_within) = (self.state.counts, true);
+        for (group, (left, right)) in counts.left.iter().zip(counts.right).enumerate() {
+            is_within &= columns.displace(&self.state, before, Wheels { left, right }, group);
+            columns.next_group();
+            before = Wheels { left: left[GROUP - 1], right: right[GROUP - 1] };
+            self.place_group(columns, group);
+        }
+        (counts.left.len()..GROUPS).for_each(|group| self.place_group(columns, group));
+        columns.waiting = 0;
+        let (left, right) = (&counts.left.as_flattened()[..used], &counts.right.as_flattened()[..used]);
+        if !is_within {
+            self.one_by_one(Wheels { left, right });
+            columns.start_from(&self.state);
             return;
         }
-        columns.sum_up();
+        sum_up(&mut columns.blocks[columns.at_hand]);
+        columns.at_hand = 1 - columns.at_hand;
+        columns.waiting = used;
+        self.state.counts = Wheels { left: left[used - 1], right: right[used - 1] };
+    }
+
+    /// Places the block that waits.
+    #[inline(always)]
+    fn place_waiting(&mut self, columns: &mut Columns) {
+        (0..GROUPS).for_each(|group| self.place_group(columns, group));
+        columns.waiting = 0;
+    }
+
+    /// Places a group of the block that waits, if there is one.
+    #[inline(always)]
+    fn place_group(&mut self, columns: &mut Columns, group: usize) {
+        let used = columns.waiting.saturating_sub(group * GROUP).min(GROUP);
+        let Some(last) = used.checked_sub(1) else { return };
+        let moved = &columns.blocks[1 - columns.at_hand][group];
         let state = &mut self.state;
-        let stored = if S::EVERY && used == BLOCK { self.sink.room() } else { None };
-        let is_stored = stored.is_some();
-        let poses = stored.unwrap_or(&mut columns.poses);
-        for (group, poses) in poses.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
-            let first = group * GROUP;
-            if first >= used {
-                break;
-            }
-            if S::EVERY {
-                let [x, y] = state.place;
-                let moved_m = &columns.moved_m[first..first + GROUP];
-                let theta_rad = &columns.theta_rad[first + 1..=first + GROUP];
-                for ((pose, [dx_m, dy_m]), theta_rad) in poses.iter_mut().zip(moved_m).zip(theta_rad) {
-                    *pose = Pose::new(x.anchor_m + (x.dropped_m + dx_m), y.anchor_m + (y.dropped_m + dy_m), *theta_rad);
-                }
-            }
-            let last = (first + GROUP).min(used) - 1;
-            let [x, y] = &mut state.place;
-            [x.moved_m, y.moved_m] = columns.moved_m[last];
-            state.world_from_body = Pose::new(x.now_m(), y.now_m(), columns.theta_rad[last + 1]);
-            state.steps = last + 1 - first;
-            if state.steps == GROUP {
-                x.drop_anchor();
-                y.drop_anchor();
-                state.steps = 0;
+        if S::EVERY {
+            if let Some(room) = if used == GROUP { self.sink.room() } else { None } {
+                fill(room, state.place, moved);
+            } else {
+                fill(&mut columns.poses, state.place, moved);
+                self.sink.take(&columns.poses[..used]);
             }
         }
-        state.counts = Wheels { left: counts.left[used - 1], right: counts.right[used - 1] };
-        if S::EVERY && !is_stored {
-            self.sink.take(&columns.poses[..used]);
+        let [x, y] = &mut state.place;
+        [x.moved_m, y.moved_m] = moved.moved_m[last];
+        state.world_from_body = Pose::new(x.now_m(), y.now_m(), moved.theta_rad[last]);
+        state.steps = used;
+        if used == GROUP {
+            x.drop_anchor();
+            y.drop_anchor();
+            state.steps = 0;
         }
     }
 }

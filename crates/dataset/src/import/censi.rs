@@ -15,8 +15,7 @@ use std::rc::Rc;
 use kinematics::Wheels;
 use serde::Deserialize;
 
-use super::Imported;
-use crate::counter;
+use super::Source;
 use crate::error::DatasetError;
 use crate::record::{
     Dataset, Displacement, NominalRobot, Odometry, Protocol, Provenance, Run, RunInfo, TruthNoise, WheelLog,
@@ -49,7 +48,7 @@ struct Tuple {
 }
 
 /// The one dataset of a file.
-pub(super) fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
+pub(super) fn open(source: &Path) -> Result<Vec<Source>, DatasetError> {
     let allowance = Allowance::default();
     let reader = Allowed { inner: BufReader::new(open_file(source, EXPECTED)?), allowance: allowance.clone() };
     let mut tuples = serde_json::Deserializer::from_reader(reader).into_iter::<Tuple>();
@@ -90,7 +89,7 @@ pub(super) fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
     let info =
         RunInfo { id: "run-01".to_owned(), protocol: Some(Protocol::Free), continuous: false, ..RunInfo::default() };
     let odometry = Odometry { t_s: times_s, wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
-    let dataset = Dataset {
+    let header = Dataset {
         provenance: provenance(&name),
         robot: NominalRobot {
             left_wheel_diameter_m: WHEEL_DIAMETER_M,
@@ -101,10 +100,10 @@ pub(super) fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
         },
         truth_noise: TruthNoise::default(),
         points: Vec::new(),
-        runs: vec![Run { info, odometry, displacements, ..Run::default() }],
+        runs: Vec::new(),
     };
-    let warnings = counter::wrap_warnings(&dataset);
-    Ok(vec![Imported { name, dataset, warnings }])
+    let run = Run { info, odometry, displacements, ..Run::default() };
+    Ok(vec![Source::new(name, header, std::iter::once(Ok(run)))])
 }
 
 fn provenance(name: &str) -> Provenance {
@@ -192,6 +191,11 @@ impl Read for Allowed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::{Imported, importer};
+
+    fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
+        importer("censi").expect("this one").read(source)
+    }
 
     fn import(content: &[u8]) -> Result<Dataset, DatasetError> {
         let temp = tempfile::tempdir().expect("a temporary folder");

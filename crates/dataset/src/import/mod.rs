@@ -8,8 +8,10 @@ mod optiodom;
 
 use std::path::Path;
 
+use crate::counter;
 use crate::error::DatasetError;
-use crate::record::Dataset;
+use crate::read::Loaded;
+use crate::record::{Dataset, Run};
 use crate::warning::Warning;
 
 /// One dataset that was found in another format.
@@ -23,6 +25,39 @@ pub struct Imported {
     pub warnings: Vec<Warning>,
 }
 
+/// A dataset in another format, whose runs are read one after the other: memory is that of the largest.
+pub struct Source {
+    /// A name for its folder.
+    pub name: String,
+    /// All but the runs.
+    pub header: Dataset,
+    /// Datasets of one run each, in order, up to the first fault.
+    pub runs: Box<dyn Iterator<Item = Result<Loaded, DatasetError>>>,
+}
+
+impl Source {
+    fn new(name: String, header: Dataset, runs: impl Iterator<Item = Result<Run, DatasetError>> + 'static) -> Self {
+        let of_run = header.clone();
+        let runs = runs.map(move |run| {
+            let dataset = Dataset { runs: vec![run?], ..of_run.clone() };
+            let warnings = counter::wrap_warnings(&dataset);
+            Ok(Loaded { dataset, warnings })
+        });
+        Self { name, header, runs: Box::new(runs) }
+    }
+
+    fn read(self) -> Result<Imported, DatasetError> {
+        let Self { name, header: mut dataset, runs } = self;
+        let mut all_warnings = Vec::new();
+        for loaded in runs {
+            let Loaded { dataset: mut of_run, mut warnings } = loaded?;
+            dataset.runs.append(&mut of_run.runs);
+            all_warnings.append(&mut warnings);
+        }
+        Ok(Imported { name, dataset, warnings: all_warnings })
+    }
+}
+
 /// A format that can be imported.
 #[derive(Debug, Clone, Copy)]
 pub struct Importer {
@@ -30,11 +65,21 @@ pub struct Importer {
     pub name: &'static str,
     /// One line: what it is, and what the source has to be.
     pub about: &'static str,
-    /// Reads all datasets of a source, in an order that does not depend on the machine.
+    /// Finds all datasets of a source, in an order that does not depend on the machine.
+    ///
+    /// # Errors
+    /// [`DatasetError`] of the first fault.
+    pub open: fn(&Path) -> Result<Vec<Source>, DatasetError>,
+}
+
+impl Importer {
+    /// Reads all datasets of a source.
     ///
     /// # Errors
     /// [`DatasetError`] of the first fault; nothing is handed out then.
-    pub read: fn(&Path) -> Result<Vec<Imported>, DatasetError>,
+    pub fn read(&self, source: &Path) -> Result<Vec<Imported>, DatasetError> {
+        (self.open)(source)?.into_iter().map(Source::read).collect()
+    }
 }
 
 /// All formats that can be imported; a new one is its file and its line here.
@@ -42,12 +87,12 @@ pub const IMPORTERS: &[Importer] = &[
     Importer {
         name: "censi",
         about: "Khepera III with a laser (Censi et al., github.com/AndreaCensi/calibration): one .tuple file",
-        read: censi::read,
+        open: censi::open,
     },
     Importer {
         name: "optiodom",
         about: "OptiTrack sessions (Sousa et al., github.com/sousarbarb/optiodom): a session's folder, or one that holds several",
-        read: optiodom::read,
+        open: optiodom::open,
     },
 ];
 

@@ -13,8 +13,7 @@ use std::path::{Path, PathBuf};
 
 use kinematics::{DriveGeometry, Increment, Wheels};
 
-use super::Imported;
-use crate::counter;
+use super::Source;
 use crate::error::{DatasetError, shown};
 use crate::record::{
     Dataset, NominalRobot, Odometry, Protocol, ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample,
@@ -38,7 +37,7 @@ const RIGHT_TICKS: usize = 4;
 const LEFT_TICKS: usize = 5;
 
 /// All sessions in or under a folder, by path.
-pub(super) fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
+pub(super) fn open(source: &Path) -> Result<Vec<Source>, DatasetError> {
     if !source.is_dir() {
         return Err(DatasetError::NotAFolder { path: source.to_owned(), expected: EXPECTED_FOLDER });
     }
@@ -48,7 +47,7 @@ pub(super) fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
     if metadata.is_empty() {
         return Err(DatasetError::NothingToImport { path: source.to_owned(), expected: EXPECTED_FOLDER });
     }
-    metadata.iter().map(|file| read_session(file)).collect()
+    metadata.iter().map(|file| open_session(file)).collect()
 }
 
 /// Collects the metadata files under a folder; links are not followed, as they may lead in a circle.
@@ -131,7 +130,7 @@ impl Metadata {
     }
 }
 
-fn read_session(metadata_file: &Path) -> Result<Imported, DatasetError> {
+fn open_session(metadata_file: &Path) -> Result<Source, DatasetError> {
     let metadata = Metadata::read(metadata_file)?;
     let file_name = metadata_file.file_name().unwrap_or_default().to_string_lossy();
     let session = file_name.strip_suffix(METADATA_SUFFIX).unwrap_or(&file_name).to_owned();
@@ -144,7 +143,6 @@ fn read_session(metadata_file: &Path) -> Result<Imported, DatasetError> {
         );
         return Err(DatasetError::Foreign { file: metadata_file.to_owned(), line: metadata.runs_line, message });
     }
-    let runs = run_files.iter().map(|(id, file)| read_run(id, file, &metadata)).collect::<Result<_, _>>()?;
     let provenance = Provenance {
         name: Some(session.clone()),
         licence: Some("MIT".to_owned()),
@@ -155,10 +153,15 @@ fn read_session(metadata_file: &Path) -> Result<Imported, DatasetError> {
                 .to_owned(),
         ),
     };
-    let dataset =
-        Dataset { provenance, robot: metadata.robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs };
-    let warnings = counter::wrap_warnings(&dataset);
-    Ok(Imported { name: session, dataset, warnings })
+    let header = Dataset {
+        provenance,
+        robot: metadata.robot,
+        truth_noise: TruthNoise::default(),
+        points: Vec::new(),
+        runs: Vec::new(),
+    };
+    let runs = run_files.into_iter().map(move |(id, file)| read_run(&id, &file, &metadata));
+    Ok(Source::new(session, header, runs))
 }
 
 /// The run files of a session with their ids, `run-NN`, by number.
@@ -295,6 +298,11 @@ fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::{Imported, importer};
+
+    fn read(source: &Path) -> Result<Vec<Imported>, DatasetError> {
+        importer("optiodom").expect("this one").read(source)
+    }
 
     const METADATA: &str =
         "type,diff,,\nngear,43.7,,\nencRes,64,,\nLi,0.2,,\nDi,0.084,0.085,\nThi,,,\nN,1,,\nL,0.75,,\n";

@@ -4,9 +4,10 @@
 
 mod manifest;
 mod odometry;
+mod run_by_run;
 mod truth;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::counter;
 use crate::error::{DatasetError, shown};
@@ -15,9 +16,11 @@ use crate::table::{RUN_COLUMN, RunIndex, Table};
 use crate::warning::Warning;
 use manifest::Manifest;
 use odometry::OdometryTable;
+use truth::{PointIndex, TruthTable};
 
 pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};
 pub(crate) use odometry::wheel_columns;
+pub use run_by_run::RunByRun;
 pub(crate) use truth::{DISPLACEMENT, POINTS, TRUTH, WHEEL_REFERENCE};
 
 /// What the robot counted.
@@ -35,49 +38,76 @@ pub struct Loaded {
 /// Reads the dataset in the folder `dir`.
 ///
 /// Memory: the columns, reserved exactly (24 bytes a row of ticks, 32 a truth pose), and half a megabyte. Nothing else grows with the
-/// tables.
+/// tables. [`RunByRun`] holds one run at a time.
 ///
 /// # Errors
 /// [`DatasetError`] with file, line and column of the first fault; see there.
 pub fn read(dir: &Path) -> Result<Loaded, DatasetError> {
-    if !dir.is_dir() {
-        let expected = "a dataset: a folder with dataset.toml, odometry.csv and a truth";
-        return Err(DatasetError::NotAFolder { path: dir.to_owned(), expected });
-    }
-    let manifest_file = dir.join(MANIFEST);
-    let Manifest { provenance, robot, robot_line, truth_noise, points, runs: infos, run_lines } =
-        Manifest::read(&manifest_file)?;
-
-    let mut warnings = Vec::new();
-    let odometry = OdometryTable::open(&dir.join(ODOMETRY), &mut warnings)?;
-    if odometry.has_ticks() && robot.ticks_per_rev.is_none() {
-        return Err(DatasetError::MissingKey {
-            file: manifest_file,
-            line: robot_line,
-            key: "ticks_per_rev",
-            why: "odometry.csv has ticks, and a count is no length without it",
-        });
-    }
-    let truths = truth::open_all(dir, &mut warnings)?;
-
-    let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
-    let mut runs: Vec<Run> = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();
-    odometry.read(&index, &mut runs)?;
-    if let Some(bits) = robot.counter_bits {
+    let Opened { dataset: mut header, manifest_file, run_lines, odometry, truths, index, mut warnings } =
+        Opened::open(dir)?;
+    let runs = &mut header.runs;
+    odometry.read(&index, runs)?;
+    if let Some(bits) = header.robot.counter_bits {
         runs.iter_mut().for_each(|run| odometry::unwrap_counters(run, bits));
     }
-    let tables: Vec<_> = truths.iter().map(truth::TruthTable::name).collect();
+    let tables: Vec<_> = truths.iter().map(TruthTable::name).collect();
+    let points = PointIndex::new(&header.points);
     for truth in truths {
-        truth.read(&index, &points, &mut runs)?;
+        truth.read(&index, &points, runs)?;
     }
     if let Some((run, line)) = runs.iter().zip(run_lines).find(|(run, _)| !has_truth(run)) {
-        let run = shown(run.info.id.as_bytes());
-        return Err(DatasetError::RunWithoutTruth { file: manifest_file, line, run, tables: tables.join(", ") });
+        return Err(without_truth(manifest_file, line, run, &tables));
     }
+    warnings.extend(counter::wrap_warnings(&header));
+    Ok(Loaded { dataset: header, warnings })
+}
 
-    let dataset = Dataset { provenance, robot, truth_noise, points, runs };
-    warnings.extend(counter::wrap_warnings(&dataset));
-    Ok(Loaded { dataset, warnings })
+fn without_truth(manifest_file: PathBuf, line: u64, run: &Run, tables: &[&str]) -> DatasetError {
+    let run = shown(run.info.id.as_bytes());
+    DatasetError::RunWithoutTruth { file: manifest_file, line, run, tables: tables.join(", ") }
+}
+
+/// A dataset whose manifest and headers have been read.
+#[derive(Debug)]
+struct Opened {
+    /// Its runs have no rows yet.
+    dataset: Dataset,
+    manifest_file: PathBuf,
+    /// Where the manifest speaks of each run.
+    run_lines: Vec<u64>,
+    odometry: OdometryTable,
+    truths: Vec<TruthTable>,
+    index: RunIndex,
+    warnings: Vec<Warning>,
+}
+
+impl Opened {
+    fn open(dir: &Path) -> Result<Self, DatasetError> {
+        if !dir.is_dir() {
+            let expected = "a dataset: a folder with dataset.toml, odometry.csv and a truth";
+            return Err(DatasetError::NotAFolder { path: dir.to_owned(), expected });
+        }
+        let manifest_file = dir.join(MANIFEST);
+        let Manifest { provenance, robot, robot_line, truth_noise, points, runs: infos, run_lines } =
+            Manifest::read(&manifest_file)?;
+
+        let mut warnings = Vec::new();
+        let odometry = OdometryTable::open(&dir.join(ODOMETRY), &mut warnings)?;
+        if odometry.has_ticks() && robot.ticks_per_rev.is_none() {
+            return Err(DatasetError::MissingKey {
+                file: manifest_file,
+                line: robot_line,
+                key: "ticks_per_rev",
+                why: "odometry.csv has ticks, and a count is no length without it",
+            });
+        }
+        let truths = truth::open_all(dir, &mut warnings)?;
+
+        let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
+        let runs = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();
+        let dataset = Dataset { provenance, robot, truth_noise, points, runs };
+        Ok(Self { dataset, manifest_file, run_lines, odometry, truths, index, warnings })
+    }
 }
 
 /// Whether an outside instrument saw anything of a run.

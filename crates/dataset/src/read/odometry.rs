@@ -1,5 +1,6 @@
 //! `odometry.csv`: what the robot counted, in one of three forms.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use kinematics::{Side, Wheels};
@@ -8,7 +9,7 @@ use super::warn_of_unknown;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{ExtraChannel, Odometry, Run, WheelLog};
-use crate::table::{Row, RunIndex, Table};
+use crate::table::{Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
 const HEADER: &str = "a header like run,t_s,left_ticks,right_ticks";
@@ -56,10 +57,16 @@ fn exactly<T>(rows: usize) -> Vec<T> {
     column
 }
 
-/// The open table and where its columns stand.
+/// The open table.
 #[derive(Debug)]
 pub(super) struct OdometryTable {
     table: Table,
+    columns: Columns,
+}
+
+/// Where its columns stand.
+#[derive(Debug)]
+struct Columns {
     t_s: usize,
     form: Form,
     wheels: [usize; 2],
@@ -94,52 +101,73 @@ impl OdometryTable {
             .into_iter()
             .filter_map(|channel| Some((channel, table.column(channel.column())?)))
             .collect();
-        Ok(Self { table, t_s, form, wheels, extra })
+        Ok(Self { table, columns: Columns { t_s, form, wheels, extra } })
     }
 
     pub(super) fn has_ticks(&self) -> bool {
-        self.form == Form::Ticks
+        self.columns.form == Form::Ticks
+    }
+
+    /// Where each run's rows are; goes back to the first.
+    pub(super) fn survey(&mut self, index: &RunIndex) -> Result<Survey, DatasetError> {
+        self.table.survey(index)
     }
 
     /// Fills every run's odometry.
     pub(super) fn read(mut self, index: &RunIndex, runs: &mut [Run]) -> Result<(), DatasetError> {
-        let rows = self.table.count_rows(index)?;
+        let rows = self.table.survey(index)?.rows;
         for (run, &rows) in runs.iter_mut().zip(&rows) {
-            run.odometry =
-                Odometry { t_s: exactly(rows), wheels: self.form.empty_log(rows), extra: Default::default() };
+            run.odometry = self.columns.empty(rows);
         }
-        let Self { table, t_s, wheels, extra, .. } = &mut self;
-        table.for_each_row(index, |run, row| {
-            let odometry = &mut runs[run].odometry;
-            let first = odometry.t_s.is_empty();
-            odometry.t_s.push(row.time_after(*t_s, odometry.t_s.last().copied())?);
-            match &mut odometry.wheels {
-                WheelLog::Ticks(ticks) => {
-                    ticks.left.push(row.count(wheels[0])?);
-                    ticks.right.push(row.count(wheels[1])?);
-                }
-                WheelLog::Angles(angles) => {
-                    angles.left.push(row.number(wheels[0])?);
-                    angles.right.push(row.number(wheels[1])?);
-                }
-                WheelLog::Twist { v_mps, omega_radps } => {
-                    v_mps.push(row.number(wheels[0])?);
-                    omega_radps.push(row.number(wheels[1])?);
-                }
-            }
-            for &(channel, column) in extra.iter() {
-                push_extra(odometry, channel, row, column, first.then_some(rows[run]))?;
-            }
-            Ok(())
-        })?;
+        self.table.for_each_row(index, |run, row| self.columns.push(&mut runs[run].odometry, row, rows[run]))?;
         // Only now: a fault in a row is the better reason, as it may be what cut the file short.
-        match runs.iter().zip(rows).find(|(_, rows)| *rows == 0) {
-            None => Ok(()),
-            Some((run, _)) => {
-                let (file, run) = (self.table.file().to_owned(), shown(run.info.id.as_bytes()));
-                Err(DatasetError::RunWithoutRows { file, run })
+        runs.iter().zip(rows).try_for_each(|(run, rows)| self.has_rows(run, rows))
+    }
+
+    /// Fills one run's odometry.
+    pub(super) fn read_run(&mut self, number: usize, survey: &Survey, run: &mut Run) -> Result<(), DatasetError> {
+        let rows = survey.rows[number];
+        self.has_rows(run, rows)?;
+        run.odometry = self.columns.empty(rows);
+        self.table.for_each_row_of(number, survey, |row| self.columns.push(&mut run.odometry, row, rows))
+    }
+
+    fn has_rows(&self, run: &Run, rows: usize) -> Result<(), DatasetError> {
+        if rows > 0 {
+            return Ok(());
+        }
+        let (file, run) = (self.table.file().to_owned(), shown(run.info.id.as_bytes()));
+        Err(DatasetError::RunWithoutRows { file, run })
+    }
+}
+
+impl Columns {
+    fn empty(&self, rows: usize) -> Odometry {
+        Odometry { t_s: exactly(rows), wheels: self.form.empty_log(rows), extra: BTreeMap::default() }
+    }
+
+    /// Adds a row to a run that will have `rows`.
+    fn push(&self, odometry: &mut Odometry, row: &Row<'_>, rows: usize) -> Result<(), DatasetError> {
+        let first = odometry.t_s.is_empty();
+        odometry.t_s.push(row.time_after(self.t_s, odometry.t_s.last().copied())?);
+        match &mut odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                ticks.left.push(row.count(self.wheels[0])?);
+                ticks.right.push(row.count(self.wheels[1])?);
+            }
+            WheelLog::Angles(angles) => {
+                angles.left.push(row.number(self.wheels[0])?);
+                angles.right.push(row.number(self.wheels[1])?);
+            }
+            WheelLog::Twist { v_mps, omega_radps } => {
+                v_mps.push(row.number(self.wheels[0])?);
+                omega_radps.push(row.number(self.wheels[1])?);
             }
         }
+        for &(channel, column) in &self.extra {
+            push_extra(odometry, channel, row, column, first.then_some(rows))?;
+        }
+        Ok(())
     }
 }
 

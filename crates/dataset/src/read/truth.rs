@@ -8,7 +8,7 @@ use kinematics::{Point, Wheels};
 use super::warn_of_unknown;
 use crate::error::{DatasetError, shown};
 use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
-use crate::table::{RUN_COLUMN, Row, RunIndex, Table};
+use crate::table::{RUN_COLUMN, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
 pub(crate) const TRUTH: &str = "truth.csv";
@@ -90,32 +90,44 @@ impl TruthTable {
         self.name
     }
 
+    /// Where each run's rows are; goes back to the first.
+    pub(super) fn survey(&mut self, index: &RunIndex) -> Result<Survey, DatasetError> {
+        self.table.survey(index)
+    }
+
     /// Fills every run's records of this kind.
-    pub(super) fn read(
-        mut self,
-        index: &RunIndex,
-        points: &[MarkedPoint],
-        runs: &mut [Run],
-    ) -> Result<(), DatasetError> {
-        let rows = self.table.count_rows(index)?;
+    pub(super) fn read(mut self, index: &RunIndex, points: &PointIndex, runs: &mut [Run]) -> Result<(), DatasetError> {
+        let rows = self.table.survey(index)?.rows;
         for (run, &rows) in runs.iter_mut().zip(&rows) {
             self.columns.reserve(run, rows);
         }
-        let points = PointIndex::new(points);
         let columns = &self.columns;
-        self.table.for_each_row(index, |run, row| columns.push(row, &mut runs[run], &points))
+        self.table.for_each_row(index, |run, row| columns.push(row, &mut runs[run], points))
+    }
+
+    /// Fills one run's records of this kind.
+    pub(super) fn read_run(
+        &mut self,
+        number: usize,
+        survey: &Survey,
+        points: &PointIndex,
+        run: &mut Run,
+    ) -> Result<(), DatasetError> {
+        self.columns.reserve(run, survey.rows[number]);
+        let columns = &self.columns;
+        self.table.for_each_row_of(number, survey, |row| columns.push(row, run, points))
     }
 }
 
 /// Which marked point an id speaks of.
 #[derive(Debug)]
-struct PointIndex {
+pub(super) struct PointIndex {
     by_id: HashMap<Box<[u8]>, usize>,
     known: String,
 }
 
 impl PointIndex {
-    fn new(points: &[MarkedPoint]) -> Self {
+    pub(super) fn new(points: &[MarkedPoint]) -> Self {
         let by_id = points.iter().map(|point| point.id.as_bytes().into()).zip(0..).collect();
         let mut known: Vec<_> = points.iter().take(LISTED_POINTS).map(|point| shown(point.id.as_bytes())).collect();
         if points.len() > LISTED_POINTS {

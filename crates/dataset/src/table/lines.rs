@@ -50,19 +50,42 @@ pub(crate) struct Lines {
     end: usize,
     at_end_of_file: bool,
     number: u64,
+    /// How much of the file has been read into the buffer.
+    read_bytes: u64,
+}
+
+/// A place between two lines of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Position {
+    offset_bytes: u64,
+    /// Of the line before.
+    number: u64,
 }
 
 impl Lines {
     pub(crate) fn open(path: &Path, expected: &'static str) -> Result<Self, DatasetError> {
         let file = open(path, expected)?;
         let buffer = vec![0; BUFFER_BYTES].into_boxed_slice();
-        Ok(Self { path: path.to_owned(), file, buffer, start: 0, end: 0, at_end_of_file: false, number: 0 })
+        let path = path.to_owned();
+        Ok(Self { path, file, buffer, start: 0, end: 0, at_end_of_file: false, number: 0, read_bytes: 0 })
     }
 
-    /// Back to the first line.
-    pub(crate) fn rewind(&mut self) -> Result<(), DatasetError> {
-        self.file.seek(SeekFrom::Start(0)).map_err(|source| DatasetError::Io { path: self.path.clone(), source })?;
-        (self.start, self.end, self.at_end_of_file, self.number) = (0, 0, false, 0);
+    /// Before the line that comes next.
+    pub(crate) const fn position(&self) -> Position {
+        Position { offset_bytes: self.read_bytes - (self.end - self.start) as u64, number: self.number }
+    }
+
+    /// Goes to a place that [`Self::position`] gave; costs nothing where that is here.
+    pub(crate) fn go_to(&mut self, position: Position) -> Result<(), DatasetError> {
+        if position == self.position() {
+            return Ok(());
+        }
+        let Position { offset_bytes, number } = position;
+        self.file
+            .seek(SeekFrom::Start(offset_bytes))
+            .map_err(|source| DatasetError::Io { path: self.path.clone(), source })?;
+        (self.start, self.end, self.at_end_of_file) = (0, 0, false);
+        (self.number, self.read_bytes) = (number, offset_bytes);
         Ok(())
     }
 
@@ -117,6 +140,7 @@ impl Lines {
         };
         self.at_end_of_file = read == 0;
         self.end += read;
+        self.read_bytes += read as u64;
         Ok(())
     }
 
@@ -163,7 +187,7 @@ mod tests {
                 all.push((line.number, line.bytes.to_vec()));
             }
             if pass == 0 {
-                lines.rewind()?;
+                lines.go_to(Position::default())?;
             }
         }
         Ok(all)
@@ -182,6 +206,27 @@ mod tests {
         let content: Vec<Vec<u8>> = (0..60_u8).map(|k| vec![b'a' + k % 26; 20_011 + 311 * usize::from(k)]).collect();
         let lines = lines_of(&content.join(&b'\n')).expect("readable");
         assert!(lines.iter().map(|(_, bytes)| bytes).eq(&content));
+    }
+
+    #[test]
+    fn every_place_between_lines_is_found_again() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("lines");
+        // Lines of all lengths, empty ones and Windows' ends, over several buffers.
+        let content: String = (0..20_000).map(|k| format!("{}{}", "x".repeat(k % 97), ["\n", "\r\n"][k % 2])).collect();
+        std::fs::write(&path, content).expect("written");
+        let mut lines = Lines::open(&path, "lines").expect("there");
+        let mut places = Vec::new();
+        loop {
+            let place = lines.position();
+            let Some(line) = lines.advance().expect("readable") else { break };
+            places.push((place, line.number, line.bytes.len()));
+        }
+        for (place, number, length) in places.into_iter().rev().step_by(37) {
+            lines.go_to(place).expect("there");
+            let line = lines.advance().expect("readable").expect("a line");
+            assert_eq!((line.number, line.bytes.len()), (number, length));
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{DatasetError, shown};
 use fields::Fields;
-use lines::{Line, Lines};
+use lines::{Line, Lines, Position};
 
 pub(crate) use fields::quoted_where_needed;
 pub(crate) use lines::{LINE_LIMIT_BYTES, open as open_file, read_all as read_lines};
@@ -52,7 +52,17 @@ pub(crate) struct Table {
     columns: Columns,
     lines: Lines,
     fields: Fields,
-    has_header: bool,
+}
+
+/// Where each run's rows are.
+#[derive(Debug)]
+pub(crate) struct Survey {
+    /// How many each run has.
+    pub(crate) rows: Vec<usize>,
+    /// Before the first of each run that has any.
+    first: Vec<Position>,
+    /// Do the rows of every run stand together?
+    pub(crate) is_grouped: bool,
 }
 
 /// Where a table is and what its columns are called.
@@ -66,7 +76,6 @@ impl Table {
     /// Opens a table and reads its header.
     pub(crate) fn open(file: &Path, expected: &'static str) -> Result<Self, DatasetError> {
         let mut table = Self::without_header(file, &[], expected)?;
-        table.has_header = true;
         let Some(header) = table.lines.advance()? else {
             return Err(DatasetError::EmptyFile { file: file.to_owned(), expected: expected.to_owned() });
         };
@@ -87,7 +96,7 @@ impl Table {
     pub(crate) fn without_header(file: &Path, columns: &[&str], expected: &'static str) -> Result<Self, DatasetError> {
         let names = columns.iter().map(|&name| name.to_owned()).collect();
         let columns = Columns { file: file.to_owned(), names };
-        Ok(Self { columns, lines: Lines::open(file, expected)?, fields: Fields::default(), has_header: false })
+        Ok(Self { columns, lines: Lines::open(file, expected)?, fields: Fields::default() })
     }
 
     pub(crate) fn file(&self) -> &Path {
@@ -123,12 +132,15 @@ impl Table {
         &self.columns.names
     }
 
-    /// Counts each run's rows and goes back to the first.
-    pub(crate) fn count_rows(&mut self, runs: &RunIndex) -> Result<Vec<usize>, DatasetError> {
+    /// Finds each run's rows and goes back to the first.
+    pub(crate) fn survey(&mut self, runs: &RunIndex) -> Result<Survey, DatasetError> {
         let run_column = self.require(RUN_COLUMN)?;
-        let mut rows = vec![0; runs.ids.len()];
+        let start = self.lines.position();
+        let mut survey = Survey { rows: vec![0; runs.ids.len()], first: vec![start; runs.ids.len()], is_grouped: true };
         let mut previous = None;
-        while let Some(line) = self.lines.advance()? {
+        loop {
+            let position = self.lines.position();
+            let Some(line) = self.lines.advance()? else { break };
             // The run comes first and without quotes in almost every table: no need to split then.
             let run = if run_column == 0 && !line.bytes.starts_with(b"\"") {
                 let end = memchr::memchr(b',', line.bytes).unwrap_or(line.bytes.len());
@@ -140,14 +152,32 @@ impl Table {
                 Some(run) => run,
                 None => self.columns.split(&mut self.fields, line)?.run(runs, run_column, previous)?,
             };
-            rows[run] += 1;
+            if survey.rows[run] == 0 {
+                survey.first[run] = position;
+            } else if previous != Some(run) {
+                survey.is_grouped = false;
+            }
+            survey.rows[run] += 1;
             previous = Some(run);
         }
-        self.lines.rewind()?;
-        if self.has_header {
-            self.lines.advance()?;
+        self.lines.go_to(start)?;
+        Ok(survey)
+    }
+
+    /// Calls `visit` with every row of a run, where these stand together.
+    pub(crate) fn for_each_row_of(
+        &mut self,
+        run: usize,
+        survey: &Survey,
+        mut visit: impl FnMut(&Row<'_>) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        self.lines.go_to(survey.first[run])?;
+        for _ in 0..survey.rows[run] {
+            // A file that someone cuts meanwhile ends sooner.
+            let Some(row) = self.next_row()? else { break };
+            visit(&row)?;
         }
-        Ok(rows)
+        Ok(())
     }
 
     /// Calls `visit` with run and row for every row.

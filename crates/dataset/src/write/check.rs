@@ -1,7 +1,7 @@
 //! Whether a dataset in memory is one that could be read back: the reader's rules, applied to columns.
 
 use std::collections::BTreeSet;
-use std::mem::discriminant;
+use std::mem::{Discriminant, discriminant};
 
 use crate::counter;
 use crate::error::{DatasetError, shown};
@@ -11,14 +11,34 @@ use crate::record::{Dataset, Odometry, Run, RunInfo, WheelLog};
 type Check = Result<(), String>;
 
 pub(super) fn check(dataset: &Dataset) -> Result<(), DatasetError> {
-    check_robot(dataset).map_err(|what| DatasetError::NotWritable { what })?;
+    check_header(dataset)?;
+    let Some(first) = dataset.runs.first().map(|run| discriminant(&run.odometry.wheels)) else {
+        return Err(without_runs());
+    };
     let mut ids = BTreeSet::new();
-    for run in &dataset.runs {
-        let checked = check_run(dataset, run)
-            .and_then(|()| if ids.insert(&run.info.id) { Ok(()) } else { Err("a second run with this id".to_owned()) });
-        checked.map_err(|what| DatasetError::RunNotWritable { run: shown(run.info.id.as_bytes()), what })?;
-    }
-    Ok(())
+    dataset.runs.iter().try_for_each(|run| check_next(dataset, first, run, &mut ids))
+}
+
+pub(super) fn without_runs() -> DatasetError {
+    DatasetError::NotWritable { what: "a dataset without runs".to_owned() }
+}
+
+/// All but the runs.
+pub(super) fn check_header(dataset: &Dataset) -> Result<(), DatasetError> {
+    check_robot(dataset).map_err(|what| DatasetError::NotWritable { what })
+}
+
+/// A run of a dataset; `first` is the first of its runs, `ids` are those of the runs before.
+pub(super) fn check_next(
+    dataset: &Dataset,
+    first: Discriminant<WheelLog>,
+    run: &Run,
+    ids: &mut BTreeSet<String>,
+) -> Result<(), DatasetError> {
+    let checked = check_run(dataset, first, run).and_then(|()| {
+        if ids.insert(run.info.id.clone()) { Ok(()) } else { Err("a second run with this id".to_owned()) }
+    });
+    checked.map_err(|what| DatasetError::RunNotWritable { run: shown(run.info.id.as_bytes()), what })
 }
 
 fn ensure(holds: bool, what: impl FnOnce() -> String) -> Check {
@@ -67,12 +87,12 @@ fn check_robot(dataset: &Dataset) -> Check {
         all_finite("point", [point.body.x_m, point.body.y_m])?;
         ensure(ids.insert(&point.id), || format!("a second point with id \"{}\"", shown(point.id.as_bytes())))?;
     }
-    ensure(!dataset.runs.is_empty(), || "a dataset without runs".to_owned())
+    Ok(())
 }
 
-fn check_run(dataset: &Dataset, run: &Run) -> Check {
+fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Check {
     check_info(&run.info)?;
-    check_odometry(dataset, &run.odometry)?;
+    check_odometry(dataset, first, &run.odometry)?;
     ensure(has_truth(run), || "odometry but no truth of any kind".to_owned())?;
 
     increasing("truth", run.truth.iter().map(|sample| sample.t_s))?;
@@ -120,14 +140,14 @@ fn check_info(info: &RunInfo) -> Check {
     Ok(())
 }
 
-fn check_odometry(dataset: &Dataset, odometry: &Odometry) -> Check {
+fn check_odometry(dataset: &Dataset, first: Discriminant<WheelLog>, odometry: &Odometry) -> Check {
     let rows = odometry.t_s.len();
     let as_long = |lengths: &[usize]| {
         ensure(lengths.iter().all(|length| *length == rows), || "odometry columns of unequal length".to_owned())
     };
     ensure(rows > 0, || "no odometry".to_owned())?;
     increasing("odometry", odometry.t_s.iter().copied())?;
-    let one_form = discriminant(&odometry.wheels) == discriminant(&dataset.runs[0].odometry.wheels);
+    let one_form = discriminant(&odometry.wheels) == first;
     ensure(one_form, || "wheels in another form than in the first run; a dataset has one".to_owned())?;
     match &odometry.wheels {
         WheelLog::Ticks(ticks) => {

@@ -66,8 +66,8 @@ struct PointOut<'a> {
     y_m: f64,
 }
 
-/// `dataset.toml` of a dataset that has been checked.
-pub(crate) fn to_toml(dataset: &Dataset) -> Result<String, toml::ser::Error> {
+/// `dataset.toml` of a dataset that has been checked, whose runs are these.
+pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, toml::ser::Error> {
     let Provenance { name, licence, source, notes } = &dataset.provenance;
     toml::to_string(&ManifestOut {
         format: FORMAT,
@@ -80,7 +80,7 @@ pub(crate) fn to_toml(dataset: &Dataset) -> Result<String, toml::ser::Error> {
             sigma_xy_m: dataset.truth_noise.sigma_xy_m,
             sigma_theta_rad: dataset.truth_noise.sigma_theta_rad,
         },
-        run: dataset.runs.iter().map(|run| RunOut::new(&run.info)).collect(),
+        run: runs.iter().map(RunOut::new).collect(),
         point: dataset
             .points
             .iter()

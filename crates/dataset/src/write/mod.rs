@@ -7,13 +7,18 @@ mod check;
 mod manifest;
 mod tables;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, BufWriter, Write};
+use std::mem::{Discriminant, discriminant};
 use std::path::{Path, PathBuf};
+
+use tables::{OptionalColumns, TABLES};
+use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
 use crate::read::{DISPLACEMENT, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, TRUTH, WHEEL_REFERENCE};
-use crate::record::{Dataset, Run};
+use crate::record::{Dataset, Run, RunInfo, WheelLog};
 
 /// Every file that a dataset may have; what [`Existing::ReplaceDataset`] may delete.
 const FILES: [&str; 6] = [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE];
@@ -37,30 +42,135 @@ pub enum Existing {
 /// dataset could not be read back (a NaN, unequal columns, a run without truth …); [`DatasetError::Io`]. In each case `dir` is as
 /// it was.
 pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), DatasetError> {
+    // Before anything is made.
     check::check(dataset)?;
-    let target = resolved(dir)?;
-    let replaced = may_write(&target, existing)?;
-    let parent = match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
-    // The folder that tempfile makes is private to the user; the dataset inside gets the usual permissions.
-    let workshop =
-        tempfile::Builder::new().prefix(".writing-").tempdir_in(parent).map_err(|source| io_error(parent, source))?;
-    let made = workshop.path().join("made");
-    write_files(dataset, &made)?;
-    if !replaced {
-        return fs::rename(&made, &target).map_err(|source| io_error(&target, source));
-    }
-    let old = workshop.path().join("replaced");
-    fs::rename(&target, &old).map_err(|source| io_error(&target, source))?;
-    fs::rename(&made, &target).map_err(|source| {
-        // Back as it was; when not even that works, the first reason is still the one to tell.
-        let _ = fs::rename(&old, &target);
-        io_error(&target, source)
-    })
+    let header = dataset.header();
+    let mut writer = Writer::with_columns(header, OptionalColumns::of(&dataset.runs), dir, existing)?;
+    dataset.runs.iter().try_for_each(|run| writer.push(run))?;
+    writer.finish()
 }
+
+/// Writes a dataset a run at a time, into a temporary sibling until all is there. Dropped before [`Self::finish`] it leaves nothing.
+#[derive(Debug)]
+pub struct Writer {
+    /// Without runs.
+    header: Dataset,
+    columns: OptionalColumns,
+    target: PathBuf,
+    existing: Existing,
+    workshop: TempDir,
+    infos: Vec<RunInfo>,
+    ids: BTreeSet<String>,
+    /// The form in which the first run reports its wheels.
+    form: Option<Discriminant<WheelLog>>,
+    /// Those of [`TABLES`] that some run has rows for.
+    tables: [Option<Out>; TABLES.len()],
+}
+
+impl Writer {
+    /// Begins a dataset in the folder `dir`. The runs of `header` are not written; none of those that are may have an
+    /// [`ExtraChannel`](crate::ExtraChannel) or a [`Run::truth_sigma`].
+    ///
+    /// # Errors
+    /// As [`write`].
+    pub fn create(header: Dataset, dir: &Path, existing: Existing) -> Result<Self, DatasetError> {
+        Self::with_columns(header, OptionalColumns::default(), dir, existing)
+    }
+
+    fn with_columns(
+        header: Dataset,
+        columns: OptionalColumns,
+        dir: &Path,
+        existing: Existing,
+    ) -> Result<Self, DatasetError> {
+        check::check_header(&header)?;
+        let target = resolved(dir)?;
+        may_write(&target, existing)?;
+        let parent = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
+        // The folder that tempfile makes is private to the user; the dataset inside gets the usual permissions.
+        let workshop = tempfile::Builder::new()
+            .prefix(".writing-")
+            .tempdir_in(parent)
+            .map_err(|source| io_error(parent, source))?;
+        let made = workshop.path().join(MADE);
+        fs::create_dir(&made).map_err(|source| io_error(&made, source))?;
+        let (infos, ids, tables) = (Vec::new(), BTreeSet::new(), Default::default());
+        Ok(Self { header, columns, target, existing, workshop, infos, ids, form: None, tables })
+    }
+
+    /// Adds a run.
+    ///
+    /// # Errors
+    /// As [`write`]; the writer is of no use then.
+    pub fn push(&mut self, run: &Run) -> Result<(), DatasetError> {
+        let form = *self.form.get_or_insert_with(|| discriminant(&run.odometry.wheels));
+        check::check_next(&self.header, form, run, &mut self.ids)?;
+        if !self.columns.hold(run) {
+            let what = "optional columns that the dataset's tables were begun without".to_owned();
+            return Err(DatasetError::RunNotWritable { run: shown(run.info.id.as_bytes()), what });
+        }
+        let made = self.workshop.path().join(MADE);
+        for (kind, out) in TABLES.iter().zip(&mut self.tables) {
+            if !(kind.has)(run) {
+                continue;
+            }
+            let (file, columns) = (made.join(kind.file), &self.columns);
+            let mut rows = || {
+                if out.is_none() {
+                    let mut begun = BufWriter::with_capacity(1 << 16, fs::File::create_new(&file)?);
+                    writeln!(begun, "{}", (kind.header)(run, columns))?;
+                    *out = Some(begun);
+                }
+                out.as_mut().map_or(Ok(()), |out| (kind.rows)(run, &self.header.points, columns, out))
+            };
+            rows().map_err(|source| io_error(&file, source))?;
+        }
+        self.infos.push(run.info.clone());
+        Ok(())
+    }
+
+    /// Puts the dataset into its place.
+    ///
+    /// # Errors
+    /// As [`write`].
+    pub fn finish(self) -> Result<(), DatasetError> {
+        let not_writable = |what| DatasetError::NotWritable { what };
+        if self.infos.is_empty() {
+            return Err(check::without_runs());
+        }
+        let toml = manifest::to_toml(&self.header, &self.infos).map_err(|error| not_writable(error.to_string()))?;
+        if toml.len() as u64 > MANIFEST_LIMIT_BYTES {
+            let what = format!(
+                "{MANIFEST} would be longer than {MANIFEST_LIMIT_BYTES} bytes; write fewer runs in one dataset"
+            );
+            return Err(not_writable(what));
+        }
+        let (made, target) = (self.workshop.path().join(MADE), &self.target);
+        let file = made.join(MANIFEST);
+        fs::write(&file, toml).map_err(|source| io_error(&file, source))?;
+        for (kind, out) in TABLES.iter().zip(self.tables) {
+            out.map_or(Ok(()), |mut out| out.flush()).map_err(|source| io_error(&made.join(kind.file), source))?;
+        }
+        // Asked again: while the runs were written someone else may have come.
+        if !may_write(target, self.existing)? {
+            return fs::rename(&made, target).map_err(|source| io_error(target, source));
+        }
+        let old = self.workshop.path().join("replaced");
+        fs::rename(target, &old).map_err(|source| io_error(target, source))?;
+        fs::rename(&made, target).map_err(|source| {
+            // Back as it was; when not even that works, the first reason is still the one to tell.
+            let _ = fs::rename(&old, target);
+            io_error(target, source)
+        })
+    }
+}
+
+/// The dataset inside of the temporary folder.
+const MADE: &str = "made";
 
 fn io_error(path: &Path, source: io::Error) -> DatasetError {
     DatasetError::Io { path: path.to_owned(), source }
@@ -107,44 +217,7 @@ fn may_write(target: &Path, existing: Existing) -> Result<bool, DatasetError> {
     }
 }
 
-fn write_files(dataset: &Dataset, dir: &Path) -> Result<(), DatasetError> {
-    fs::create_dir(dir).map_err(|source| io_error(dir, source))?;
-    let toml = manifest::to_toml(dataset).map_err(|error| DatasetError::NotWritable { what: error.to_string() })?;
-    if toml.len() as u64 > MANIFEST_LIMIT_BYTES {
-        let what =
-            format!("{MANIFEST} would be longer than {MANIFEST_LIMIT_BYTES} bytes; write fewer runs in one dataset");
-        return Err(DatasetError::NotWritable { what });
-    }
-    let file = dir.join(MANIFEST);
-    fs::write(&file, toml).map_err(|source| io_error(&file, source))?;
-
-    let any = |has: fn(&Run) -> bool| dataset.runs.iter().any(has);
-    write_table(&dir.join(ODOMETRY), |out| tables::odometry(dataset, out))?;
-    if any(|run| !run.truth.is_empty()) {
-        write_table(&dir.join(TRUTH), |out| tables::truth(dataset, out))?;
-    }
-    if any(|run| !run.displacements.is_empty()) {
-        write_table(&dir.join(DISPLACEMENT), |out| tables::displacement(dataset, out))?;
-    }
-    if any(|run| !run.point_readings.is_empty()) {
-        write_table(&dir.join(POINTS), |out| tables::points(dataset, out))?;
-    }
-    if any(|run| !run.wheel_reference.is_empty()) {
-        write_table(&dir.join(WHEEL_REFERENCE), |out| tables::wheel_reference(dataset, out))?;
-    }
-    Ok(())
-}
-
 type Out = BufWriter<fs::File>;
-
-fn write_table(file: &Path, table: impl FnOnce(&mut Out) -> io::Result<()>) -> Result<(), DatasetError> {
-    let written = || {
-        let mut out = BufWriter::with_capacity(1 << 16, fs::File::create_new(file)?);
-        table(&mut out)?;
-        out.flush()
-    };
-    written().map_err(|source| io_error(file, source))
-}
 
 #[cfg(test)]
 mod tests {
@@ -251,5 +324,31 @@ mod tests {
         wrong.runs[0].odometry.t_s[1] = f64::NAN;
         write(&wrong, &temp.path().join("a/set"), Existing::Refuse).expect_err("NaN");
         assert!(entries(temp.path()).is_empty());
+    }
+
+    #[test]
+    fn a_writer_that_is_dropped_or_refuses_a_run_leaves_no_trace() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let target = temp.path().join("set");
+        let whole = dataset("old");
+        let begin = || Writer::create(whole.header(), &target, Existing::Refuse).expect("begun");
+        let run = &whole.runs[0];
+        let mut writer = begin();
+        writer.push(run).expect("sound");
+        drop(writer);
+        let mut sparse = Run { info: RunInfo { id: "other".to_owned(), ..RunInfo::default() }, ..run.clone() };
+        sparse.odometry.extra.insert(crate::ExtraChannel::GyroYawRate, vec![0.0; run.odometry.t_s.len()]);
+        for (second, expected) in [(run, "a second run with this id"), (&sparse, "optional columns")] {
+            let mut writer = begin();
+            writer.push(run).expect("sound");
+            let error = writer.push(second).expect_err(expected).to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        assert!(begin().finish().expect_err("nothing in it").to_string().contains("without runs"));
+        assert!(entries(temp.path()).is_empty());
+        let mut writer = begin();
+        writer.push(run).expect("sound");
+        writer.finish().expect("written");
+        assert_eq!(crate::read(&target).expect("readable").dataset.runs, std::slice::from_ref(run));
     }
 }

@@ -1,0 +1,115 @@
+//! A large dataset imported, evaluated and calibrated, beside the time that reading and parsing it takes, and the memory of each.
+//!
+//! The source is made first: a session in `OptiOdom`'s format of runs of 100 000 rows, the robot turning elsewhere every ten seconds. Argument: its size in
+//! megabytes (100 where none is given). `docs/performance.md` has a run of it.
+
+use std::f64::consts::PI;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::time::Instant;
+
+use dataset::{Existing, RunByRun, Writer, import};
+use peak_alloc::PeakAlloc;
+use rand::{RngExt, SeedableRng};
+
+#[global_allocator]
+static PEAK: PeakAlloc = PeakAlloc;
+
+const ROWS: usize = 100_000;
+
+/// Counts a turn of the wheel, and the robot: metres a count of each wheel and the wheels' distance.
+const COUNTS_PER_TURN: f64 = 43.7 * 64.0;
+const M_PER_COUNT: [f64; 2] = [PI * 0.0848 / COUNTS_PER_TURN, PI * 0.0853 / COUNTS_PER_TURN];
+const SEPARATION_M: f64 = 0.2065;
+
+/// Writes a session of so many megabytes; gives its runs.
+fn write_session(dir: &Path, megabytes: usize) -> std::io::Result<usize> {
+    let (mut runs, mut bytes) = (0, 0);
+    while bytes < megabytes * 1_000_000 {
+        runs += 1;
+        let file = dir.join(format!("large_run-{runs:03}.csv"));
+        write_run(&file, runs as u64)?;
+        bytes += usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
+    }
+    let metadata = format!("type,diff\nngear,43.7\nencRes,64\nLi,0.205\nDi,0.085,0.085\nN,{runs}\nL,\n");
+    std::fs::write(dir.join("large_metadata.csv"), metadata)?;
+    Ok(runs)
+}
+
+fn write_run(file: &Path, seed: u64) -> std::io::Result<()> {
+    let mut chance = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut out = BufWriter::with_capacity(1 << 16, File::create(file)?);
+    let (mut pose, mut speed, mut counts) = ([0.0_f64; 3], [0.0; 2], [0.0_f64; 2]);
+    for row in 0..ROWS {
+        if row % 200 == 0 {
+            speed = [0; 2].map(|_| chance.random_range(20.0..90.0));
+        }
+        let [left, right] = counts.map(f64::trunc);
+        let seen = pose.map(|value: f64| value + chance.random_range(-3e-4..3e-4));
+        writeln!(out, "{},{},{},{},{right},{left}", 0.05 * row as f64, seen[0], seen[1], seen[2])?;
+        let turned = speed.map(|speed: f64| speed + chance.random_range(-1.0..1.0));
+        let [left_m, right_m] = [turned[0] * M_PER_COUNT[0], turned[1] * M_PER_COUNT[1]];
+        let (distance_m, half_rad) = (0.5 * (left_m + right_m), 0.5 * (right_m - left_m) / SEPARATION_M);
+        let (sin, cos) = (pose[2] + half_rad).sin_cos();
+        pose = [pose[0] + distance_m * cos, pose[1] + distance_m * sin, pose[2] + 2.0 * half_rad];
+        // What is not a whole count is counted later.
+        counts = [counts[0].fract() + turned[0], counts[1].fract() + turned[1]];
+    }
+    out.flush()
+}
+
+/// Seconds and megabytes of heap that something takes.
+fn measured<T>(what: impl FnOnce() -> T) -> (f64, f64) {
+    PEAK.reset_peak_usage();
+    let before = PEAK.current_usage();
+    let started = Instant::now();
+    drop(what());
+    (started.elapsed().as_secs_f64(), PEAK.peak_usage().saturating_sub(before) as f64 / 1e6)
+}
+
+#[allow(clippy::print_stdout)]
+fn main() {
+    let megabytes = std::env::args().find_map(|argument| argument.parse().ok()).unwrap_or(100);
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let (source, set) = (temp.path().join("large"), temp.path().join("set"));
+    std::fs::create_dir(&source).expect("made");
+    let runs = write_session(&source, megabytes).expect("written");
+    println!("{megabytes} MB, {runs} runs, {} rows", runs * ROWS);
+    println!("{:<28} {:>7} {:>9} {:>8}", "", "s", "x parsing", "heap MB");
+    let show = |what: &str, (seconds, megabytes): (f64, f64), parsing_s: f64| {
+        println!("{what:<28} {seconds:>7.2} {:>9.2} {megabytes:>8.1}", seconds / parsing_s);
+    };
+
+    let open = || (import::importer("optiodom").expect("there").open)(&source).expect("a session").remove(0);
+    let parse = measured(|| open().runs.for_each(|loaded| drop(loaded.expect("readable"))));
+    show("source parsed", parse, parse.0);
+    let imported = measured(|| {
+        let session = open();
+        let mut writer = Writer::create(session.header, &set, Existing::Refuse).expect("begun");
+        for loaded in session.runs {
+            writer.push(&loaded.expect("readable").dataset.runs[0]).expect("written");
+        }
+        writer.finish().expect("written");
+    });
+    show("imported", imported, parse.0);
+
+    let parse = measured(|| RunByRun::open(&set).expect("readable").for_each(|loaded| drop(loaded.expect("readable"))));
+    show("dataset parsed", parse, parse.0);
+    let evaluated = measured(|| {
+        let runs = RunByRun::open(&set).expect("readable").flat_map(|loaded| {
+            let dataset = loaded.expect("readable").dataset;
+            calib::evaluate(&[dataset.session()], None, false).runs
+        });
+        calib::CalibrationDrift::of_runs(None, runs.collect())
+    });
+    show("evaluated", evaluated, parse.0);
+    for name in ["linear", "joint"] {
+        let method = calib::method(name).expect("there");
+        let calibrated = measured(|| {
+            let dataset = dataset::read(&set).expect("readable").dataset;
+            method.calibrate(&[dataset.session()]).map_err(|error| println!("{name}: {error}"))
+        });
+        show(&format!("calibrated by {name}"), calibrated, parse.0);
+    }
+}
