@@ -28,6 +28,7 @@ fn listed(values: &BTreeMap<String, Value>) -> String {
     let parts: Vec<String> = values
         .iter()
         .map(|(name, value)| match value.sigma {
+            Some(sigma) if value.unit == "1" => format!("{name} = {:.3e} ± {sigma:.1e}", value.value),
             Some(sigma) => format!("{name} = {:.3e} ± {sigma:.1e} {}", value.value, value.unit),
             None => format!("{name} = {:.3}", value.value),
         })
