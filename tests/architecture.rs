@@ -25,7 +25,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("calib", &["kinematics", "dataset"]),
     ("diagnose", &["kinematics", "dataset", "effects", "scenario", "calib"]),
     ("report", &[]),
-    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "report"]),
+    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "report"]),
     ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "bench", "report"]),
 ];
 

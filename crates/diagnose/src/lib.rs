@@ -19,7 +19,7 @@ mod sparse;
 mod statistics;
 mod unlisted;
 
-pub use diagnosis::{DiagnoseError, Diagnosis, Options, diagnose};
+pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
     Blind, Check, Compared, Document, Finding, Gain, NextExperiment, Smallest, UnlistedTerm, Value, Verdict,
 };

@@ -22,8 +22,8 @@ mod thinning;
 
 pub use evidence::{Evidence, Information};
 pub use filter::{Innovation, Pass};
-pub use fit::{Fit, FitError, FitOptions, fit};
-pub(crate) use fit::{From, basis, fit_from, pass_with_innovations};
+pub use fit::{Fit, FitError, FitOptions, fit, pass_with_innovations};
+pub(crate) use fit::{From, basis, fit_from};
 pub use model::{Column, Model};
 pub(crate) use noise::NoisePrior;
 pub use noise::{Noise, NoiseComponent};
