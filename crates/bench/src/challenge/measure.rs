@@ -77,7 +77,7 @@ fn naming(hidden: &OracleView, first: Option<&Said>) -> Naming {
 fn is_aliased(hidden: &OracleView) -> bool {
     match hidden.kind {
         EffectKind::Mean => !hidden.aliases.is_empty(),
-        EffectKind::Scatter => hidden.ratio.is_none_or(|ratio| ratio < PLAIN_RATIO),
+        EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < PLAIN_RATIO),
         EffectKind::Gross => false,
     }
 }
@@ -304,7 +304,7 @@ const BOOTSTRAPS: usize = 400;
 fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let mut points: Vec<(f64, f64)> = cases
         .iter()
-        .filter(|case| case.round == Round::Single && matches!(case.noise, NoiseClass::White | NoiseClass::Dropouts))
+        .filter(|case| case.round == Round::Single && case.noise == NoiseClass::White)
         .filter_map(|case| {
             let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
             Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))

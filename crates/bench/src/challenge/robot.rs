@@ -1,6 +1,6 @@
 //! Random robots and what they drive: geometry, speeds, noise, calibration errors and one of several families of paths.
 //!
-//! A robot drives one or two sessions, each at its own speed, and a held-out log on paths of another draw. Loads and jitter of the log, which some effects
+//! A robot drives one or two sessions, each at its own speed, and a held-out log on other paths of the family. Loads and jitter of the log, which some effects
 //! need to show at all, are there in many cases without such an effect: a record that has them says nothing.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -95,9 +95,11 @@ impl RandomRobot {
         let family = PathFamily::ALL[draw.below(PathFamily::ALL.len())];
         let two = draw.chance(0.5);
         let share = if two { 0.5 } else { 1.0 };
-        let sessions = (0..if two { 2 } else { 1 }).map(|_| session(&base, family, share, draw)).collect();
-        let other = PathFamily::ALL[draw.below(PathFamily::ALL.len())];
-        let held_out = session(&base, other, 0.4, draw);
+        let sessions: Vec<SessionPlan> =
+            (0..if two { 2 } else { 1 }).map(|_| session(&base, family, share, draw)).collect();
+        // At the first session's speed, on other paths of the family: what was never excited is no fair question.
+        let scenario = sessions[0].scenario.clone();
+        let held_out = SessionPlan { programs: programs(family, &scenario, 0.5, draw), scenario };
         Ok(Self { family, sessions, held_out, payload_kg, jitter_s })
     }
 
@@ -122,6 +124,9 @@ impl RandomRobot {
 /// Looks of the simulated instrument a second, of which a case takes some.
 pub(crate) const RATE_HZ: f64 = 20.0;
 
+/// Radius of the tightest arc in wheelbases: the inner wheel runs at a sixth of the outer one's speed, which the controllers can still do.
+const TIGHTEST: f64 = 0.7;
+
 fn session(base: &Scenario, family: PathFamily, share: f64, draw: &mut Draw) -> SessionPlan {
     let mut scenario = base.clone();
     scenario.robot.cruise_speed_m_s = draw.uniform(0.15, 0.5);
@@ -139,10 +144,11 @@ fn pairs(pairs: f64, share: f64) -> u32 {
 fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw) -> Vec<MotionProgram> {
     // Ways in seconds of driving, so that slow robots do not drive for hours.
     let speed_m_s = scenario.robot.cruise_speed_m_s;
+    let tightest_m = TIGHTEST * scenario.robot.wheel_separation_m;
     let mut way_m = |low_s: f64, high_s: f64| speed_m_s * draw.uniform(low_s, high_s);
     let straights = Schedule::Straights { length_m: way_m(3.0, 7.0), runs: 2 * pairs(3.0, share) };
     let squares = Schedule::Squares { side_m: way_m(2.0, 4.0), runs_each_way: pairs(2.0, share) };
-    let radius_m = way_m(1.0, 2.5).max(0.3);
+    let radius_m = way_m(1.0, 2.5).max(tightest_m);
     let circles = Schedule::Circles { radius_m, turns: None, runs_each_way: pairs(2.0, share) };
     let schedules = match family {
         PathFamily::Protocols => {
@@ -156,13 +162,15 @@ fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw
         }
         PathFamily::Free | PathFamily::Forward => {
             let runs = 2 * pairs(6.0, share);
-            return (0..runs).map(|run| free(run, family == PathFamily::Forward, speed_m_s, draw)).collect();
+            return (0..runs)
+                .map(|run| free(run, family == PathFamily::Forward, (speed_m_s, tightest_m), draw))
+                .collect();
         }
     };
     schedules.iter().flat_map(Schedule::programs).collect()
 }
 
-fn free(run: u32, forward: bool, speed_m_s: f64, draw: &mut Draw) -> MotionProgram {
+fn free(run: u32, forward: bool, (speed_m_s, tightest_m): (f64, f64), draw: &mut Draw) -> MotionProgram {
     let motions = (0..5)
         .map(|_| {
             let length_m = speed_m_s * draw.uniform(1.5, 4.0);
@@ -170,7 +178,7 @@ fn free(run: u32, forward: bool, speed_m_s: f64, draw: &mut Draw) -> MotionProgr
                 0 => Motion::Straight { length_m: if forward { length_m } else { draw.sign() * length_m } },
                 1 if !forward => Motion::Spin { turn_rad: draw.sign() * draw.uniform(0.5, 1.3 * FRAC_PI_2) },
                 _ => {
-                    let radius_m = draw.uniform(0.4, 1.2);
+                    let radius_m = tightest_m * draw.uniform(1.0, 4.0);
                     Motion::Arc { radius_m, turn_rad: draw.sign() * length_m / radius_m }
                 }
             }
