@@ -62,10 +62,12 @@ pub struct OracleView {
     pub other_form: bool,
     /// Sizes by the hypothesis's names, shape parameters after them.
     pub sizes: Vec<(String, f64)>,
-    /// Noncentrality of the best test of it; beside another hidden effect, with that projected out. `None` for gross faults.
+    /// Noncentrality of the test that knows it, in its hypothesis's form; beside another hidden effect, with that in the model. `None` for gross faults.
     pub noncentrality: Option<f64>,
-    /// Its size over the smallest that the best test finds with nine chances in ten. `None` for gross faults.
+    /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
     pub ratio: Option<f64>,
+    /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross faults and scatter.
+    pub form_share: Option<f64>,
     /// Other names that the best test between the two does not tell from it with nine chances in ten.
     pub aliases: Vec<String>,
 }
@@ -92,6 +94,10 @@ const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
 const CLOSE: f64 = 1.5;
 /// Where the held-out log's draws are, away from the sessions'.
 const HELD_OUT: u32 = 16;
+/// Steps in which a scale is sought.
+const MOST_STEPS: usize = 5;
+/// Another form of which the hypothesis takes up less is another effect: the forms of tests/effect_hypotheses leave at most 0.65² of their squares.
+const LEAST_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;
 
@@ -253,7 +259,8 @@ impl Case {
         } else {
             None
         };
-        let oracle = hidden.iter().enumerate().map(|(k, effect)| view(effect, k, &shown, both.as_ref())).collect();
+        let oracle =
+            hidden.iter().enumerate().map(|(k, effect)| view(effect, k, &shown, both.as_ref(), &hidden)).collect();
         let best = both.as_ref().or(shown.first().and_then(Option::as_ref));
         let best_drive = best.map(|shown| shown.best_drive(&truth));
         let datasets = drive(&robot.sessions, &sight, &all, true, 0)?;
@@ -282,7 +289,7 @@ enum Chosen {
 /// λ over that of the detection limit, as a ratio of sizes.
 fn ratio(effect: &Hidden, shown: &Shown) -> f64 {
     match effect.kind {
-        EffectKind::Mean => (shown.noncentrality() / detection_limit(shown.freedom(effect.id))).sqrt(),
+        EffectKind::Mean => (shown.noncentrality_in_form(effect.id) / detection_limit(shown.freedom(effect.id))).sqrt(),
         // λ grows with the fourth power of the size.
         _ => (shown.scatter / TOLD_APART).powf(0.25),
     }
@@ -308,27 +315,34 @@ fn scale(
     }
     let wanted = draw.log_uniform(low, high.min(most));
     let mut found = (first, at_first);
-    for _ in 0..4 {
+    // How fast the ratio grows with the scale: as its first power, until two points say otherwise.
+    let mut growth = 1.0_f64;
+    for _ in 0..MOST_STEPS {
         let off = wanted / found.1;
         if (1.0 / CLOSE.sqrt()..=CLOSE.sqrt()).contains(&off) {
             break;
         }
-        effect.scale = (effect.scale * off.clamp(1e-3, 1e3)).min(effect.most);
+        let before = (effect.scale, found.1);
+        effect.scale = (effect.scale * off.powf(1.0 / growth).clamp(1e-3, 1e3)).min(effect.most);
         if effect.act().is_none() {
             return Ok(Chosen::Unseen);
         }
         let Some(next) = seen(effect)? else { return Ok(Chosen::Unseen) };
         let at_next = ratio(effect, &next);
-        found = (next, at_next);
-        if !(found.1 > 0.0) {
+        if !(at_next > 0.0) {
             return Ok(Chosen::Unseen);
         }
+        let slope = (at_next / before.1).ln() / (effect.scale / before.0).ln();
+        growth = if slope.is_finite() { slope.clamp(0.3, 6.0) } else { 1.0 };
+        found = (next, at_next);
     }
     let off = wanted / found.1;
-    if (1.0 / CLOSE..=CLOSE).contains(&off) { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
+    let close = (1.0 / CLOSE..=CLOSE).contains(&off);
+    let of_its_kind = !effect.other_form || form_share(effect, &found.0) > LEAST_SHARE;
+    if close && of_its_kind { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 
-fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Shown>) -> OracleView {
+fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Shown>, others: &[Hidden]) -> OracleView {
     let sizes = effect.sizes().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
     let mut view = OracleView {
         id: effect.id.to_owned(),
@@ -337,24 +351,89 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
         sizes,
         noncentrality: None,
         ratio: None,
+        form_share: None,
         aliases: Vec::new(),
     };
     let Some(own) = shown[place].as_ref() else { return view };
-    let mut noncentrality = if effect.kind == EffectKind::Mean { own.noncentrality() } else { own.scatter };
-    if let (Some(both), Some(Some(other))) = (both, shown.get(1 - place.min(1))) {
-        // Of one beside the other, by polarisation: ⟨a, b⟩ = (|a + b|² − |a|² − |b|²)/2.
-        let (a, b) = (noncentrality, other.noncentrality());
-        let product = 0.5 * (both.noncentrality() - a - b);
-        noncentrality = if b > 0.0 { (a - product * product / b).max(0.0) } else { a };
-    }
-    view.noncentrality = Some(noncentrality);
     if effect.kind == EffectKind::Mean {
+        let other = others.iter().find(|other| other.id != effect.id);
+        let noncentrality = match (both, other) {
+            (Some(both), Some(other)) => both.noncentrality_beside(effect.id, other.id),
+            _ => own.noncentrality_in_form(effect.id),
+        };
+        view.noncentrality = Some(noncentrality);
         view.ratio = Some((noncentrality / detection_limit(own.freedom(effect.id))).sqrt());
+        view.form_share = Some(form_share(effect, own));
     } else {
+        view.noncentrality = Some(own.scatter);
         view.ratio = Some(ratio(effect, own));
     }
     // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
     let rivals = own.rivals(effect.id).into_iter().filter(|(_, left)| *left < TOLD_APART);
     view.aliases = rivals.map(|(id, _)| id.to_owned()).collect();
     view
+}
+
+/// How much of an effect's signature its own hypothesis takes up.
+fn form_share(effect: &Hidden, shown: &Shown) -> f64 {
+    let whole = shown.noncentrality();
+    if whole > 0.0 { shown.noncentrality_in_form(effect.id) / whole } else { 0.0 }
+}
+
+/// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
+#[cfg(test)]
+pub(crate) struct Trial {
+    seed: u64,
+    robot: RandomRobot,
+    watching: Watching,
+    hidden: Hidden,
+    noise: TrueNoise,
+    truth: DriveGeometry,
+    plain: Vec<Dataset>,
+    pub(crate) noncentrality: f64,
+}
+
+#[cfg(test)]
+impl Trial {
+    /// The first robot that shows the effect, in its catalogue's form, under white noise and many looks.
+    pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, BenchError> {
+        for attempt in 0..50 {
+            let mut draw = Draw::of(seed, 0, "trial", attempt);
+            let robot = RandomRobot::draw(&mut draw, Hidden::needs(id))?;
+            let watching = Watching::draw(&mut draw);
+            let Some(mut hidden) = Hidden::draw(id, &robot, &mut draw) else { continue };
+            let plainly = watching.class == NoiseClass::White && watching.kind == super::looks::TruthKind::Dense;
+            if !plainly || hidden.other_form {
+                continue;
+            }
+            let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
+            let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
+            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: watching.variances() };
+            let sight = Sight { seed, number: 0, robot: &robot, watching: &watching };
+            let plain = drive(&robot.sessions, &sight, &[], false, 0)?;
+            let mut noncentrality = 0.0;
+            for _ in 0..4 {
+                let exact = drive(&robot.sessions, &sight, &[&hidden], false, 0)?;
+                let Some(shown) = Shown::of(&exact, &plain, &truth, noise) else { return Ok(None) };
+                noncentrality = shown.noncentrality_in_form(hidden.id);
+                let off = ratio(&hidden, &shown);
+                if (0.99..1.01).contains(&off) {
+                    break;
+                }
+                hidden.scale /= off;
+            }
+            return Ok(Some(Self { seed, robot, watching, hidden, noise, truth, plain, noncentrality }));
+        }
+        Ok(None)
+    }
+
+    /// The oracle's statistic on a drive with noise of its own, with the effect or without.
+    pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, BenchError> {
+        let Self { seed, robot, watching, .. } = self;
+        let sight = Sight { seed: *seed, number, robot, watching };
+        let all = [&self.hidden];
+        let data = drive(&robot.sessions, &sight, if hidden { &all } else { &[] }, true, 0)?;
+        let shown = Shown::of(&data, &self.plain, &self.truth, self.noise);
+        Ok(shown.map_or(0.0, |shown| shown.statistic(self.hidden.id)))
+    }
 }

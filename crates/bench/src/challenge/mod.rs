@@ -16,6 +16,8 @@ mod oracle;
 mod power;
 mod robot;
 mod score;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 

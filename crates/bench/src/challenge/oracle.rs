@@ -1,8 +1,8 @@
 //! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
 //!
 //! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the true
-//! drive, then sees the effect's signature alone: χ² less what the drive's lengths take up is the noncentrality λ of the best test there is, and what is
-//! left when another name's hypothesis takes up its part is that of the test between the two names. Start poses are free, as in the data.
+//! drive, then sees the effect's signature alone. What the effect's own hypothesis takes up of its χ², beside the drive's lengths, is the noncentrality λ of
+//! the test that knows the effect; what is left when another name's hypothesis takes up its part is that of the test between the true signature and that name.
 //! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
 //! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
 //! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
@@ -127,11 +127,11 @@ impl Shown {
         Some(Self { scatter: scatter(&seen.z), total: seen.total, candidates, free })
     }
 
-    /// How much of χ² some columns take up at their best, and their values there with standard deviations.
-    fn taken_up(&self, candidate: Option<&Candidate>) -> (f64, Vec<(f64, f64)>) {
+    /// How much of χ² the lengths and some candidates take up at their best, and the candidates' sizes there with standard deviations.
+    fn taken_up(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
         let mut at = self.free.clone();
         let mut prior: Vec<f64> = at.iter().map(|_| LENGTHS_SD.powi(-2)).collect();
-        if let Some(candidate) = candidate {
+        for candidate in candidates {
             at.extend(candidate.columns.clone());
             prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.plausible).powi(-2)));
         }
@@ -149,9 +149,36 @@ impl Shown {
         (-gradient.dot(&step), values)
     }
 
-    /// Noncentrality of the best test of the effect: χ² with the lengths at their best.
+    /// The signature's χ² with the lengths at their best: noncentrality of the test by the true form.
     pub(crate) fn noncentrality(&self) -> f64 {
-        (LOUD * self.total.chi_square - self.taken_up(None).0).max(0.0)
+        (LOUD * self.total.chi_square - self.taken_up(&[]).0).max(0.0)
+    }
+
+    /// The shape of a name that takes up most, beside the lengths, and how much: noncentrality of the test by the hypothesis's own form.
+    fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
+        let alone = self.taken_up(&[]).0;
+        self.candidates
+            .iter()
+            .filter(|candidate| candidate.id == id)
+            .map(|candidate| (candidate, (self.taken_up(&[candidate]).0 - alone).max(0.0)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Noncentrality of the test of a name by its hypothesis's own form.
+    pub(crate) fn noncentrality_in_form(&self, id: &str) -> f64 {
+        self.best_shape(id).map_or(0.0, |(_, noncentrality)| noncentrality)
+    }
+
+    /// The same with another name's hypothesis in the model already.
+    pub(crate) fn noncentrality_beside(&self, id: &str, other: &str) -> f64 {
+        let (Some((own, _)), Some((other, _))) = (self.best_shape(id), self.best_shape(other)) else { return 0.0 };
+        (self.taken_up(&[own, other]).0 - self.taken_up(&[other]).0).max(0.0)
+    }
+
+    /// The oracle's test of an effect with one shape on what was measured with noise: χ² without the effect.
+    #[cfg(test)]
+    pub(crate) fn statistic(&self, id: &str) -> f64 {
+        self.noncentrality_in_form(id)
     }
 
     /// How many directions of an effect's own hypothesis a plausible size would show by a standard deviation; at least one.
@@ -181,10 +208,10 @@ impl Shown {
     /// Every other name with the noncentrality of the test between it and the true one, the least first. Names whose best sizes no effect can have are none.
     pub(crate) fn rivals(&self, id: &str) -> Vec<(&'static str, f64)> {
         let whole = self.noncentrality();
-        let alone = self.taken_up(None).0;
+        let alone = self.taken_up(&[]).0;
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
         for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {
-            let (taken, values) = self.taken_up(Some(candidate));
+            let (taken, values) = self.taken_up(&[candidate]);
             let sizes: Vec<(&str, f64)> = candidate
                 .parameters
                 .iter()

@@ -12,8 +12,8 @@ const POWER: f64 = 0.9;
 /// Noncentrality at which two names are told apart at the level and power above: their log likelihood ratio is N(±λ/2, λ), so √λ = z(0.95) + z(0.9).
 pub(crate) const TOLD_APART: f64 = 8.564;
 
-/// Power of a χ² test with this noncentrality.
-fn power(freedom: f64, noncentrality: f64) -> f64 {
+/// Power of a χ² test at 5 % with this noncentrality.
+pub(crate) fn power(freedom: f64, noncentrality: f64) -> f64 {
     let Ok(central) = ChiSquared::new(freedom) else { return 0.0 };
     let critical = central.inverse_cdf(1.0 - LEVEL);
     let Ok(poisson) = Poisson::new(0.5 * noncentrality) else { return LEVEL };
