@@ -338,7 +338,9 @@ fn scale(
     }
     let off = wanted / found.1;
     let close = (1.0 / CLOSE..=CLOSE).contains(&off);
-    let of_its_kind = !effect.other_form || form_share(effect, &found.0) > LEAST_SHARE;
+    // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
+    let described_better = || found.0.rivals(effect.id).first().is_some_and(|(_, left)| *left < -TOLD_APART);
+    let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
     if close && of_its_kind { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 

@@ -264,6 +264,8 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
         .iter()
         .filter(rounds)
         .flat_map(|case| case.findings().map(move |said| (case, said)))
+        // That something has no name is no statement of which.
+        .filter(|(_, said)| said.names[0] != "unlisted")
         .map(|(case, said)| (said.probability, case.hidden.iter().any(|hidden| hidden.id == said.names[0])))
         .collect();
     // Ten bins of equal width.

@@ -2,7 +2,7 @@
 //!
 //! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the true
 //! drive, then sees the effect's signature alone. What the effect's own hypothesis takes up of its χ², beside the drive's lengths, is the noncentrality λ of
-//! the test that knows the effect; what is left when another name's hypothesis takes up its part is that of the test between the true signature and that name.
+//! the test that knows the effect; how much less another name's hypothesis takes up is that of the test between the two names.
 //! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
 //! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
 //! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
@@ -205,9 +205,10 @@ impl Shown {
             .max(1)
     }
 
-    /// Every other name with the noncentrality of the test between it and the true one, the least first. Names whose best sizes no effect can have are none.
+    /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less of the true signature its hypothesis
+    /// takes up than the true name's does. That of what scatters takes up all. Names whose best sizes no effect can have are none.
     pub(crate) fn rivals(&self, id: &str) -> Vec<(&'static str, f64)> {
-        let whole = self.noncentrality();
+        let own = self.best_shape(id).map_or_else(|| self.noncentrality(), |(_, own)| own);
         let alone = self.taken_up(&[]).0;
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
         for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {
@@ -224,7 +225,7 @@ impl Shown {
             if effects::effect_of_sizes(candidate.id, &sizes).is_none() && sizes.iter().any(|(_, size)| *size != 0.0) {
                 continue;
             }
-            let left = (whole - (taken - alone)).max(0.0);
+            let left = own - (taken - alone);
             match rivals.iter_mut().find(|(of, _)| *of == candidate.id) {
                 Some(known) => known.1 = known.1.min(left),
                 None => rivals.push((candidate.id, left)),

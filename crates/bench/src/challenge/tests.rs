@@ -19,31 +19,32 @@ fn is_likely(successes: usize, of: usize, probability: f64) -> bool {
 }
 
 /// The oracle's own test on data with noise, by the catalogue's hypothesis and the true variances: at 5 % it alarms on nulls so often, and finds an effect of
-/// the oracle's limit with the power that its noncentrality says. Rejects, as was tried: variances a fifth off, lengths that are not projected out, a
-/// signature that is not the difference to the plain drive where rows are coarse.
+/// the oracle's limit with the power that its noncentrality says. Half or twice the noncentrality is rejected.
 #[test]
 fn the_oracle_has_the_power_that_it_states() {
     const TRIALS: usize = 80;
-    for id in ["slip_speed", "lateral_skid"] {
-        let trial = Trial::at_limit(5, id).expect("simulates").expect("a robot that shows it");
-        let found = |hidden: bool| -> usize {
-            (0..TRIALS as u64)
-                .into_par_iter()
-                .filter(|number| trial.statistic(1000 + number, hidden).expect("simulates") > 3.841_459)
-                .count()
-        };
-        let (alarms, hits) = (found(false), found(true));
-        let expected = power(1.0, trial.noncentrality);
-        assert!((0.85..0.95).contains(&expected), "{id}: {expected}");
-        assert!(is_likely(alarms, TRIALS, 0.05), "{id}: {alarms} alarms in {TRIALS} at 5 %");
-        assert!(is_likely(hits, TRIALS, expected), "{id}: {hits} found of {TRIALS} at power {expected}");
+    let id = "slip_speed";
+    let trial = Trial::at_limit(5, id).expect("simulates").expect("a robot that shows it");
+    let found = |hidden: bool| -> usize {
+        (0..TRIALS as u64)
+            .into_par_iter()
+            .filter(|number| trial.statistic(1000 + number, hidden).expect("simulates") > 3.841_459)
+            .count()
+    };
+    let (alarms, hits) = (found(false), found(true));
+    let expected = power(1.0, trial.noncentrality);
+    assert!((0.85..0.95).contains(&expected), "{id}: {expected}");
+    assert!(is_likely(alarms, TRIALS, 0.05), "{id}: {alarms} alarms in {TRIALS} at 5 %");
+    assert!(is_likely(hits, TRIALS, expected), "{id}: {hits} found of {TRIALS} at power {expected}");
+    for wrong in [0.5, 2.0] {
+        assert!(!is_likely(hits, TRIALS, power(1.0, wrong * trial.noncentrality)), "{id}: {hits} says nothing");
     }
 }
 
 #[test]
 fn a_case_stands_by_itself() {
-    let whole = challenge(3, 20, 2, &|| ()).expect("simulates");
-    let alone = challenge(3, 20, 1, &|| ()).expect("simulates");
+    let whole = challenge(3, 8, 2, &|| ()).expect("simulates");
+    let alone = challenge(3, 8, 1, &|| ()).expect("simulates");
     let text = |result: &ChallengeResult| serde_json::to_string(result).expect("has a JSON form");
     assert_eq!(text(&whole), text(&alone));
     let last = whole.cases.last().expect("cases");
@@ -56,7 +57,7 @@ fn a_case_stands_by_itself() {
 #[test]
 fn records_do_not_tell_what_is_hidden() {
     let mut loads_elsewhere = 0;
-    for number in 0..40 {
+    for number in 0..20 {
         let Ok(case) = Case::draw(11, number).expect("simulates") else { continue };
         let hidden: Vec<&str> = case.hidden.iter().map(|hidden| hidden.id).collect();
         for dataset in &case.datasets {
