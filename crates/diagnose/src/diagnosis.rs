@@ -58,9 +58,7 @@ pub struct Diagnosis {
     pub document: Document,
     /// The simulated robot with what was found, where it can be written.
     pub extended: Result<Scenario, String>,
-    /// The calibrated model alone.
-    pub base: FittedModel,
-    /// The model with what was found in its mean.
+    /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
 }
 
@@ -243,9 +241,8 @@ fn continued(datasets: &[Dataset], base: JointFit<'_>, fault: Option<&Fault>, op
         extended_model: None,
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
-    let base = FittedModel { model: asked.base.fit.model.clone(), choices: Vec::new() };
     let found = FittedModel::of(model);
-    Diagnosis { document, extended, base, found }
+    Diagnosis { document, extended, found }
 }
 
 fn is_scatter(finding: &Finding) -> bool {

@@ -62,7 +62,7 @@ pub struct OracleView {
     pub other_form: bool,
     /// Sizes by the hypothesis's names, shape parameters after them.
     pub sizes: Vec<(String, f64)>,
-    /// Noncentrality of the test that knows it, in its hypothesis's form; beside another hidden effect, with that in the model. `None` for gross faults.
+    /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None` for gross faults.
     pub noncentrality: Option<f64>,
     /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
     pub ratio: Option<f64>,
@@ -286,10 +286,21 @@ enum Chosen {
     Unseen,
 }
 
+/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it (where in its gap a
+/// wheel was left, which fraction of a count was lost).
+fn by_form(effect: &Hidden) -> bool {
+    effect.other_form || ["backlash", "low_speed_truncation"].contains(&effect.id)
+}
+
+/// Noncentrality of the test that knows the effect.
+fn known(effect: &Hidden, shown: &Shown) -> f64 {
+    if by_form(effect) { shown.noncentrality_in_form(effect.id) } else { shown.noncentrality() }
+}
+
 /// λ over that of the detection limit, as a ratio of sizes.
 fn ratio(effect: &Hidden, shown: &Shown) -> f64 {
     match effect.kind {
-        EffectKind::Mean => (shown.noncentrality_in_form(effect.id) / detection_limit(shown.freedom(effect.id))).sqrt(),
+        EffectKind::Mean => (known(effect, shown) / detection_limit(shown.freedom(effect.id))).sqrt(),
         // λ grows with the fourth power of the size.
         _ => (shown.scatter / TOLD_APART).powf(0.25),
     }
@@ -339,7 +350,8 @@ fn scale(
     let off = wanted / found.1;
     let close = (1.0 / CLOSE..=CLOSE).contains(&off);
     // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
-    let described_better = || found.0.rivals(effect.id).first().is_some_and(|(_, left)| *left < -TOLD_APART);
+    let described_better =
+        || found.0.rivals(effect.id, known(effect, &found.0)).first().is_some_and(|(_, left)| *left < -TOLD_APART);
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
     if close && of_its_kind { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
@@ -358,10 +370,17 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
     };
     let Some(own) = shown[place].as_ref() else { return view };
     if effect.kind == EffectKind::Mean {
-        let other = others.iter().find(|other| other.id != effect.id);
+        let other = others.iter().position(|other| other.id != effect.id);
+        let other = other.and_then(|other| Some((&others[other], shown[other].as_ref()?)));
         let noncentrality = match (both, other) {
-            (Some(both), Some(other)) => both.noncentrality_beside(effect.id, other.id),
-            _ => own.noncentrality_in_form(effect.id),
+            (Some(both), Some((other, _))) if by_form(effect) => both.noncentrality_beside(effect.id, other.id),
+            (Some(both), Some((_, other))) => {
+                // By polarisation: ⟨a, b⟩ = (|a + b|² − |a|² − |b|²)/2.
+                let (a, b) = (own.noncentrality(), other.noncentrality());
+                let product = 0.5 * (both.noncentrality() - a - b);
+                if b > 0.0 { (a - product * product / b).max(0.0) } else { a }
+            }
+            _ => known(effect, own),
         };
         view.noncentrality = Some(noncentrality);
         view.ratio = Some((noncentrality / detection_limit(own.freedom(effect.id))).sqrt());
@@ -371,7 +390,7 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
         view.ratio = Some(ratio(effect, own));
     }
     // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
-    let rivals = own.rivals(effect.id).into_iter().filter(|(_, left)| *left < TOLD_APART);
+    let rivals = own.rivals(effect.id, known(effect, own)).into_iter().filter(|(_, left)| *left < TOLD_APART);
     view.aliases = rivals.map(|(id, _)| id.to_owned()).collect();
     view
 }

@@ -1,8 +1,9 @@
 //! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
 //!
 //! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the true
-//! drive, then sees the effect's signature alone. What the effect's own hypothesis takes up of its χ², beside the drive's lengths, is the noncentrality λ of
-//! the test that knows the effect; how much less another name's hypothesis takes up is that of the test between the two names.
+//! drive, then sees the effect's signature alone. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
+//! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
+//! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
 //! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
 //! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
 //! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
@@ -205,10 +206,9 @@ impl Shown {
             .max(1)
     }
 
-    /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less of the true signature its hypothesis
-    /// takes up than the true name's does. That of what scatters takes up all. Names whose best sizes no effect can have are none.
-    pub(crate) fn rivals(&self, id: &str) -> Vec<(&'static str, f64)> {
-        let own = self.best_shape(id).map_or_else(|| self.noncentrality(), |(_, own)| own);
+    /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less than `own` of the true signature its
+    /// hypothesis takes up. Names whose best sizes no effect can have are none.
+    pub(crate) fn rivals(&self, id: &str, own: f64) -> Vec<(&'static str, f64)> {
         let alone = self.taken_up(&[]).0;
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
         for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {

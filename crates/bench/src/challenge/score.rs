@@ -148,8 +148,8 @@ fn said(document: &Document, case: &Case) -> Vec<Said> {
         .collect()
 }
 
-/// What the tool's extension gains over its own base on the held-out log, and what the true term gains over the best base. Looks without error: on average
-/// over their errors the log score differs by these. Only means gain there.
+/// What the tool's model gains on the held-out log over the best calibration without the effect, and what the true term gains there. Looks without error: on
+/// average over their errors the log score differs by these. Only means gain. A tool that says nothing gains nothing: its own base is not held against it.
 fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, BenchError> {
     let mean = case.oracle.iter().all(|hidden| kind_of(&hidden.id) == Some(EffectKind::Mean));
     let (Some((held_out, plain)), Some(best), Some(truth)) = (&case.held_out, &case.best_drive, case.truth()) else {
@@ -160,9 +160,10 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
     }
     let held_out = std::slice::from_ref(held_out);
     let floor = misfit(std::slice::from_ref(plain), &calib::likelihood::Model::of(&truth, 0), case.noise, &mut []);
-    let possible = misfit(held_out, best, case.noise, &mut []) - floor;
-    let found = diagnosis.map_or(0.0, |diagnosis| {
-        let base = misfit(held_out, &diagnosis.base.model, case.noise, &mut diagnosis.base.terms());
+    let base = misfit(held_out, best, case.noise, &mut []);
+    let possible = base - floor;
+    let extended = diagnosis.filter(|diagnosis| !diagnosis.found.terms().is_empty());
+    let found = extended.map_or(0.0, |diagnosis| {
         base - misfit(held_out, &diagnosis.found.model, case.noise, &mut diagnosis.found.terms())
     });
     Ok(Some([found, possible]))
