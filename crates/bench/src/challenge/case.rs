@@ -321,7 +321,7 @@ fn scale(
     let at_first = ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
     let most = at_first * effect.most / effect.scale;
-    if !(most > low.max(1.0)) {
+    if most.is_nan() || most <= low.max(1.0) {
         return Ok(Chosen::Unseen);
     }
     let wanted = draw.log_uniform(low, high.min(most));
@@ -340,7 +340,7 @@ fn scale(
         }
         let Some(next) = seen(effect)? else { return Ok(Chosen::Unseen) };
         let at_next = ratio(effect, &next);
-        if !(at_next > 0.0) {
+        if at_next.is_nan() || at_next <= 0.0 {
             return Ok(Chosen::Unseen);
         }
         let slope = (at_next / before.1).ln() / (effect.scale / before.0).ln();
