@@ -16,8 +16,8 @@ const ALARMS: f64 = 0.05;
 const DETECTED: f64 = 0.7;
 const NAMED: f64 = 0.55;
 
-/// A size at which an effect must be detected: twice where the bar on power is.
-const PLAIN_RATIO: f64 = 3.2;
+/// A size, in detection limits, at which an effect must be detected: above where the bar on power is, 1.6.
+const PLAIN_RATIO: f64 = 2.0;
 
 /// Successes that so many trials fall short of with less than this chance.
 fn least(of: usize, share: f64, alpha: f64) -> u64 {

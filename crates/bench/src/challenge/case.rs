@@ -353,7 +353,8 @@ fn scale(
     let described_better =
         || found.0.rivals(effect.id, known(effect, &found.0)).first().is_some_and(|(_, left)| *left < -TOLD_APART);
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
-    if close && of_its_kind { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
+    let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_taken_up_by_lengths();
+    if close && of_its_kind && of_its_own { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 
 fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Shown>, others: &[Hidden]) -> OracleView {

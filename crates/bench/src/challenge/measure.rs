@@ -119,6 +119,9 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
         &of(Round::Single).chain(of(Round::Pair)).collect::<Vec<_>>(),
         0.9,
     ));
+    let white = |case: &&CaseResult| case.noise == NoiseClass::White;
+    let drawn: Vec<&CaseResult> = of(Round::Single).chain(of(Round::Pair)).filter(white).collect();
+    measures.push(Measure { met: None, ..gain("gain_white", "the same under white noise (shown only)", &drawn, 0.9) });
     measures.push(gain(
         "gain_left_out",
         "left out: gain over the oracle's",

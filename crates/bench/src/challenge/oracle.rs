@@ -155,6 +155,11 @@ impl Shown {
         (LOUD * self.total.chi_square - self.taken_up(&[]).0).max(0.0)
     }
 
+    /// Whether the drive's lengths take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
+    pub(crate) fn is_taken_up_by_lengths(&self) -> bool {
+        self.noncentrality() < 0.01 * LOUD * self.total.chi_square
+    }
+
     /// The shape of a name that takes up most, beside the lengths, and how much: noncentrality of the test by the hypothesis's own form.
     fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
         let alone = self.taken_up(&[]).0;
