@@ -1,4 +1,4 @@
-# The checks of .ci/run one by one: same names, same commands. `documents` alone is no check.
+# The checks of .ci/run one by one: same names, same commands. `documents` and `challenge` are no checks.
 
 # Everything, as CI runs it
 ci:
@@ -35,3 +35,7 @@ bench:
 # Run the commands of the documents and paste what they print, docs/methods.md's tables of all methods included
 documents:
     env YAIR_UPDATE_DOCS=1 cargo test --test architecture the_documents_show_what_the_commands_print
+
+# The blind benchmark of diagnosis against its bars; docs/diagnose.md has its table. It takes a quarter of an hour
+challenge:
+    cargo run --release -- challenge --cases 2000 --seed 1

@@ -1,6 +1,7 @@
 //! The `yair` command: one file a subcommand, and the only code that knows the terminal.
 
 mod calibrate;
+mod challenge;
 mod compare;
 mod diagnose;
 mod diagnosis_page;
@@ -41,6 +42,7 @@ enum Command {
     Import(import::Arguments),
     Calibrate(calibrate::Arguments),
     Diagnose(diagnose::Arguments),
+    Challenge(challenge::Arguments),
     Evaluate(evaluate::Arguments),
     Compare(compare::Arguments),
     Sweep(sweep::Arguments),
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, &terminal),
+        Command::Challenge(arguments) => challenge::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),

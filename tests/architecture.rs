@@ -25,7 +25,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("calib", &["kinematics", "dataset"]),
     ("diagnose", &["kinematics", "dataset", "effects", "scenario", "calib"]),
     ("report", &[]),
-    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "report"]),
+    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "report"]),
     ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "bench", "report"]),
 ];
 
@@ -236,7 +236,8 @@ fn the_readme_the_justfile_and_ci_run_the_same_commands() {
         .filter(|line| !line.starts_with([' ', '#']))
         .filter_map(|line| line.strip_suffix(':'))
         .collect();
-    let expected: BTreeSet<&str> = steps.iter().map(|(name, _)| name.as_str()).chain(["ci", "documents"]).collect();
+    let expected: BTreeSet<&str> =
+        steps.iter().map(|(name, _)| name.as_str()).chain(["ci", "documents", "challenge"]).collect();
     assert_eq!(recipes, expected);
 }
 

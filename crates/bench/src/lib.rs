@@ -6,6 +6,7 @@
 //! number of threads, shards and interruptions.
 
 mod bound;
+mod challenge;
 mod error;
 mod moments;
 pub mod paper;
@@ -13,6 +14,10 @@ mod sweep;
 mod trial;
 
 pub use bound::{FisherInformation, Innovation, NoBound};
+pub use challenge::{
+    CaseResult, ChallengeResult, Confusion, EffectKind, Measure, NoiseClass, OracleView, PathFamily, Round, Said,
+    TruthKind, challenge, challenge_case, challenge_datasets,
+};
 pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{

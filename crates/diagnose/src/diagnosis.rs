@@ -63,6 +63,28 @@ pub struct Diagnosis {
     pub residuals: Residuals,
     /// Every effect that was asked for, and what became of it.
     pub alternatives: Vec<Alternative>,
+    /// The calibrated model with what was found in its mean.
+    pub found: FittedModel,
+}
+
+/// A model with the terms whose sizes it has, for whoever wants to hold it against other records.
+#[derive(Debug, Clone)]
+pub struct FittedModel {
+    /// Lengths, and sizes in the order of the terms' parameters.
+    pub model: calib::likelihood::Model,
+    choices: Vec<Choice>,
+}
+
+impl FittedModel {
+    fn of(extended: &Extended<'_>) -> Self {
+        Self { model: extended.fit.fit.model.clone(), choices: extended.choices.clone() }
+    }
+
+    /// Its terms, at the start of their lives.
+    #[must_use]
+    pub fn terms(&self) -> Vec<Box<dyn dataset::ModelTerm>> {
+        crate::candidate::terms(&self.choices)
+    }
 }
 
 /// Looks whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
@@ -247,7 +269,8 @@ fn continued(
         extended_model: None,
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
-    Diagnosis { document, extended, residuals, alternatives }
+    let found = FittedModel::of(model);
+    Diagnosis { document, extended, residuals, alternatives, found }
 }
 
 fn is_scatter(finding: &Finding) -> bool {

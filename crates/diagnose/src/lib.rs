@@ -24,7 +24,7 @@ mod statistics;
 mod unlisted;
 
 pub use alternatives::{Alternative, Fate};
-pub use diagnosis::{DiagnoseError, Diagnosis, Options, diagnose, diagnose_within};
+pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_within};
 pub use document::{
     Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
     Value, Verdict,

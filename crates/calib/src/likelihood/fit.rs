@@ -161,8 +161,9 @@ pub(crate) fn fit_from(
     Ok(Fit { model, noise, free_headings: headings, pass, converged })
 }
 
-/// A pass at given values, with its innovations.
-pub(crate) fn pass_with_innovations(
+/// A pass at given values, with its innovations; free headings are those of chains whose instrument sees none, one for each chain.
+#[must_use]
+pub fn pass_with_innovations(
     records: &Records<'_>,
     selections: &[Selection],
     model: &Model,

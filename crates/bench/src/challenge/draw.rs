@@ -1,0 +1,44 @@
+//! Draws of a case's stream: ranges, choices and directions.
+
+use effects::{Address, Stream, StreamName};
+
+/// A stream with the draws that a case is made of.
+#[derive(Debug, Clone)]
+pub(crate) struct Draw(pub(crate) Stream);
+
+impl Draw {
+    /// The draws of one matter of a case; a case that had to be drawn again has others.
+    pub(crate) fn of(seed: u64, case: u64, what: &str, attempt: u64) -> Self {
+        let name = StreamName::new("challenge").nth(attempt);
+        let address = Address { seed, point: 0, trial: case, run: 0 };
+        // The matter is hashed into the run's place of the address by its letters: matters are few and fixed.
+        let run = what.bytes().fold(1_u32, |hash, byte| hash.wrapping_mul(31).wrapping_add(u32::from(byte)));
+        Self(Address { run, ..address }.stream(name))
+    }
+
+    /// Uniform in [low, high).
+    pub(crate) fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.uniform()
+    }
+
+    /// Uniform in its logarithm.
+    pub(crate) fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
+        (self.uniform(low.ln(), high.ln())).exp()
+    }
+
+    /// One with this chance.
+    pub(crate) fn chance(&mut self, probability: f64) -> bool {
+        self.0.uniform() < probability
+    }
+
+    /// A number below `n`.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // small and positive
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        ((self.0.uniform() * n as f64) as usize).min(n.saturating_sub(1))
+    }
+
+    /// 1 or −1.
+    pub(crate) fn sign(&mut self) -> f64 {
+        if self.chance(0.5) { 1.0 } else { -1.0 }
+    }
+}

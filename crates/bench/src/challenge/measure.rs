@@ -1,0 +1,382 @@
+//! Measures over cases: shares with their one-sided limits, the power's ratio, gains, calibration; each against its bar.
+
+use std::collections::BTreeMap;
+
+use super::case::{OracleView, Round};
+use super::draw::Draw;
+use super::hidden::EffectKind;
+use super::looks::NoiseClass;
+use super::power::limits;
+use super::score::{CaseResult, Said};
+
+/// One measure against its bar.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Measure {
+    /// A word for scripts.
+    pub id: &'static str,
+    /// What is measured, for people.
+    pub what: &'static str,
+    /// The value; `None` where no case tells.
+    pub value: Option<f64>,
+    /// Its one-sided 95 % limit on the side of the bar.
+    pub limit: Option<f64>,
+    /// Over how many cases or findings.
+    pub of: usize,
+    /// The bar.
+    pub bar: f64,
+    /// Whether the limit must not be above the bar, or not below.
+    pub at_most: bool,
+    /// Whether the limit clears the bar; `None` for measures that are shown only.
+    pub met: Option<bool>,
+}
+
+fn share(id: &'static str, what: &'static str, (k, n): (usize, usize), bar: f64, at_most: bool) -> Measure {
+    let (low, high) = limits(k, n);
+    let limit = if at_most { high } else { low };
+    #[allow(clippy::cast_precision_loss)]
+    let value = (n > 0).then(|| k as f64 / n as f64);
+    let met = if at_most { limit <= bar } else { limit >= bar };
+    Measure { id, what, value, limit: value.map(|_| limit), of: n, bar, at_most, met: value.map(|_| met) }
+}
+
+fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> (usize, usize) {
+    all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
+}
+
+/// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their names.
+const PLAIN_RATIO: f64 = 2.0;
+/// A pair counts where the oracle finds each beside the other at this many detection limits.
+const PAIR_RATIO: f64 = 1.6;
+
+/// What was said of one hidden effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Naming {
+    Undetected,
+    First,
+    InSet,
+    Unlisted,
+    WrongName,
+    WrongSet,
+}
+
+fn naming(hidden: &OracleView, first: Option<&Said>) -> Naming {
+    let Some(said) = first else { return Naming::Undetected };
+    if said.names[0] == hidden.id {
+        Naming::First
+    } else if said.names.contains(&hidden.id) {
+        Naming::InSet
+    } else if said.names[0] == "unlisted" {
+        Naming::Unlisted
+    } else if said.names.len() == 1 {
+        Naming::WrongName
+    } else {
+        Naming::WrongSet
+    }
+}
+
+fn is_aliased(hidden: &OracleView) -> bool {
+    match hidden.kind {
+        EffectKind::Mean => !hidden.aliases.is_empty(),
+        EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < PLAIN_RATIO),
+        EffectKind::Gross => false,
+    }
+}
+
+/// All measures.
+pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
+    let of = |round: Round| cases.iter().filter(move |case| case.round == round);
+    let alarm = |case: &CaseResult| case.findings().next().is_some();
+    let mut measures = vec![
+        share(
+            "false_alarms",
+            "nulls with an alarm",
+            count(of(Round::Null).filter(|case| case.noise == NoiseClass::White), alarm),
+            0.05,
+            true,
+        ),
+        share(
+            "false_alarms_other_noise",
+            "nulls with an alarm, other noise",
+            count(of(Round::Null).filter(|case| case.noise != NoiseClass::White), alarm),
+            0.10,
+            true,
+        ),
+        share(
+            "nulls_unextended",
+            "nulls left unextended",
+            count(of(Round::Null), |case: &CaseResult| !case.extended),
+            0.95,
+            false,
+        ),
+        power(seed, cases),
+    ];
+    measures.extend(names(cases));
+    measures.extend(left_out(cases));
+    measures.push(pairs(cases));
+    measures.push(gain(
+        "gain",
+        "gain over the oracle's",
+        &of(Round::Single).chain(of(Round::Pair)).collect::<Vec<_>>(),
+        0.9,
+    ));
+    let white = |case: &&CaseResult| case.noise == NoiseClass::White;
+    let drawn: Vec<&CaseResult> = of(Round::Single).chain(of(Round::Pair)).filter(white).collect();
+    measures.push(Measure { met: None, ..gain("gain_white", "the same under white noise (shown only)", &drawn, 0.9) });
+    measures.push(gain(
+        "gain_left_out",
+        "left out: gain over the oracle's",
+        &of(Round::LeftOut).collect::<Vec<_>>(),
+        0.7,
+    ));
+    measures.extend(probabilities(cases));
+    measures
+}
+
+fn names(cases: &[CaseResult]) -> Vec<Measure> {
+    let singles: Vec<(&OracleView, Naming, &CaseResult)> = cases
+        .iter()
+        .filter(|case| case.round == Round::Single)
+        .filter_map(|case| {
+            let hidden = case.hidden.first()?;
+            Some((hidden, naming(hidden, case.findings().next()), case))
+        })
+        .filter(|(_, naming, _)| *naming != Naming::Undetected)
+        .collect();
+    let plain = singles.iter().filter(|(hidden, _, _)| !is_aliased(hidden));
+    let aliased = || singles.iter().filter(|(hidden, _, _)| is_aliased(hidden));
+    let mut measures = vec![
+        share("first_name", "right name first", count(plain, |(_, naming, _)| *naming == Naming::First), 0.95, false),
+        share(
+            "set_holds",
+            "aliased: the set holds the right name",
+            count(aliased(), |(_, naming, _)| matches!(naming, Naming::First | Naming::InSet)),
+            0.98,
+            false,
+        ),
+        share(
+            "single_wrong_name",
+            "aliased: a single wrong name",
+            count(aliased(), |(_, naming, _)| *naming == Naming::WrongName),
+            0.01,
+            true,
+        ),
+    ];
+    // Of means alone: there the oracle has sets.
+    let sizes: Vec<(f64, f64)> = aliased()
+        .filter(|(hidden, _, _)| hidden.kind == EffectKind::Mean)
+        .filter_map(|(hidden, _, case)| {
+            #[allow(clippy::cast_precision_loss)]
+            Some((case.findings().next()?.names.len() as f64, 1.0 + hidden.aliases.len() as f64))
+        })
+        .collect();
+    measures.push(ratio_of_sums("set_size", "aliased: size of sets over the oracle's", &sizes, 1.2, true));
+    measures
+}
+
+/// Σa/Σb with its one-sided limit, linearised over cases.
+fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar: f64, at_most: bool) -> Measure {
+    let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
+    let value = (b > 0.0 && pairs.len() > 1).then(|| a / b);
+    let limit = value.map(|value| {
+        #[allow(clippy::cast_precision_loss)]
+        let n = pairs.len() as f64;
+        let squares: f64 = pairs.iter().map(|pair| (pair.0 - value * pair.1).powi(2)).sum();
+        let error = (squares * n / (n - 1.0)).sqrt() / b;
+        if at_most { value + 1.645 * error } else { value - 1.645 * error }
+    });
+    let met = limit.map(|limit| if at_most { limit <= bar } else { limit >= bar });
+    Measure { id, what, value, limit, of: pairs.len(), bar, at_most, met }
+}
+
+fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
+    let said: Vec<(&OracleView, &CaseResult)> = cases
+        .iter()
+        .filter(|case| case.round == Round::LeftOut && case.findings().next().is_some())
+        .filter_map(|case| Some((case.hidden.first()?, case)))
+        .collect();
+    let outcome = |(hidden, case): &&(&OracleView, &CaseResult)| without(hidden, case);
+    let counted = said.iter().filter(|one| outcome(one) != Without::Alias);
+    vec![
+        share(
+            "left_out",
+            "left out: not given a wrong name",
+            count(counted, |one| outcome(&one) == Without::NoName),
+            0.9,
+            false,
+        ),
+        Measure {
+            met: None,
+            ..share(
+                "left_out_alias",
+                "left out: an alias is named (shown only)",
+                count(said.iter(), |one| outcome(&one) == Without::Alias),
+                1.0,
+                true,
+            )
+        },
+    ]
+}
+
+/// What was said where the effect was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Without {
+    /// Nothing with a name.
+    NoName,
+    /// Names that this data cannot tell from the missing one.
+    Alias,
+    /// Another name.
+    Wrong,
+}
+
+pub(crate) fn without(hidden: &OracleView, case: &CaseResult) -> Without {
+    let mut worst = Without::NoName;
+    for said in case.findings() {
+        if said.names.iter().any(|name| name == "unlisted") {
+            continue;
+        }
+        if said.names.iter().any(|name| hidden.aliases.contains(name)) {
+            if worst == Without::NoName {
+                worst = Without::Alias;
+            }
+        } else {
+            worst = Without::Wrong;
+        }
+    }
+    worst
+}
+
+fn pairs(cases: &[CaseResult]) -> Measure {
+    let both_show =
+        |case: &&CaseResult| case.hidden.iter().all(|hidden| hidden.ratio.is_some_and(|ratio| ratio >= PAIR_RATIO));
+    let both = |case: &CaseResult| {
+        case.hidden.iter().all(|hidden| case.findings().any(|said| said.names.contains(&hidden.id)))
+    };
+    let counted = cases.iter().filter(|case| case.round == Round::Pair).filter(both_show);
+    share("pairs", "pairs: both in the findings", count(counted, both), 0.85, false)
+}
+
+fn gain(id: &'static str, what: &'static str, cases: &[&CaseResult], bar: f64) -> Measure {
+    let pairs: Vec<(f64, f64)> = cases.iter().filter_map(|case| case.gain).map(|[found, best]| (found, best)).collect();
+    ratio_of_sums(id, what, &pairs, bar, false)
+}
+
+/// Findings of singles and pairs: is the first name right as often as stated; do intervals cover?
+fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
+    let rounds = |case: &&CaseResult| matches!(case.round, Round::Single | Round::Pair);
+    let findings: Vec<(f64, bool)> = cases
+        .iter()
+        .filter(rounds)
+        .flat_map(|case| case.findings().map(move |said| (case, said)))
+        // That something has no name is no statement of which.
+        .filter(|(_, said)| said.names[0] != "unlisted")
+        .map(|(case, said)| (said.probability, case.hidden.iter().any(|hidden| hidden.id == said.names[0])))
+        .collect();
+    // Ten bins of equal width.
+    let mut bins: BTreeMap<u32, (f64, f64, f64)> = BTreeMap::new();
+    for (probability, right) in &findings {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let bin = bins.entry((probability * 10.0).clamp(0.0, 9.0) as u32).or_default();
+        bin.0 += probability;
+        bin.1 += f64::from(u8::from(*right));
+        bin.2 += 1.0;
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let n = findings.len() as f64;
+    let error = (n > 0.0).then(|| bins.values().map(|(stated, right, _)| (stated - right).abs()).sum::<f64>() / n);
+    let covered: Vec<bool> =
+        cases.iter().filter(rounds).flat_map(|case| &case.said).flat_map(|said| said.covered.clone()).collect();
+    let covers = count(covered.iter(), |covered| *covered);
+    vec![
+        Measure {
+            id: "calibration_error",
+            what: "stated probabilities: expected calibration error",
+            value: error,
+            limit: None,
+            of: findings.len(),
+            bar: 0.05,
+            at_most: true,
+            met: error.map(|error| error <= 0.05),
+        },
+        share("coverage_low", "95 % intervals cover", covers, 0.93, false),
+        share("coverage_high", "95 % intervals cover, not too often", covers, 0.97, true),
+    ]
+}
+
+/// Draws of the cases again, with replacement, for the limit of the power's ratio.
+const BOOTSTRAPS: usize = 400;
+
+/// The size, in detection limits, from which on nine of ten cases are detected: where the best monotone curve of detection over size crosses 0.9.
+fn power(seed: u64, cases: &[CaseResult]) -> Measure {
+    let mut points: Vec<(f64, f64)> = cases
+        .iter()
+        .filter(|case| case.round == Round::Single && case.noise == NoiseClass::White)
+        .filter_map(|case| {
+            let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
+            Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))
+        })
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let value = crossing(&points, 0.9);
+    let mut draw = Draw::of(seed, u64::MAX, "bootstrap", 0);
+    let mut again: Vec<f64> = (0..BOOTSTRAPS)
+        .map(|_| {
+            let mut drawn: Vec<(f64, f64)> = (0..points.len()).map(|_| points[draw.below(points.len())]).collect();
+            drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+            crossing(&drawn, 0.9).unwrap_or(f64::INFINITY)
+        })
+        .collect();
+    again.sort_by(f64::total_cmp);
+    let limit = again[BOOTSTRAPS * 95 / 100];
+    Measure {
+        id: "power_ratio",
+        what: "size with 90 % power over the oracle's",
+        value,
+        limit: Some(limit).filter(|limit| limit.is_finite()),
+        of: points.len(),
+        bar: 1.6,
+        at_most: true,
+        met: (!points.is_empty()).then_some(limit <= 1.6),
+    }
+}
+
+/// Where a monotone fit (pool adjacent violators; Ayer et al. 1955) of (size, 0 or 1), sorted by size, first reaches a level.
+fn crossing(points: &[(f64, f64)], level: f64) -> Option<f64> {
+    // Blocks: first size, sum, number.
+    let mut blocks: Vec<(f64, f64, f64)> = Vec::new();
+    for (size, hit) in points {
+        blocks.push((*size, *hit, 1.0));
+        while let [.., a, b] = blocks[..]
+            && a.1 / a.2 >= b.1 / b.2
+        {
+            blocks.pop();
+            blocks.pop();
+            blocks.push((a.0, a.1 + b.1, a.2 + b.2));
+        }
+    }
+    blocks.iter().find(|(_, sum, n)| sum / n >= level).map(|(size, _, _)| *size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_monotone_curve_crosses_where_it_should() {
+        let step: Vec<(f64, f64)> = (0..100).map(|k| (f64::from(k), f64::from(u8::from(k >= 40)))).collect();
+        assert_eq!(crossing(&step, 0.9), Some(40.0));
+        // One miss far up: the block above it still has more than nine of ten, the one it is pooled with as well.
+        let mut missed = step.clone();
+        missed[80].1 = 0.0;
+        assert_eq!(crossing(&missed, 0.9), Some(40.0));
+        assert_eq!(crossing(&[(1.0, 0.0)], 0.9), None);
+    }
+
+    #[test]
+    fn a_ratio_of_sums_knows_its_error() {
+        // a = b/2 exactly: no error. Its limit is itself.
+        let pairs: Vec<(f64, f64)> = (1..50).map(|k| (0.5 * f64::from(k), f64::from(k))).collect();
+        let exact = ratio_of_sums("", "", &pairs, 0.4, false);
+        assert_eq!((exact.value, exact.met), (Some(0.5), Some(true)));
+        assert!((exact.limit.expect("a limit") - 0.5).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,89 @@
+//! The benchmark benched: is the oracle's power what it says, does the tool get nothing of the answer, does a case stand by itself?
+
+use rayon::prelude::*;
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+use super::case::Trial;
+use super::hidden::EffectKind;
+use super::power::power;
+use super::*;
+
+/// Chance of either side of a binomial count at which a test fails.
+const ALPHA: f64 = 1e-4;
+
+fn is_likely(successes: usize, of: usize, probability: f64) -> bool {
+    let binomial = Binomial::new(probability, of as u64).expect("a probability");
+    let count = successes as u64;
+    binomial.sf(count.saturating_sub(1)) > ALPHA && binomial.cdf(count) > ALPHA
+        || (count == 0 && binomial.cdf(0) > ALPHA)
+}
+
+/// The oracle's own test on data with noise, by the catalogue's hypothesis and the true variances: at 5 % it alarms on nulls so often, and finds an effect of
+/// the oracle's limit with the power that its noncentrality says. Half or twice the noncentrality is rejected.
+#[test]
+fn the_oracle_has_the_power_that_it_states() {
+    const TRIALS: usize = 160;
+    let id = "slip_speed";
+    let trial = Trial::at_limit(5, id).expect("simulates").expect("a robot that shows it");
+    let found = |hidden: bool| -> usize {
+        (0..TRIALS as u64)
+            .into_par_iter()
+            .filter(|number| trial.statistic(1000 + number, hidden).expect("simulates") > 3.841_459)
+            .count()
+    };
+    let (alarms, hits) = (found(false), found(true));
+    let expected = power(1.0, trial.noncentrality);
+    assert!((0.85..0.95).contains(&expected), "{id}: {expected}");
+    assert!(is_likely(alarms, TRIALS, 0.05), "{id}: {alarms} alarms in {TRIALS} at 5 %");
+    assert!(is_likely(hits, TRIALS, expected), "{id}: {hits} found of {TRIALS} at power {expected}");
+    for wrong in [0.5, 2.0] {
+        assert!(!is_likely(hits, TRIALS, power(1.0, wrong * trial.noncentrality)), "{id}: {hits} says nothing");
+    }
+}
+
+#[test]
+fn a_case_stands_by_itself() {
+    let whole = challenge(3, 8, 2, &|| ()).expect("simulates");
+    let alone = challenge(3, 8, 1, &|| ()).expect("simulates");
+    let text = |result: &ChallengeResult| serde_json::to_string(result).expect("has a JSON form");
+    assert_eq!(text(&whole), text(&alone));
+    let last = whole.cases.last().expect("cases");
+    assert_eq!(challenge_case(3, last.case).expect("simulates").as_ref(), Ok(last));
+    let other = challenge_case(4, last.case).expect("simulates");
+    assert_ne!(other.as_ref(), Ok(last), "another seed is another case");
+}
+
+/// No name, note or key of a dataset tells what is hidden; loads and jitter stand in cases without such an effect too.
+#[test]
+fn records_do_not_tell_what_is_hidden() {
+    let mut loads_elsewhere = 0;
+    for number in 0..20 {
+        let Ok(case) = Case::draw(11, number).expect("simulates") else { continue };
+        let hidden: Vec<&str> = case.hidden.iter().map(|hidden| hidden.id).collect();
+        for dataset in &case.datasets {
+            assert_eq!(dataset.provenance, dataset::Provenance::default());
+            for run in &dataset.runs {
+                assert!(hidden.iter().all(|id| !run.info.id.contains(id)));
+                let loaded = run.info.covariates.contains_key("payload_kg");
+                assert!(run.info.covariates.len() == usize::from(loaded), "{:?}", run.info.covariates);
+                loads_elsewhere += usize::from(loaded && !hidden.contains(&"payload_compression"));
+            }
+        }
+    }
+    assert!(loads_elsewhere > 0);
+}
+
+#[test]
+fn rounds_take_turns_and_leave_every_effect_out_once() {
+    let all = hidden::hideable();
+    // Three geometry effects and the silent one cannot be hidden.
+    assert_eq!(all.len(), effects::CATALOGUE.len() - 4);
+    assert!(
+        [EffectKind::Mean, EffectKind::Scatter, EffectKind::Gross]
+            .iter()
+            .all(|kind| all.iter().any(|(_, of)| of == kind))
+    );
+    let places: Vec<u64> =
+        (0..200).map(Round::of).filter(|(round, _)| *round == Round::LeftOut).map(|(_, place)| place).collect();
+    assert_eq!(places, (0..40).collect::<Vec<u64>>());
+}
