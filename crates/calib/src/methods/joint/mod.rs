@@ -133,7 +133,11 @@ impl JointFit<'_> {
         self.refit_with(from, &mut [])
     }
 
-    pub(crate) fn refit_with(&mut self, from: Option<From>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), CalibError> {
+    pub(crate) fn refit_with(
+        &mut self,
+        from: Option<From>,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let options = FitOptions { held: self.held(), ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;

@@ -61,7 +61,11 @@ impl JointFit<'_> {
             &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency],
         ];
         let several = self.fit.pass.runs.iter().any(|run| run.run.0 != self.fit.pass.runs[0].run.0);
-        let mut ways = vec![None, Some(Apart::Run)];
+        let mut ways = vec![None];
+        // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
+        if gate == Gate::Open || (self.thinning == Thinning::NONE && self.is_white()) {
+            ways.push(Some(Apart::Run));
+        }
         if several {
             ways.push(Some(Apart::Session));
         }
