@@ -31,13 +31,15 @@ pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice]) -> (Vec<Blind>, 
         let entry = match smallest {
             // A million times what would be large is rounding, not information.
             Some((parameter, size)) if size < 1e6 * parameter.plausible => {
+                // A ratio has no unit in print.
+                let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
                 let why = if size > parameter.plausible {
                     format!(
-                        "these runs hardly excite it: {} below {size:.2e} {} would not have shown, and {:.1e} is large already",
-                        parameter.name, parameter.unit, parameter.plausible
+                        "these runs hardly excite it: {} below {size:.2e}{unit} would not have shown, and {:.1e} is large already",
+                        parameter.name, parameter.plausible
                     )
                 } else {
-                    format!("{} from {size:.2e} {} on would have shown", parameter.name, parameter.unit)
+                    format!("{} from {size:.2e}{unit} on would have shown", parameter.name)
                 };
                 let smallest =
                     Smallest { value: size, unit: parameter.unit.to_owned(), parameter: parameter.name.to_owned() };

@@ -147,6 +147,14 @@ pub struct Gain {
     pub drift_percent: Option<Compared>,
 }
 
+impl Gain {
+    /// Does odometry drift more with the extended model for certain? Then it is none, whatever it says of single looks.
+    #[must_use]
+    pub fn drifts_more(&self) -> bool {
+        self.drift_percent.as_ref().is_some_and(|drift| drift.high < 0.0)
+    }
+}
+
 /// Base and extended model compared; positive bounds are a gain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Compared {

@@ -260,7 +260,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         // Nor is a term that predicts unseen runs worse than none, or with which odometry drifts more for certain.
         if gain(&model, &extended).is_ok_and(|gain| {
             let score = gain.log_score_per_observation;
-            score.low + score.high <= 0.0 || gain.drift_percent.is_some_and(|drift| drift.high < 0.0)
+            score.low + score.high <= 0.0 || gain.drifts_more()
         }) {
             break;
         }

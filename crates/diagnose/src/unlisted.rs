@@ -99,7 +99,7 @@ pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) 
             let earned = gain(model, &extended).ok()?;
             let score = earned.log_score_per_observation;
             let certain = score.low + score.high > 2.0 * (score.high - score.low);
-            (score.low > 0.0).then_some((score.extended, extended, certain))
+            (score.low > 0.0 && !earned.drifts_more()).then_some((score.extended, extended, certain))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, extended, certain)| SparseFound { model: extended, p_value, trials, certain })
