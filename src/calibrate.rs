@@ -19,7 +19,7 @@ use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 #[derive(Args)]
 #[command(after_help = methods())]
 pub(crate) struct Arguments {
-    /// Datasets; several are one robot's sessions, calibrated together.
+    /// Datasets; several are one robot's sessions, calibrated together. A folder of datasets stands for all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Method, or `all` for each one that applies.

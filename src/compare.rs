@@ -1,7 +1,7 @@
 //! `yair compare DATASET... [--method M]...`
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use calib::{ComparedMethod, Comparison, KindMean, METHODS, Method, refuse_wrapped_counters};
@@ -28,11 +28,7 @@ pub(crate) struct Arguments {
 const KINDS_A_TABLE: usize = 3;
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let mut paths = Vec::new();
-    for path in &arguments.datasets {
-        paths.extend(datasets_in(path)?);
-    }
-    let datasets = read_datasets(&paths, terminal)?;
+    let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     refuse_wrapped_counters(&sessions)?;
     let chosen = |method: &&dyn Method| {
@@ -58,25 +54,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     terminal.document(&comparison)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// A dataset, or those in a folder of datasets, by name.
-fn datasets_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
-    const MANIFEST: &str = "dataset.toml";
-    if !path.is_dir() || path.join(MANIFEST).exists() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let unreadable = |error| format!("{}: {error}", path.display());
-    let mut inside = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(unreadable)? {
-        let entry = entry.map_err(unreadable)?.path();
-        if entry.join(MANIFEST).is_file() {
-            inside.push(entry);
-        }
-    }
-    inside.sort();
-    // Nothing inside: reading the folder as a dataset says what is missing.
-    Ok(if inside.is_empty() { vec![path.to_owned()] } else { inside })
 }
 
 fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {

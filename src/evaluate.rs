@@ -8,12 +8,12 @@ use clap::Args;
 use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
 
-use crate::terminal::{Failure, Terminal, cell, folder_name, refuse_doubles, table};
+use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets with absolute truth.
+    /// Datasets with absolute truth; a folder of datasets stands for all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Calibration file from `yair calibrate --out`; may be given several times.
@@ -39,7 +39,7 @@ struct Document {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    refuse_doubles(&arguments.datasets)?;
+    let paths = datasets_at(&arguments.datasets)?;
     let mut found = vec![None];
     for path in &arguments.calibrations {
         let calibrations = CalibrationReport::read(path)?.calibrations();
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         }
         found.extend(calibrations.into_iter().map(Some));
     }
-    let (names, calibrations) = evaluate(&arguments.datasets, &found, terminal)?;
+    let (names, calibrations) = evaluate(&paths, &found, terminal)?;
     show(&calibrations, terminal)?;
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();

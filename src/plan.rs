@@ -14,7 +14,7 @@ use crate::terminal::{Failure, Terminal, read_datasets, table};
 /// The next experiment: what tells apart the names that a diagnosis leaves, or shows what it could not see; from a scenario, what to drive before there is any data.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets of one robot, or a scenario file.
+    /// Datasets of one robot, or a folder of them, or a scenario file.
     #[arg(required = true, value_name = "DATASET|SCENARIO")]
     sources: Vec<PathBuf>,
     /// Sides of the floor, metres; without it what the robot moved over so far, or the scenario's budget.

@@ -98,10 +98,9 @@ pub(crate) fn table(headers: &[&str], left: usize) -> Table {
     table
 }
 
-/// Reads datasets and passes their warnings on.
+/// Reads datasets and passes their warnings on; a folder of datasets stands for all of them.
 pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
-    refuse_doubles(paths)?;
-    paths
+    datasets_at(paths)?
         .iter()
         .map(|path| {
             let loaded = dataset::read(path)?;
@@ -115,8 +114,37 @@ pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Ve
         .collect()
 }
 
+/// A dataset, or those in a folder of datasets, by name.
+fn datasets_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    const MANIFEST: &str = "dataset.toml";
+    if !path.is_dir() || path.join(MANIFEST).exists() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let unreadable = |error| format!("{}: {error}", path.display());
+    let mut inside = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?.path();
+        if entry.join(MANIFEST).is_file() {
+            inside.push(entry);
+        }
+    }
+    inside.sort();
+    // Nothing inside: reading the folder as a dataset says what is missing.
+    Ok(if inside.is_empty() { vec![path.to_owned()] } else { inside })
+}
+
+/// The datasets that paths stand for, each once.
+pub(crate) fn datasets_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut all = Vec::with_capacity(paths.len());
+    for path in paths {
+        all.extend(datasets_in(path)?);
+    }
+    refuse_doubles(&all)?;
+    Ok(all)
+}
+
 /// The same runs twice would halve every variance.
-pub(crate) fn refuse_doubles(paths: &[PathBuf]) -> Result<(), Failure> {
+fn refuse_doubles(paths: &[PathBuf]) -> Result<(), Failure> {
     let mut seen = BTreeSet::new();
     match paths.iter().find(|path| path.canonicalize().is_ok_and(|real| !seen.insert(real))) {
         None => Ok(()),

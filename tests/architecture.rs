@@ -302,7 +302,8 @@ fn a_pasted_output_with_another_digit_does_not_agree() {
 }
 
 /// The documents whose commands are run.
-const DOCUMENTS: [&str; 4] = ["README.md", "docs/calibration.md", "docs/methods.md", "docs/bench.md"];
+const DOCUMENTS: [&str; 5] =
+    ["README.md", "docs/calibration.md", "docs/methods.md", "docs/bench.md", "docs/real-robots.md"];
 
 /// A pasted output as it should be: what is printed, with the same left out at … as before. What comes after … is found by its first line that is printed once, or else is as long as it was.
 fn refreshed(pasted: &[String], real: &str) -> Vec<String> {
