@@ -154,12 +154,14 @@ pub(crate) struct Asked<'a> {
     pub(crate) sparse: Option<(Extended<'a>, f64, usize)>,
     /// Correlation of looks that follow each other, where they had to be thinned.
     pub(crate) correlated: Option<(f64, f64)>,
+    /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
+    pub(crate) in_disguise: bool,
 }
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
     let found = search(&base, catalogue);
     let checked = check(&found.model);
-    let mut asked = Asked { base, found, checked, sparse: None, correlated: None };
+    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false };
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
     let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
     if !asked.found.model.choices.is_empty()
@@ -180,9 +182,10 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
     if !is_white(&asked.checked) {
         // Looks that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
         // apart they are independent, and what stands out then may be believed.
-        let explains = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
-            .map(|sparse| (check(&sparse.model), sparse))
-            .filter(|(checked, sparse)| is_white(checked) || sparse.certain);
+        let tried =
+            sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL).map(|sparse| (check(&sparse.model), sparse));
+        asked.in_disguise = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
+        let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
         if let Some((checked, sparse)) = explains {
             asked.checked = checked;
             asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));

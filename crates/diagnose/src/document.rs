@@ -147,11 +147,16 @@ pub struct Gain {
     pub drift_percent: Option<Compared>,
 }
 
+/// A drift that grows by less than this share is no reason to leave out what looks show.
+const MATERIAL: f64 = 0.05;
+
 impl Gain {
-    /// Does odometry drift more with the extended model for certain? Then it is none, whatever it says of single looks.
+    /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single looks.
     #[must_use]
     pub fn drifts_more(&self) -> bool {
-        self.drift_percent.as_ref().is_some_and(|drift| drift.high < 0.0)
+        self.drift_percent
+            .as_ref()
+            .is_some_and(|drift| drift.high < 0.0 && drift.extended > (1.0 + MATERIAL) * drift.base)
     }
 }
 

@@ -84,7 +84,7 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         );
         let mut ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
         // Where something else is found too, it may be that this is the rest of it.
-        if !ids.is_empty() && !asked.found.model.choices.is_empty() {
+        if !ids.is_empty() && (asked.in_disguise || !asked.found.model.choices.is_empty()) {
             ids.push("unlisted");
         }
         findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));

@@ -24,6 +24,8 @@ pub(crate) struct SparseFound<'a> {
     pub(crate) trials: usize,
     /// It gains on held-out runs by more than twice what chance does in 95 % of cases: correlated looks, which differ from run to run, do not do that.
     pub(crate) certain: bool,
+    /// Looks are likelier with it, but odometry drifts more: it stands for something else.
+    pub(crate) drifts_more: bool,
 }
 
 /// Products of at most three covariates that vanish at standstill.
@@ -99,8 +101,14 @@ pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) 
             let earned = gain(model, &extended).ok()?;
             let score = earned.log_score_per_observation;
             let certain = score.low + score.high > 2.0 * (score.high - score.low);
-            (score.low > 0.0 && !earned.drifts_more()).then_some((score.extended, extended, certain))
+            (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, extended, certain)| SparseFound { model: extended, p_value, trials, certain })
+        .map(|(_, extended, certain, drifts_more)| SparseFound {
+            model: extended,
+            p_value,
+            trials,
+            certain,
+            drifts_more,
+        })
 }
