@@ -72,7 +72,7 @@ impl Writer {
     /// [`ExtraChannel`](crate::ExtraChannel) or a [`Run::truth_sigma`].
     ///
     /// # Errors
-    /// As [`write`].
+    /// As [`write()`].
     pub fn create(header: Dataset, dir: &Path, existing: Existing) -> Result<Self, DatasetError> {
         Self::with_columns(header, OptionalColumns::default(), dir, existing)
     }
@@ -105,7 +105,7 @@ impl Writer {
     /// Adds a run.
     ///
     /// # Errors
-    /// As [`write`]; the writer is of no use then.
+    /// As [`write()`]; the writer is of no use then.
     pub fn push(&mut self, run: &Run) -> Result<(), DatasetError> {
         let form = *self.form.get_or_insert_with(|| discriminant(&run.odometry.wheels));
         check::check_next(&self.header, form, run, &mut self.ids)?;
@@ -136,7 +136,7 @@ impl Writer {
     /// Puts the dataset into its place.
     ///
     /// # Errors
-    /// As [`write`].
+    /// As [`write()`].
     pub fn finish(self) -> Result<(), DatasetError> {
         let not_writable = |what| DatasetError::NotWritable { what };
         if self.infos.is_empty() {
