@@ -8,7 +8,7 @@ use calib::methods::joint::JointFit;
 use super::library::Manoeuvre;
 use super::predict::predictions;
 use super::setting::Setting;
-use super::weigh::{Candidate, Frame, Rivals, with_runs};
+use super::weigh::{Candidate, Frame, Rivals, with_parts, with_runs};
 use super::words::Predictions;
 use super::{Part, evidences, words};
 use crate::candidate::{Choice, terms};
@@ -94,14 +94,7 @@ pub(super) fn tell_apart(
         parts.iter_mut().for_each(|part| part.pairs = 2);
         minutes *= 2.0;
     }
-    let added: Vec<(&Evidence, f64)> = parts
-        .iter()
-        .filter_map(|part| {
-            let (_, evidence) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
-            Some((evidence, f64::from(part.pairs)))
-        })
-        .collect();
-    let after = with_runs(&before, &added);
+    let after = with_parts(&before, &parts, &options);
     let sigmas = told.iter().filter_map(|pair| rivals.apart(&after, *pair)).map(|apart| apart.sigmas);
     let sigmas = sigmas.fold(f64::INFINITY, f64::min);
     let (what, predicts) = predictions(base, &without, &rivals, &before, &told, &parts, setting)

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::library::{Manoeuvre, library};
 use super::setting::{Limits, Setting};
-use super::weigh::{Frame, with_runs};
+use super::weigh::{Frame, with_parts, with_runs};
 use super::words::Predictions;
 use super::{Part, evidences, words};
 use crate::blind::SHOWS;
@@ -170,16 +170,7 @@ fn pruned<'i>(
     shown: impl Fn(&Evidence) -> Vec<&'i str>,
 ) -> Evidence {
     let all = shown(after);
-    let of = |parts: &[Part]| {
-        let added: Vec<(&Evidence, f64)> = parts
-            .iter()
-            .filter_map(|part| {
-                let (_, evidence) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
-                Some((evidence, f64::from(part.pairs)))
-            })
-            .collect();
-        with_runs(before, &added)
-    };
+    let of = |parts: &[Part]| with_parts(before, parts, options);
     for place in (0..parts.len()).rev() {
         while parts[place].pairs > 0 {
             parts[place].pairs -= 1;

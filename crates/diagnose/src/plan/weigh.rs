@@ -7,6 +7,8 @@ use calib::likelihood::{Column, Evidence};
 use calib::methods::joint::JointFit;
 use nalgebra::{DMatrix, DVector};
 
+use super::Part;
+use super::library::Manoeuvre;
 use crate::candidate::Choice;
 use crate::scan::inverse;
 use crate::search::reach;
@@ -131,6 +133,18 @@ pub(crate) fn with_runs(before: &Evidence, added: &[(&Evidence, f64)]) -> Eviden
     let mut all = before.clone();
     added.iter().for_each(|(evidence, times)| all.add(evidence, *times));
     all
+}
+
+/// The same with the runs of a plan's parts, each made up among the options.
+pub(crate) fn with_parts(before: &Evidence, parts: &[Part], options: &[(Manoeuvre, Evidence)]) -> Evidence {
+    let added: Vec<(&Evidence, f64)> = parts
+        .iter()
+        .filter_map(|part| {
+            let (_, evidence) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
+            Some((evidence, f64::from(part.pairs)))
+        })
+        .collect();
+    with_runs(before, &added)
 }
 
 #[cfg(test)]

@@ -177,9 +177,7 @@ impl JointFit<'_> {
         let parts = match (apart, gate) {
             (Some(Apart::Run), gate) => self.blocks(&mut [], PARTS_OF_A_RUN, gate),
             (_, Gate::Shut) => self.units(),
-            (_, Gate::Open) => {
-                self.blocks(&mut [], if runs < LEAST_RUNS { LEAST_RUNS.div_ceil(runs) } else { 1 }, gate)
-            }
+            (_, Gate::Open) => self.blocks(&mut [], LEAST_RUNS.div_ceil(runs), gate),
         };
         // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
         let mut seen: Vec<((usize, usize), usize)> = Vec::new();
