@@ -67,11 +67,17 @@ impl JointFit<'_> {
         let parameters: usize = terms.iter().map(|term| term.parameters().len()).sum();
         let mut gradient = vec![Pose::IDENTITY; parameters];
         let mut found = Vec::new();
+        // Where the displacements of a run have led, the last piece, and the way of the session.
+        let mut trail: Option<(Pose, Option<Piece>, f64)> = None;
         for chain in &self.records.chains {
             let Some((start, first, last)) = chain.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
-            for term in terms.iter_mut() {
-                term.restart(chain.info);
+            let (run_from_chain, mut previous, mut session_m) =
+                trail.take().filter(|_| chain.goes_on).unwrap_or((Pose::IDENTITY, None, chain.session_m));
+            if !chain.goes_on {
+                for term in terms.iter_mut() {
+                    term.restart(chain.info);
+                }
             }
             let twist = |piece: &Piece| {
                 let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -84,7 +90,7 @@ impl JointFit<'_> {
                              piece: Option<&Piece>,
                              gradient: &mut [Pose]| {
                 let twist = piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, twist);
-                let look = Look { t_s, world_from_body: body, twist, run: chain.info };
+                let look = Look { t_s, world_from_body: run_from_chain * body, twist, run: chain.info };
                 gradient.fill(Pose::IDENTITY);
                 each(terms, gradient, |term, own| term.sight(&look, own));
                 let off = weighed(gradient, &model.sizes);
@@ -95,8 +101,7 @@ impl JointFit<'_> {
             let mounted = start * body_from_sensor.inverse();
             let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
             let mut pose = mounted * add(off, late).inverse();
-            let mut previous: Option<Piece> = None;
-            let (mut session_m, mut wheel_rad, mut length_m) = (chain.session_m, chain.wheel_rad, 0.0);
+            let (mut wheel_rad, mut length_m) = (chain.wheel_rad, 0.0);
             for piece in &chain.pieces[first.1..] {
                 let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
                 let mut increment = Increment::from_travel(travel_m, model.separation_m);
@@ -104,13 +109,14 @@ impl JointFit<'_> {
                 let interval = Interval {
                     t_s: piece.t_s,
                     dt_s: piece.dt_s,
+                    row_s: piece.row_s,
                     travel_m,
                     previous_m: model.m_per_rad.zip_with(before.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
                     previous_dt_s: before.dt_s,
                     wheel_separation_m: model.separation_m,
                     wheel_rad,
                     turned_rad: piece.wheel_rad,
-                    world_from_body: pose,
+                    world_from_body: run_from_chain * pose,
                     session_m,
                     run: chain.info,
                 };
@@ -127,6 +133,7 @@ impl JointFit<'_> {
             }
             let (off, late) = seen_from(terms, last.0, pose, chain.pieces.last(), &mut gradient);
             let seen = pose * add(off, late) * body_from_sensor;
+            trail = Some((run_from_chain * pose * body_from_sensor, previous, session_m));
             found.push(EndError {
                 run: chain.run,
                 position_m: seen.position().distance_m(last.1.position()),

@@ -9,7 +9,7 @@ use kinematics::{Count, Twist, Wheels};
 use crate::likelihood::Piece;
 
 /// An instant may miss a row by the rounding of its file.
-const SAME_INSTANT_S: f64 = 1e-9;
+pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
 
 /// Turns of both wheels since a run's first row.
 #[derive(Debug, Clone)]
@@ -164,17 +164,18 @@ impl Cursor<'_, '_> {
         let Some(mut angle) = self.angle_rad(from_s) else { return false };
         let (mut at_s, mut row) = (from_s, self.row);
         let Some(end) = self.angle_rad(to_s).filter(|_| to_s > from_s) else { return false };
-        let mut push = |t_s: f64, next: Wheels<f64>| {
+        let rows_s = self.track.t_s;
+        let mut push = |t_s: f64, next: Wheels<f64>, row: usize| {
             let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
-            pieces.push(Piece { t_s: at_s, dt_s: t_s - at_s, wheel_rad });
+            let row_s = [rows_s[row], rows_s.get(row + 1).copied().unwrap_or(t_s)];
+            pieces.push(Piece { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
             (at_s, angle) = (t_s, next);
         };
-        let rows_s = self.track.t_s;
         while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
             row += 1;
-            push(rows_s[row], self.track.row_rad(row));
+            push(rows_s[row], self.track.row_rad(row), row - 1);
         }
-        push(to_s, end);
+        push(to_s, end, row);
         if self.track.continuous || pieces.len() - before == 1 {
             return true;
         }

@@ -7,13 +7,15 @@ use kinematics::{Increment, Pose, Twist, Wheels};
 
 use crate::record::RunInfo;
 
-/// One interval between two recorded rows.
+/// One interval between two recorded rows, or a part of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Interval<'r> {
     /// Its start, seconds from the run's start.
     pub t_s: f64,
     /// Length, seconds.
     pub dt_s: f64,
+    /// Start and end of the logged interval of which it is a part, or the whole: a look between two rows cuts it.
+    pub row_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
     /// Travel of each wheel in the interval before, by the same, metres; zero at the start of a run.

@@ -44,25 +44,26 @@ pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that makes the data far likelier, if there is one.
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one.
 pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: &[String]) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
-    let mut best: Option<Fault> = None;
-    for id in CATALOGUE.iter().filter(|id| !without.iter().any(|out| out == *id)) {
+    let mut best: Option<(bool, Fault)> = None;
+    // The most specific trace first: jumps that are undone at once are also wraps.
+    for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
         let Some(Hypothesis::Records(rewritings)) = hypothesis(id) else { continue };
         if sound && ALWAYS_POSSIBLE.contains(id) {
             continue;
         }
-        for (sizes, sentence, records) in together(datasets, rewritings) {
+        for Form { sizes, sentence, evident, records } in together(datasets, rewritings) {
             let own = sessions(&records);
             let Ok(fit) = PLAIN.fit(&own) else { continue };
-            // Records that no plausible drive follows, rewritten or not, say nothing of the fault. What was lost is not restored to the last count: looks may still
-            // lie off, but far fewer of them.
+            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not
+            // restored to the last count: looks may still lie off, but far fewer of them.
             let most_outliers = base.map_or(OUTLIERS, |base| OUTLIERS.max(STILL_OFF * left_out(base)));
-            if !is_drive(&fit)
-                || left_out(&fit) >= most_outliers
-                || fit.fit.model.body_from_sensor.theta_rad.abs() > MOST_TURNED_RAD
-            {
+            let follows = is_drive(&fit)
+                && left_out(&fit) < most_outliers
+                && fit.fit.model.body_from_sensor.theta_rad.abs() <= MOST_TURNED_RAD;
+            if !follows && !evident {
                 continue;
             }
             let gain = base.map_or(f64::MAX, |base| {
@@ -70,12 +71,16 @@ pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: 
                 let looks = count(base).max(count(&fit));
                 cost(base, looks) + implausible(base) - cost(&fit, looks) - implausible(&fit)
             });
-            if gain > GAIN && best.as_ref().is_none_or(|best| gain > best.gain) {
-                best = Some(Fault { id, sizes, sentence, records, gain });
+            // What the log shows needs no instrument; one must not contradict it.
+            let least = if evident { -GAIN } else { GAIN };
+            let better =
+                |(shown, known): &(bool, Fault)| (evident, gain) > (*shown, known.gain + f64::from(u8::from(*shown)));
+            if gain > least && best.as_ref().is_none_or(better) {
+                best = Some((evident, Fault { id, sizes, sentence, records, gain: gain.max(GAIN) }));
             }
         }
     }
-    best
+    best.map(|(_, fault)| fault)
 }
 
 /// Faults that any records may have; they are tried where the base fit is hard to believe. The others look for their own traces.
@@ -115,30 +120,56 @@ fn is_drive(fit: &JointFit<'_>) -> bool {
         && fit.fit.converged
 }
 
-/// A form of a fault: its sizes, what it is, and the records without it.
-type Form = (Vec<(&'static str, f64)>, String, Vec<Dataset>);
+/// A form of a fault.
+struct Form {
+    sizes: Vec<(&'static str, f64)>,
+    sentence: String,
+    /// The log of some session shows it by itself.
+    evident: bool,
+    /// The records without it.
+    records: Vec<Dataset>,
+}
 
-/// The same rewriting of all sessions, by its sizes; a session in which it is impossible stays as it is.
+/// Factors of sessions that were estimated, each for itself, agree within this.
+const SAME_FACTOR: f64 = 0.05;
+
+/// Whether two sessions' rewritings undo the same fault. How often it strikes may differ.
+fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
+    let same = |(a, b): (&(&str, f64), &(&str, f64))| {
+        a.0 == b.0 && (a.0 == "probability" || (a.1 - b.1).abs() <= SAME_FACTOR * a.1.abs())
+    };
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}
+
+/// The same rewriting of all sessions; a session in which it is impossible stays as it is.
 fn together(datasets: &[Dataset], rewritings: fn(&Dataset) -> Vec<Rewriting>) -> Vec<Form> {
     let each: Vec<Vec<Rewriting>> = datasets.iter().map(rewritings).collect();
-    let mut forms: Vec<(Vec<(&'static str, f64)>, String)> = Vec::new();
+    let mut forms: Vec<Form> = Vec::new();
     for rewriting in each.iter().flatten() {
-        if forms.iter().all(|(sizes, _)| *sizes != rewriting.sizes) {
-            forms.push((rewriting.sizes.clone(), rewriting.sentence.clone()));
+        match forms.iter_mut().find(|form| is_same(&form.sizes, &rewriting.sizes)) {
+            Some(form) => {
+                form.evident |= rewriting.evident;
+                if form.sentence != rewriting.sentence {
+                    form.sentence = format!("{}; {}", form.sentence, rewriting.sentence);
+                }
+            }
+            None => forms.push(Form {
+                sizes: rewriting.sizes.clone(),
+                sentence: rewriting.sentence.clone(),
+                evident: rewriting.evident,
+                records: Vec::new(),
+            }),
         }
     }
+    for form in &mut forms {
+        form.records = datasets
+            .iter()
+            .zip(&each)
+            .map(|(dataset, own)| {
+                let same = own.iter().find(|rewriting| is_same(&form.sizes, &rewriting.sizes));
+                same.map_or_else(|| dataset.clone(), |rewriting| rewriting.records.clone())
+            })
+            .collect();
+    }
     forms
-        .into_iter()
-        .map(|(sizes, sentence)| {
-            let records = datasets
-                .iter()
-                .zip(&each)
-                .map(|(dataset, own)| {
-                    let same = own.iter().find(|rewriting| rewriting.sizes == sizes);
-                    same.map_or_else(|| dataset.clone(), |rewriting| rewriting.records.clone())
-                })
-                .collect();
-            (sizes, sentence, records)
-        })
-        .collect()
 }

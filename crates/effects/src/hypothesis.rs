@@ -49,6 +49,8 @@ pub struct Rewriting {
     pub sizes: Vec<(&'static str, f64)>,
     /// What the fault was, for people: "the left and the right counter are swapped".
     pub sentence: String,
+    /// Whether the log itself shows the fault, whatever an instrument saw.
+    pub evident: bool,
     /// The records as they would be without it.
     pub records: Dataset,
 }

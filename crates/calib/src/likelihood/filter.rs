@@ -131,6 +131,7 @@ pub(crate) fn pass(
     for (phase, selection) in selections.iter().enumerate() {
         let mut innovations = Vec::new();
         let mut position = 0;
+        let mut trail: Option<Trail> = None;
         for (number, (chain, legs)) in records.chains.iter().zip(&selection.legs).enumerate() {
             if phase == 0 && result.runs.last().is_none_or(|run| run.run != chain.run) {
                 result.runs.push(Evidence::new(chain.run, columns));
@@ -138,11 +139,20 @@ pub(crate) fn pass(
             while result.runs[position].run != chain.run {
                 position += 1;
             }
-            if legs.is_empty() {
+            let unseen = legs.is_empty();
+            // Terms remember what was driven on the way to the next displacement, seen or not.
+            if unseen && (terms.is_empty() || chain.start == Start::Seen) {
                 continue;
             }
             let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
+            if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
+                filter.go_on(trail);
+            }
             filter.run(legs, free_headings[number]);
+            trail = Some(filter.trail());
+            if unseen {
+                continue;
+            }
             let Filter { sums, outliers, innovations: of_chain, noise_score: of_noise, .. } = filter;
             innovations.extend(of_chain);
             if phase == 0 {
@@ -165,6 +175,15 @@ pub(crate) fn pass(
     result
 }
 
+/// Where the displacements of a run have led: the next one's terms go on from there.
+#[derive(Debug, Clone, Copy)]
+struct Trail {
+    /// The next chain's frame in that of the first.
+    run_from_chain: Pose,
+    session_m: f64,
+    previous: Option<Piece>,
+}
+
 struct Filter<'f, 'a> {
     chain: &'f Chain<'a>,
     number: usize,
@@ -173,6 +192,8 @@ struct Filter<'f, 'a> {
     noise: &'f Noise,
     terms: &'f mut [Box<dyn ModelTerm>],
     want: Want,
+    /// The chain's frame in that of the run's displacements; the identity for poses.
+    run_from_chain: Pose,
     pose: Pose,
     covariance: Matrix3<f64>,
     /// ∂pose/∂column.
@@ -182,6 +203,7 @@ struct Filter<'f, 'a> {
     session_m: f64,
     wheel_rad: Wheels<f64>,
     previous: Option<Piece>,
+    goes_on: bool,
     gradients: Vec<Pose>,
     sums: Sums,
     innovations: Vec<Innovation>,
@@ -217,6 +239,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             noise,
             terms,
             want,
+            run_from_chain: Pose::IDENTITY,
             pose: Pose::IDENTITY,
             covariance: Matrix3::zeros(),
             by: vec![Vector3::zeros(); all],
@@ -225,6 +248,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             session_m: chain.session_m,
             wheel_rad: chain.wheel_rad,
             previous: None,
+            goes_on: false,
             gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
             sums: Sums::new(columns),
             innovations: Vec::new(),
@@ -234,13 +258,37 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
+    /// Goes on where the chain before ended.
+    fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
+        (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
+        self.goes_on = true;
+    }
+
+    /// Where this chain ended.
+    fn trail(&self) -> Trail {
+        let run_from_sensor = self.run_from_chain * self.pose * self.instrument.body_from_sensor;
+        Trail { run_from_chain: run_from_sensor, session_m: self.session_m, previous: self.previous }
+    }
+
     fn run(&mut self, legs: &[Leg], free_heading_rad: f64) {
-        for term in self.terms.iter_mut() {
-            term.restart(self.chain.info);
+        if !self.goes_on {
+            for term in self.terms.iter_mut() {
+                term.restart(self.chain.info);
+            }
         }
+        let Some(first) = legs.first() else {
+            let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
+            self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), start_s);
+            let pieces = 0..self.chain.pieces.len();
+            self.predict(&Leg { pieces, from: 0, look: 0, noise: [Matrix3::zeros(); 2] });
+            return;
+        };
         match self.chain.start {
-            Start::Seen => self.start_at(legs[0].from, legs[0].pieces.start, free_heading_rad),
-            Start::Origin => self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), 0.0),
+            Start::Seen => self.start_at(first.from, first.pieces.start, free_heading_rad),
+            Start::Origin => {
+                let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
+                self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), start_s);
+            }
         }
         let mut lost = 0;
         for leg in legs {
@@ -323,7 +371,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         if self.gradients.is_empty() {
             return Vec::new();
         }
-        let look = Look { t_s, world_from_body: self.pose, twist, run: self.chain.info };
+        let world_from_body = self.run_from_chain * self.pose;
+        let look = Look { t_s, world_from_body, twist, run: self.chain.info };
         self.gradients.fill(Pose::IDENTITY);
         let mut rest = &mut self.gradients[..];
         for term in self.terms.iter_mut() {
@@ -398,13 +447,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         let interval = Interval {
             t_s: piece.t_s,
             dt_s: piece.dt_s,
+            row_s: piece.row_s,
             travel_m,
             previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
             previous_dt_s: previous.dt_s,
             wheel_separation_m: self.model.separation_m,
             wheel_rad: self.wheel_rad,
             turned_rad: piece.wheel_rad,
-            world_from_body: self.pose * before,
+            world_from_body: self.run_from_chain * self.pose * before,
             session_m: self.session_m,
             run: self.chain.info,
         };

@@ -1,13 +1,14 @@
 //! Runs as chains: how the wheels turned, cut at the instants at which the instrument looked, and what it saw.
 //!
 //! Poses and positions make one chain a run and start free at its first look; where the log does not reach from one look to the next, a new chain begins. A
-//! displacement is a chain of its own: it starts where the instrument stood, which is known exactly in its own frame.
+//! displacement is a chain of its own: it starts where the instrument stood, which is known exactly in its own frame. Displacements that follow each other
+//! lead through the run: what goes with the heading in the room, or remembers, goes on from one to the next.
 
 use dataset::{RunInfo, Session};
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use super::model::Model;
-use crate::wheel_track::WheelTrack;
+use crate::wheel_track::{SAME_INSTANT_S, WheelTrack};
 
 /// A stretch of constant wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +17,8 @@ pub(crate) struct Piece {
     pub(crate) dt_s: f64,
     /// Turn of each wheel, radians.
     pub(crate) wheel_rad: Wheels<f64>,
+    /// Start and end of the logged interval of which it is a part, or the whole.
+    pub(crate) row_s: [f64; 2],
 }
 
 /// A motion whose chord is less than this share of its way hardly shows where it went.
@@ -49,6 +52,8 @@ pub struct Chain<'a> {
     /// The run.
     pub info: &'a RunInfo,
     pub(crate) start: Start,
+    /// It starts where the chain before it ended: a displacement after a displacement.
+    pub(crate) goes_on: bool,
     pub(crate) pieces: Vec<Piece>,
     pub(crate) looks: Vec<Seen>,
     /// Angle of each wheel at the first piece, by its counter, radians.
@@ -68,7 +73,7 @@ impl Chain<'_> {
                 let first = self.looks.first()?;
                 (pose(first)?, (first.t_s, first.after))
             }
-            Start::Origin => (Pose::IDENTITY, (0.0, 0)),
+            Start::Origin => (Pose::IDENTITY, (self.pieces.first()?.t_s, 0)),
         };
         Some((start, first, (last.t_s, pose(last)?)))
     }
@@ -116,6 +121,7 @@ impl<'a> Records<'a> {
                         run: (number, position),
                         info: run.info(),
                         start: Start::Seen,
+                        goes_on: false,
                         pieces: Vec::new(),
                         looks: Vec::new(),
                         wheel_rad: track.first_rad(),
@@ -246,6 +252,7 @@ fn begin<'a>(
 
 fn add_displacements<'a>(chains: &mut Vec<Chain<'a>>, base: &Chain<'a>, track: &WheelTrack<'_>, run: &dataset::Run) {
     let mut cursor = track.cursor();
+    let mut last_s = f64::NEG_INFINITY;
     for seen in &run.displacements {
         let Some(turned_rad) = cursor.angle_rad(seen.t0_s) else { continue };
         let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
@@ -259,7 +266,9 @@ fn add_displacements<'a>(chains: &mut Vec<Chain<'a>>, base: &Chain<'a>, track: &
                 theta_rad: Some(pose.theta_rad),
                 after: pieces.len(),
             };
-            chains.push(Chain { start: Start::Origin, pieces, looks: vec![look], wheel_rad, ..base.clone() });
+            let goes_on = (seen.t0_s - last_s).abs() <= SAME_INSTANT_S;
+            last_s = seen.t1_s;
+            chains.push(Chain { start: Start::Origin, goes_on, pieces, looks: vec![look], wheel_rad, ..base.clone() });
         }
     }
 }

@@ -66,6 +66,7 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     let without = |bits: u8| Rewriting {
         sizes: vec![("bits", f64::from(bits))],
         sentence: format!("the log keeps {bits} bits of the counters, which wrap"),
+        evident: true,
         records: rewrite_wheels(
             dataset,
             |wheels| {

@@ -46,7 +46,10 @@ impl PhysicalEffect for IntervalError {
 
     /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { share: size(sizes, "share")?.min(1.0), jitter_s: size(sizes, "jitter_s").unwrap_or(USUAL_JITTER_S) })
+        Some(Self {
+            share: size(sizes, "share")?.min(1.0),
+            jitter_s: size(sizes, "jitter_s").unwrap_or(USUAL_JITTER_S),
+        })
     }
 }
 
@@ -84,6 +87,8 @@ struct Term {
     rows: VecDeque<(f64, f64)>,
     /// How late the last row was by its beat; 0 while there is none.
     late_s: f64,
+    /// End of the logged interval whose parts come in, and by which share of it what came before its end was late.
+    row: Option<(f64, f64)>,
 }
 
 impl Term {
@@ -115,33 +120,47 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let (row_s, line) = (interval.t_s + interval.dt_s, self.line());
+        let [from_s, row_s] = interval.row_s;
+        let share = match self.row {
+            Some((known_s, share)) if known_s == row_s => share,
+            _ => {
+                let share = self.next_row(from_s, row_s);
+                self.row = Some((row_s, share));
+                share
+            }
+        };
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
+    }
+}
+
+impl Term {
+    /// Takes a row: by which share of its length the interval that ends there is late.
+    fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
+        let line = self.line();
         let Some(&(last, last_s)) = self.rows.back() else {
-            self.rows.extend([(0.0, interval.t_s), (1.0, row_s)]);
-            return;
+            self.rows.extend([(0.0, from_s), (1.0, row_s)]);
+            return 0.0;
         };
         let gaps_s = || self.rows.iter().zip(self.rows.range(1..)).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).collect();
-        let Some(between_s) = line.map(|(_, between_s)| between_s).or_else(|| median(gaps_s())) else { return };
+        let Some(between_s) = line.map(|(_, between_s)| between_s).or_else(|| median(gaps_s())) else { return 0.0 };
         let beats = ((row_s - last_s) / between_s).round();
         if beats < 1.0 {
-            return; // Between two beats: the row of a standstill.
+            return 0.0; // Between two beats: the row of a standstill.
         }
         let late_s = line.map(|(zero_s, between_s)| row_s - zero_s - (last + beats) * between_s);
         if late_s.is_some_and(|late_s| late_s.abs() > MISSED * between_s) {
-            *self = Self { rows: VecDeque::from([(-1.0, row_s - between_s), (0.0, row_s)]), late_s: 0.0 };
-            return;
+            *self = Self { rows: VecDeque::from([(-1.0, row_s - between_s), (0.0, row_s)]), ..Self::default() };
+            return 0.0;
         }
-        if let Some(late_s) = late_s {
-            // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
-            // logged, speeds would average too low.
-            let share = (late_s - self.late_s) / (beats * between_s);
-            gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
-        }
+        // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
+        // logged, speeds would average too low.
+        let share = late_s.map_or(0.0, |late_s| (late_s - self.late_s) / (beats * between_s));
         self.late_s = late_s.unwrap_or(0.0);
         self.rows.push_back((last + beats, row_s));
         if self.rows.len() > *ROWS.end() {
             self.rows.pop_front();
         }
+        share
     }
 }
 

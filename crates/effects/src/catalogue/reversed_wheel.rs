@@ -83,6 +83,7 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
         Rewriting {
             sizes: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
             sentence: sentence.to_owned(),
+            evident: false,
             records: rewrite_wheels(dataset, turned, twist),
         }
     };

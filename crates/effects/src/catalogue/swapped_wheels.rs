@@ -61,6 +61,7 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     vec![Rewriting {
         sizes: vec![("swapped", 1.0)],
         sentence: "the left and the right counter are swapped".to_owned(),
+        evident: false,
         records: rewrite_wheels(dataset, changed, turned),
     }]
 }

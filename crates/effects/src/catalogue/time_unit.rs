@@ -4,7 +4,7 @@
 //! without it have the times of the log, or those of the instrument, divided. Observability: the record itself. Alias: none.
 //! Reference: what importers meet; ROS headers in nanoseconds, Arduino's millis() and micros().
 
-use dataset::{Dataset, Run};
+use dataset::{Dataset, Odometry, Run, WheelLog};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
@@ -76,11 +76,41 @@ fn ratio_of_spans(dataset: &Dataset) -> Option<f64> {
     median(dataset.runs.iter().filter_map(ratio).collect())
 }
 
+/// Speed of a usual robot, m/s.
+const USUAL_M_S: f64 = 0.3;
+
+/// How far, in logarithms, the robot's mean speed by its log is from a usual robot's.
+fn off_usual(dataset: &Dataset) -> f64 {
+    let robot = &dataset.robot;
+    let m_per_rad = 0.25 * (robot.left_wheel_diameter_m + robot.right_wheel_diameter_m);
+    let (mut way_m, mut time_s) = (0.0, 0.0);
+    for Odometry { t_s, wheels, .. } in dataset.runs.iter().map(|run| &run.odometry) {
+        let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
+        #[allow(clippy::cast_precision_loss)] // far under 2⁵³ counts
+        let turned_rad = match wheels {
+            WheelLog::Ticks(ticks) => {
+                let counted =
+                    |column: &[i64]| column.windows(2).map(|pair| pair[1].abs_diff(pair[0])).sum::<u64>() as f64;
+                let rad = robot.ticks_per_rev.map_or(0.0, |ticks_per_rev| std::f64::consts::TAU / ticks_per_rev);
+                0.5 * rad * (counted(&ticks.left) + counted(&ticks.right))
+            }
+            WheelLog::Angles(angles) => {
+                let turned = |column: &[f64]| column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
+                0.5 * (turned(&angles.left) + turned(&angles.right))
+            }
+            // Speeds are logged: the same whatever the unit of time.
+            WheelLog::Twist { .. } => return 0.0,
+        };
+        way_m += m_per_rad * turned_rad;
+        time_s += length_s;
+    }
+    if way_m > 0.0 && time_s > 0.0 { (way_m / time_s / USUAL_M_S).ln().abs() } else { 0.0 }
+}
+
 fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     let Some(ratio) = ratio_of_spans(dataset) else { return Vec::new() };
     let near = |factor: &f64| ratio / factor < WITHIN && factor / ratio < WITHIN;
     let Some(factor) = FACTORS.into_iter().find(near) else { return Vec::new() };
-    // Which of the two is in seconds, the ratio does not say.
     let (mut log, mut looks) = (dataset.clone(), dataset.clone());
     for run in &mut log.runs {
         run.odometry.t_s.iter_mut().for_each(|t_s| *t_s /= factor);
@@ -93,11 +123,15 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
             (seen.t0_s, seen.t1_s) = (seen.t0_s * factor, seen.t1_s * factor);
         }
     }
-    [(log, factor, "the log's"), (looks, factor.recip(), "the instrument's")]
+    let mut forms = [(log, factor, "the log's"), (looks, factor.recip(), "the instrument's")];
+    // Which of the two is in seconds, the ratio does not say; the speed does.
+    forms.sort_by(|a, b| off_usual(&a.0).total_cmp(&off_usual(&b.0)));
+    forms
         .into_iter()
         .map(|(records, factor, whose)| Rewriting {
             sizes: vec![("factor", factor)],
             sentence: format!("{whose} times are off by a factor of {factor:e}"),
+            evident: true,
             records,
         })
         .collect()

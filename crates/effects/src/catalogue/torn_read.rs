@@ -157,6 +157,9 @@ fn undone(jumps: &[f64]) -> Option<usize> {
     None
 }
 
+/// Jumps of just a torn byte that are undone at once: one may be an accident, two are none.
+const EVIDENT: usize = 2;
+
 fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     let without = |jump: i64| {
         let (mut mended, mut samples) = (0, 0);
@@ -171,6 +174,7 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
         (mended > 0).then(|| Rewriting {
             sizes: vec![("probability", mended as f64 / samples as f64), ("jump_counts", jump as f64)],
             sentence: format!("{mended} counts were torn while they were read, off by {jump}"),
+            evident: mended >= EVIDENT,
             records,
         })
     };

@@ -155,6 +155,7 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     vec![Rewriting {
         sizes: vec![("factor", factor)],
         sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
+        evident: false,
         records,
     }]
 }
