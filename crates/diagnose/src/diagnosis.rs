@@ -14,7 +14,7 @@ use crate::candidate::{Choice, mean_terms};
 use crate::checks::{Checked, check};
 use crate::document::{Document, Finding, Gain, Verdict};
 use crate::gain::gain;
-use crate::gross::{Fault, fault, left_out, sessions};
+use crate::gross::{Fault, fault, follows, left_out, sessions};
 use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
@@ -220,7 +220,9 @@ fn continued(
     options: &Options,
     limits: &Limits,
 ) -> Diagnosis {
-    let catalogue = mean_terms(&options.without);
+    // Where the counts do not follow the robot at all, no small effect has a meaning.
+    let lost = !follows(&base);
+    let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
     let asked = ask(datasets, base, &catalogue);
     let mut findings: Vec<Finding> = fault.map(naming::of_fault).into_iter().collect();
     findings.extend(naming::of_search(&asked.found));
@@ -232,7 +234,9 @@ fn continued(
     }
     // Counts that were lost are restored roughly: what lies far off by them has its name already.
     let restored = fault.is_some_and(|fault| fault.id == "dropped_samples");
-    if !restored {
+    if lost {
+        findings.extend(naming::of_lost(&asked.base));
+    } else if !restored {
         findings.extend(scatter(&asked, options));
     }
     // Something is left that no name explains; a failed check that a scatter explains has its name already.

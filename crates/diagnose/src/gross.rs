@@ -3,6 +3,7 @@
 //! A factor on both wheels is no matter of the likelihood, which fits any lengths: how plausible the fitted lengths are decides. A fault that a fit
 //! hides is worse than none.
 
+use calib::likelihood::NoiseComponent;
 use calib::methods::joint::{Joint, JointFit};
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
@@ -20,6 +21,8 @@ const MOUNT_SD_RAD: f64 = 0.3;
 const WHEEL_SIGMA: f64 = 0.01;
 /// The same of turns, rad/√rad.
 const TURN_SIGMA: f64 = 0.05;
+/// So many times as much and the counts do not follow the robot at all.
+const LOST: f64 = 3.0;
 /// A share of looks that do not fit beyond which something is wrong with the records.
 const OUTLIERS: f64 = 0.01;
 /// Share of the looks that did not fit before which may still not fit in records that are rewritten.
@@ -84,7 +87,7 @@ pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: 
 }
 
 /// Faults that any records may have; they are tried where the base fit is hard to believe. The others look for their own traces.
-const ALWAYS_POSSIBLE: [&str; 4] = ["swapped_wheels", "reversed_wheel", "wrong_counts_per_turn", "time_unit"];
+const ALWAYS_POSSIBLE: [&str; 3] = ["swapped_wheels", "reversed_wheel", "wrong_counts_per_turn"];
 
 /// How implausible the lengths of a fit are, as a part of its cost.
 fn implausible(fit: &JointFit<'_>) -> f64 {
@@ -108,6 +111,12 @@ fn is_sound(fit: &JointFit<'_>) -> bool {
     is_drive(fit) && left_out(fit) < OUTLIERS
 }
 
+/// Does the robot go where a drive of any lengths would, by the counts?
+pub(crate) fn follows(fit: &JointFit<'_>) -> bool {
+    let sigma = |of| fit.fit.noise.sigma(of);
+    sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
+}
+
 /// Are a fit's lengths and noise those of a drive?
 fn is_drive(fit: &JointFit<'_>) -> bool {
     let (model, nominal) = (&fit.fit.model, &fit.nominal);
@@ -115,8 +124,8 @@ fn is_drive(fit: &JointFit<'_>) -> bool {
     near(model.m_per_rad.left, nominal.m_per_rad.left, 2.0 * WHEEL_SD)
         && near(model.m_per_rad.right, nominal.m_per_rad.right, 2.0 * WHEEL_SD)
         && near(model.separation_m, nominal.separation_m, 1.5 * SEPARATION_SD)
-        && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Wheel) < WHEEL_SIGMA
-        && fit.fit.noise.sigma(calib::likelihood::NoiseComponent::Turn) < TURN_SIGMA
+        && fit.fit.noise.sigma(NoiseComponent::Wheel) < WHEEL_SIGMA
+        && fit.fit.noise.sigma(NoiseComponent::Turn) < TURN_SIGMA
         && fit.fit.converged
 }
 

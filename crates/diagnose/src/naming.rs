@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use calib::likelihood::NoiseComponent;
+use calib::methods::joint::JointFit;
 use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
 
 use crate::candidate::Choice;
@@ -118,6 +120,17 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
         ),
         unlisted_term: None,
     })
+}
+
+/// The counts do not follow the robot, and no gross fault explains it.
+pub(crate) fn of_lost(base: &JointFit<'_>) -> Option<Finding> {
+    let sigma = |of| base.fit.noise.sigma(of);
+    let what = format!(
+        "the robot does not go where its wheels' counts say: to the best fit they err by {:.0} mm for each root of a metre and {:.0} mrad for each root of a radian",
+        1e3 * sigma(NoiseComponent::Wheel),
+        1e3 * sigma(NoiseComponent::Turn)
+    );
+    of_scatter(&[], 0.0, BTreeMap::new(), &what)
 }
 
 /// The finding of a gross fault.

@@ -82,6 +82,15 @@ impl Projection {
         Some(Self { gradient: free.transpose() * own.gradient, free, indices, inverse })
     }
 
+    /// The score of one run by some columns, with what the free columns' estimate takes of it, which all runs share, taken out.
+    pub(crate) fn score_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DVector<f64> {
+        let cross =
+            DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| all.information[(columns[i], self.indices[j])])
+                * &self.free;
+        let free = self.free.transpose() * DVector::from_fn(self.indices.len(), |j, _| run.gradient[self.indices[j]]);
+        DVector::from_fn(columns.len(), |i, _| run.gradient[columns[i]]) - cross * &self.inverse * free
+    }
+
     pub(crate) fn of_columns(&self, evidence: &Evidence, columns: &[usize]) -> Projected {
         let cross = DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| {
             evidence.information[(columns[i], self.indices[j])]
@@ -115,6 +124,28 @@ pub(crate) fn principal(
     let scaled_gradient = gradient.component_mul(&plausible);
     let eigen = scaled.symmetric_eigen();
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
+}
+
+/// Scales of the prior of sizes: what is plausible, halved again and again.
+const SCALES: i32 = 11;
+
+/// Log of the chance of the data with some sizes free over that with the best ones: what their freedom costs, and how well they agree with what is plausible.
+///
+/// Sizes are normal about zero with a scale of their own, which is anything from what is plausible down to a thousandth of it with even chances in its logarithm (a
+/// mixture of g-priors; Liang et al. 2008): a small effect is not less likely because a large one would have been plausible. `directions` are principal ones: the
+/// information of a plausible size, and the χ² that the direction explains.
+pub(crate) fn log_weight(directions: &[(f64, f64)]) -> f64 {
+    let at = |scale: i32| -> f64 {
+        let square = 0.25_f64.powi(scale);
+        let of = |(value, explained): &(f64, f64)| {
+            -0.5 * explained / (1.0 + square * value) - 0.5 * (square * value).ln_1p()
+        };
+        directions.iter().map(of).sum()
+    };
+    let all: Vec<f64> = (0..SCALES).map(at).collect();
+    let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = all.iter().map(|weight| (weight - most).exp()).sum();
+    most + (sum / f64::from(SCALES)).ln()
 }
 
 /// How many values the noise was estimated from, after the free columns.
@@ -151,17 +182,16 @@ fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> V
             at += parameters.len();
             let Projected { information, gradient, share } = projection.of_columns(&evidence, &columns);
             let shown = share.iter().any(|share| *share > ROUNDING);
-            let (mut statistic, mut dimensions, mut log_odds) = (0.0, 0, 0.0);
+            let mut directions = Vec::new();
             if shown {
-                for (value, gradient) in principal(&information, &gradient, parameters) {
-                    if value < LEAST_SHOWN * LEAST_SHOWN {
-                        continue;
-                    }
-                    dimensions += 1;
-                    statistic += shrink * gradient * gradient / value;
-                    log_odds += 0.5 * shrink * gradient * gradient / (value + 1.0) - 0.5 * (1.0 + value).ln();
-                }
+                directions = principal(&information, &gradient, parameters);
+                directions.retain(|(value, _)| *value >= LEAST_SHOWN * LEAST_SHOWN);
             }
+            let dimensions = directions.len();
+            let explained: Vec<(f64, f64)> =
+                directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
+            let statistic = explained.iter().map(|(_, explained)| explained).sum();
+            let log_odds = 0.5 * statistic + log_weight(&explained);
             let p_value = p_of_statistic(statistic, dimensions, freedom);
             Scored { choice: choice.clone(), parameters, information, dimensions, statistic, p_value, log_odds }
         })

@@ -5,8 +5,8 @@ use nalgebra::DVector;
 
 use crate::candidate::{Choice, terms};
 use crate::gain::gain;
-use crate::scan::{Projection, Scored, inverse, principal, scan, total};
-use crate::statistics::{of_trials, p_of_statistic};
+use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
+use crate::statistics::{of_trials, p_of_statistic, p_of_student};
 
 /// Family-wise rate of false alarms of the scan over the catalogue.
 pub(crate) const SCAN_LEVEL: f64 = 0.02;
@@ -35,8 +35,7 @@ pub(crate) fn evidence(base: &JointFit<'_>, model: &Extended<'_>) -> f64 {
 
 /// How well sizes agree with what is plausible, and what their freedom costs.
 fn weight(directions: &[(f64, f64)]) -> f64 {
-    let of = |(value, size): &(f64, f64)| -0.5 * size * size * value / (1.0 + value) - 0.5 * (1.0 + value).ln();
-    directions.iter().map(of).sum()
+    log_weight(&directions.iter().map(|(value, size)| (*value, size * size * value)).collect::<Vec<_>>())
 }
 
 /// Whether a choice's sizes make an effect that can be: a share that is lost is no gain. What is within its error of nothing counts as nothing.
@@ -100,6 +99,8 @@ pub(crate) struct Extended<'a> {
 pub(crate) struct Name {
     pub(crate) choice: Choice,
     pub(crate) log_odds: f64,
+    /// Log likelihood at its best, less what its freedom gains by chance, half of a χ² for each direction.
+    pub(crate) explains: f64,
 }
 
 /// What the search found.
@@ -172,6 +173,38 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     Some((test, directions))
 }
 
+/// With fewer runs they do not say how a size differs between them.
+const LEAST_RUNS: usize = 6;
+/// Chance at which a size that is none passes for one over the runs, once it has passed over the looks.
+const RUNS_LEVEL: f64 = 0.05;
+
+/// Whether a choice's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
+/// motion, looks that resemble each other), and a likelihood that takes looks for independent believes them too much.
+///
+/// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
+/// Liang & Zeger 1986.
+pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize) -> bool {
+    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    if runs.len() < LEAST_RUNS {
+        return true;
+    }
+    let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
+    let parameters = extended.choices[choice].parameters().len();
+    let first: usize = extended.choices[..choice].iter().map(|choice| choice.parameters().len()).sum();
+    let own: Vec<usize> = (0..parameters).map(|k| calib::likelihood::Column::Term(first + k).index()).collect();
+    let mut others = extended.fit.clone();
+    others.columns.retain(|column| !own.contains(&column.index()));
+    let Some(projection) = Projection::of(&others, &evidence) else { return false };
+    let information = projection.of_columns(&evidence, &own).information;
+    let sizes = DVector::from_fn(parameters, |k, _| extended.fit.fit.model.sizes[first + k]);
+    let stands = sizes.dot(&(&information * &sizes));
+    #[allow(clippy::cast_precision_loss)]
+    let n = runs.len() as f64;
+    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &evidence, &own).dot(&sizes).powi(2)).sum();
+    let t = stands / (squares * n / (n - 1.0)).sqrt();
+    t.is_nan() || p_of_student(t, n - 1.0) < RUNS_LEVEL
+}
+
 /// Refits a model with its choices; `None` when that diverges.
 pub(crate) fn refit<'a>(base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
     let mut all = terms(&choices);
@@ -211,7 +244,10 @@ fn rivals<'a>(
             #[allow(clippy::cast_precision_loss)]
             let trials = (shapes.map_or(1, |entry| entry.shapes.max(1)) as f64).ln();
             let log_odds = log_odds(base_cost, &extended, most, place) - trials;
-            (Name { choice, log_odds }, extended)
+            let directions = examine(&extended, place).map_or(0, |(_, directions)| directions.len());
+            #[allow(clippy::cast_precision_loss)] // a handful
+            let explains = base_cost - cost(&extended.fit, most) - 0.5 * directions as f64;
+            (Name { choice, log_odds, explains }, extended)
         })
         .collect();
     named.sort_by(|a, b| b.0.log_odds.total_cmp(&a.0.log_odds));
@@ -257,6 +293,10 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         if examine(&extended, place).is_none_or(|(test, _)| test.p_value * tests > SCAN_LEVEL) {
             break;
         }
+        // Nor an accident of a few runs: what differs from run to run is no size.
+        if !holds_over_runs(&extended, place) {
+            break;
+        }
         // Nor is a term that predicts unseen runs worse than none, or with which odometry drifts more for certain.
         if gain(&model, &extended).is_ok_and(|gain| {
             let score = gain.log_score_per_observation;
@@ -293,10 +333,10 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
             model = without;
             continue;
         }
-        let top = found[0].0.log_odds;
-        names.push(
-            found.iter().filter(|(name, _)| name.log_odds > top - reach(top)).map(|(name, _)| name.clone()).collect(),
-        );
+        let (top, most) = (found[0].0.log_odds, found.iter().map(|(name, _)| name.explains).fold(f64::MIN, f64::max));
+        // Neither what is plausible nor the prior of sizes may silence a name that explains as much.
+        let near = |name: &Name| name.log_odds > top - reach(top) || name.explains > most - reach(most);
+        names.push(found.iter().filter(|(name, _)| near(name)).map(|(name, _)| name.clone()).collect());
         model = found.swap_remove(0).1;
         place += 1;
     }

@@ -26,6 +26,11 @@ pub(crate) fn p_of_z(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| 2.0 * normal.sf(z.abs()))
 }
 
+/// Two-sided chance of a Student variable this far out.
+pub(crate) fn p_of_student(t: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| 2.0 * student.sf(t.abs()))
+}
+
 /// How far out a normal variable of this two-sided chance is.
 pub(crate) fn z_of_p(p: f64) -> f64 {
     std::f64::consts::SQRT_2 * erfc_inv(p.clamp(1e-300, 1.0))

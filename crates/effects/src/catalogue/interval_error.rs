@@ -37,7 +37,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None }))
+        Some(Box::new(State { size: *self, stream: None, last_s: f64::NEG_INFINITY }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -56,7 +56,12 @@ impl PhysicalEffect for IntervalError {
 struct State {
     size: IntervalError,
     stream: Option<Stream>,
+    /// The last stamp: no log goes back.
+    last_s: f64,
 }
+
+/// Rows that would be stamped out of order are stamped this much after one another, seconds.
+const NEXT_S: f64 = 1e-4;
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
@@ -64,13 +69,14 @@ impl Forward for State {
     }
 
     fn start_run(&mut self, stream: Stream) {
-        self.stream = Some(stream);
+        (self.stream, self.last_s) = (Some(stream), f64::NEG_INFINITY);
     }
 
     fn clock(&mut self, sample: &mut SampleClock) {
         let Some(stream) = &mut self.stream else { return };
-        let late_s = stream.uniform_about_zero(self.size.jitter_s);
+        let late_s = stream.uniform_about_zero(self.size.jitter_s).max(self.last_s + NEXT_S - sample.stamp_s);
         sample.stamp_s += late_s;
+        self.last_s = sample.stamp_s;
         sample.read_s = sample.read_s.map(|read_s| read_s + (1.0 - self.size.share) * late_s);
     }
 }
