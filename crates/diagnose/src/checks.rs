@@ -13,7 +13,7 @@ use crate::document::Check;
 use crate::scan::{Projected, Projection, freedom, principal, total};
 use crate::search::Extended;
 use crate::sparse::{Channel, Covariate, Sparse};
-use crate::statistics::{holm, p_of_chi_square, p_of_statistic, p_of_z};
+use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z};
 
 /// Family-wise rate of false alarms of all checks.
 pub(crate) const CHECKS_LEVEL: f64 = 0.01;
@@ -264,7 +264,6 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let Some(evidence) = total(&pass.runs) else { return };
     let Some(projection) = Projection::of(&model.fit, &evidence) else { return };
     let freedom = freedom(&model.fit, &evidence);
-    let shrink = freedom / evidence.count.max(1.0);
     let mut at = first;
     for (name, products) in &questions {
         let own = products.len() * Channel::ALL.len();
@@ -276,12 +275,12 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
         let (mut statistic, mut dimensions) = (0.0, 0);
         for (value, gradient) in principal(&information, &gradient, &parameters) {
             if value >= 1.0 {
-                statistic += shrink * gradient * gradient / value;
+                statistic += gradient * gradient / value;
                 dimensions += 1;
             }
         }
         if dimensions > 0 {
-            add(name, statistic, p_of_statistic(statistic, dimensions, freedom));
+            add(name, statistic, p_of_score(statistic, dimensions, evidence.count, freedom));
         }
     }
 }

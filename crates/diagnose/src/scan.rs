@@ -11,7 +11,7 @@ use dataset::TermParameter;
 use nalgebra::{DMatrix, DVector};
 
 use crate::candidate::{Choice, terms};
-use crate::statistics::p_of_statistic;
+use crate::statistics::p_of_score;
 
 /// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
 const LEAST_SHOWN: f64 = 1.0;
@@ -190,9 +190,9 @@ fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> V
             let dimensions = directions.len();
             let explained: Vec<(f64, f64)> =
                 directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
-            let statistic = explained.iter().map(|(_, explained)| explained).sum();
+            let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
             let log_odds = 0.5 * statistic + log_weight(&explained);
-            let p_value = p_of_statistic(statistic, dimensions, freedom);
+            let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
             Scored { choice: choice.clone(), parameters, information, dimensions, statistic, p_value, log_odds }
         })
         .collect()

@@ -16,6 +16,18 @@ pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) ->
     FisherSnedecor::new(dimensions, freedom.max(1.0)).map_or(1.0, |f| f.sf(statistic.max(0.0) / dimensions))
 }
 
+/// The same of a score's statistic, g'I⁻¹g, whose variance was estimated from `count` values that have what is tested in them: it is at most `count`, and what it
+/// leaves of that is what the variance should have been estimated from (exact for one variance: F of the regression).
+pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom: f64) -> f64 {
+    #[allow(clippy::cast_precision_loss)] // a handful of dimensions
+    let left = freedom - dimensions as f64;
+    if dimensions == 0 || !statistic.is_finite() || left < 1.0 {
+        return 1.0;
+    }
+    let share = (statistic / count.max(1.0)).clamp(0.0, 1.0 - 1e-9);
+    p_of_statistic(left * share / (1.0 - share), dimensions, left)
+}
+
 /// Chance of a χ² this large.
 pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom.max(1.0)).map_or(1.0, |chi| chi.sf(statistic.max(0.0)))

@@ -33,6 +33,9 @@ pub(crate) struct Drive<'a> {
     last_row_s: f64,
 }
 
+/// A stamp that jitters does not come before the last one: it is at least so much later, seconds.
+const NEXT_STAMP_S: f64 = 1e-6;
+
 /// The robot's own log: which row is due and which of its two readings are done.
 struct LogClock {
     interval_s: f64,
@@ -243,7 +246,9 @@ impl<'a> Drive<'a> {
         if !readout.written {
             return;
         }
-        self.run.odometry.t_s.push(stamp_s);
+        // Rows are stamped in the order in which they are written.
+        let before_s = self.run.odometry.t_s.last().map_or(f64::NEG_INFINITY, |before_s| before_s + NEXT_STAMP_S);
+        self.run.odometry.t_s.push(stamp_s.max(before_s));
         if let WheelLog::Ticks(ticks) = &mut self.run.odometry.wheels {
             ticks.left.push(readout.ticks.left);
             ticks.right.push(readout.ticks.right);

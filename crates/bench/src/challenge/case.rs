@@ -262,7 +262,7 @@ impl Case {
         let oracle =
             hidden.iter().enumerate().map(|(k, effect)| view(effect, k, &shown, both.as_ref(), &hidden)).collect();
         let best = both.as_ref().or(shown.first().and_then(Option::as_ref));
-        let best_drive = best.map(|shown| shown.best_drive(&truth));
+        let best_drive = best.map(Shown::best_drive);
         let datasets = drive(&robot.sessions, &sight, &all, true, 0)?;
         let held_out = if weak {
             let log =

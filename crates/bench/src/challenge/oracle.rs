@@ -1,7 +1,7 @@
 //! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
 //!
-//! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the true
-//! drive, then sees the effect's signature alone. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
+//! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the drive that
+//! fits best without the effect, then sees what of the signature the lengths leave. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
 //! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
 //! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
 //! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
@@ -33,7 +33,12 @@ struct Candidate {
 
 /// What noise-free runs show at the true drive.
 pub(crate) struct Shown {
+    /// At the lengths that a calibration without the effect would find: a turn lost all along a path is of second order in it before that.
     total: Evidence,
+    /// χ² of the signature at the true lengths.
+    at_truth: f64,
+    /// The drive with those lengths.
+    best: Model,
     candidates: Vec<Candidate>,
     free: Vec<usize>,
     /// ½ Σ e², e being the mean squared innovation of a run.
@@ -82,6 +87,18 @@ fn look(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<
     Some(Seen { total, z })
 }
 
+/// Steps of Gauss and Newton to the best lengths.
+const LENGTH_STEPS: usize = 3;
+
+/// The step of the lengths to their best, without any effect.
+fn to_best_lengths(total: &Evidence, at: &[usize]) -> Option<DVector<f64>> {
+    let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
+        LOUD * total.information[(at[i], at[j])] + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
+    });
+    let gradient = DVector::from_fn(at.len(), |i, _| LOUD * total.gradient[at[i]]);
+    Some(-(matrix.try_inverse()? * gradient))
+}
+
 /// ½ Σ e² over innovations, e being the mean square of a run's.
 fn scatter(z: &[((usize, usize), f64)]) -> f64 {
     z.chunk_by(|a, b| a.0 == b.0)
@@ -116,16 +133,25 @@ impl Shown {
                 terms.push(shape.term);
             }
         }
-        let model = Model::of(truth, at - Column::BASE.len());
-        let mut seen = look(datasets, &model, noise, &mut terms)?;
+        let free: Vec<usize> = Column::GEOMETRY.iter().map(|column| column.index()).collect();
+        let mut model = Model::of(truth, at - Column::BASE.len());
         let plain = look(without, &model, noise, &mut terms)?;
+        let mut at_truth = None;
+        let mut seen = look(datasets, &model, noise, &mut terms)?;
+        for _ in 0..LENGTH_STEPS {
+            at_truth.get_or_insert(LOUD * seen.total.chi_square);
+            let step = to_best_lengths(&seen.total, &free)?;
+            Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+            seen = look(datasets, &model, noise, &mut terms)?;
+        }
         if seen.z.len() == plain.z.len() {
             seen.total.gradient -= &plain.total.gradient;
             seen.z.iter_mut().zip(&plain.z).for_each(|(seen, plain)| seen.1 -= plain.1);
             seen.total.chi_square = seen.z.iter().map(|(_, z)| z * z).sum();
         }
-        let free = Column::GEOMETRY.iter().map(|column| column.index()).collect();
-        Some(Self { scatter: scatter(&seen.z), total: seen.total, candidates, free })
+        let at_truth = at_truth.unwrap_or(0.0);
+        let best = Model { sizes: Vec::new(), ..model };
+        Some(Self { scatter: scatter(&seen.z), total: seen.total, at_truth, best, candidates, free })
     }
 
     /// How much of χ² the lengths and some candidates take up at their best, and the candidates' sizes there with standard deviations.
@@ -157,7 +183,7 @@ impl Shown {
 
     /// Whether the drive's lengths take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
     pub(crate) fn is_taken_up_by_lengths(&self) -> bool {
-        self.noncentrality() < 0.01 * LOUD * self.total.chi_square
+        self.noncentrality() < 0.01 * self.at_truth
     }
 
     /// The shape of a name that takes up most, beside the lengths, and how much: noncentrality of the test by the hypothesis's own form.
@@ -241,17 +267,7 @@ impl Shown {
     }
 
     /// The lengths at their best, as the drive that a calibration without the effect would find.
-    pub(crate) fn best_drive(&self, truth: &DriveGeometry) -> Model {
-        let at = &self.free;
-        let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
-            LOUD * self.total.information[(at[i], at[j])] + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
-        });
-        let gradient = DVector::from_fn(at.len(), |i, _| LOUD * self.total.gradient[at[i]]);
-        let mut model = Model::of(truth, 0);
-        if let Some(inverse) = matrix.try_inverse() {
-            let step = -(inverse * gradient);
-            Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
-        }
-        model
+    pub(crate) fn best_drive(&self) -> Model {
+        self.best.clone()
     }
 }

@@ -167,7 +167,17 @@ fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw
                 .collect();
         }
     };
-    schedules.iter().flat_map(Schedule::programs).collect()
+    let mut programs: Vec<MotionProgram> = Vec::new();
+    for (number, schedule) in schedules.iter().enumerate() {
+        for mut program in schedule.programs() {
+            // Circles of two radii have the same names.
+            if programs.iter().any(|known| known.id == program.id) {
+                program.id = format!("{}_{number}", program.id);
+            }
+            programs.push(program);
+        }
+    }
+    programs
 }
 
 fn free(run: u32, forward: bool, (speed_m_s, tightest_m): (f64, f64), draw: &mut Draw) -> MotionProgram {

@@ -5,15 +5,13 @@
 //! Observability: a moving robot and an irregular log; looks between the rows blur it. Alias: wheel noise, but for the slope against ξ.
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes; milliseconds.
 
-use std::collections::VecDeque;
-
 use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Shape, median, size};
+use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::stream::Stream;
 
 /// Irregular stamps.
@@ -37,7 +35,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None, last_s: f64::NEG_INFINITY }))
+        Some(Box::new(State { size: *self, stream: None }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -56,12 +54,7 @@ impl PhysicalEffect for IntervalError {
 struct State {
     size: IntervalError,
     stream: Option<Stream>,
-    /// The last stamp: no log goes back.
-    last_s: f64,
 }
-
-/// Rows that would be stamped out of order are stamped this much after one another, seconds.
-const NEXT_S: f64 = 1e-4;
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
@@ -69,28 +62,36 @@ impl Forward for State {
     }
 
     fn start_run(&mut self, stream: Stream) {
-        (self.stream, self.last_s) = (Some(stream), f64::NEG_INFINITY);
+        self.stream = Some(stream);
     }
 
     fn clock(&mut self, sample: &mut SampleClock) {
         let Some(stream) = &mut self.stream else { return };
-        let late_s = stream.uniform_about_zero(self.size.jitter_s).max(self.last_s + NEXT_S - sample.stamp_s);
+        let late_s = stream.uniform_about_zero(self.size.jitter_s);
         sample.stamp_s += late_s;
-        self.last_s = sample.stamp_s;
         sample.read_s = sample.read_s.map(|read_s| read_s + (1.0 - self.size.share) * late_s);
     }
 }
 
-/// Rows from which the beat is taken: the last ones, so many that their own jitter tells little, and at least so many that it is a beat.
-const ROWS: std::ops::RangeInclusive<usize> = 8..=64;
-
+/// Rows of a beat that no other has shown the length of before there is a line through them.
+const LEAST_ROWS: f64 = 8.0;
+/// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
+const MEMORY_ROWS: f64 = 500.0;
 /// A row that is farther from its beat than this share of it is no jitter: the log has missed its beat, and a new one begins.
 const MISSED: f64 = 0.45;
 
-/// The regular beat behind the rows: a line through the last rows' times over the numbers of their beats.
+/// The regular beat behind the rows: a line through the rows' times over the numbers of their beats, with one slope for all beats of the log.
 #[derive(Default)]
 struct Term {
-    rows: VecDeque<(f64, f64)>,
+    /// Of the rows of this beat: weight, means of number and time, and sums of squares and products about them.
+    rows: f64,
+    mean: [f64; 2],
+    square: f64,
+    product: f64,
+    /// The same sums of the beats before.
+    before: [f64; 2],
+    /// The last row: the number of its beat, and its time.
+    last: Option<(f64, f64)>,
     /// How late the last row was by its beat; 0 while there is none.
     late_s: f64,
     /// End of the logged interval whose parts come in, and by which share of it what came before its end was late.
@@ -100,18 +101,61 @@ struct Term {
 impl Term {
     /// When beat 0 is and the time between two beats, where rows enough are known.
     fn line(&self) -> Option<(f64, f64)> {
-        if self.rows.len() < *ROWS.start() {
-            return None;
+        let [square, product] = [self.square + self.before[0], self.product + self.before[1]];
+        let known = self.before[0] > 0.0 || self.rows >= LEAST_ROWS;
+        (known && self.rows > 0.0 && square > 0.0).then(|| {
+            let between_s = product / square;
+            (self.mean[1] - between_s * self.mean[0], between_s)
+        })
+    }
+
+    /// Takes a row of the beat, by Welford's recursion.
+    fn add(&mut self, beat: f64, time_s: f64) {
+        let keeps = 1.0 - 1.0 / MEMORY_ROWS;
+        self.rows = keeps * self.rows + 1.0;
+        let off = [beat - self.mean[0], time_s - self.mean[1]];
+        for (mean, off) in self.mean.iter_mut().zip(off) {
+            *mean += off / self.rows;
         }
-        #[allow(clippy::cast_precision_loss)]
-        let n = self.rows.len() as f64;
-        let mean = |of: fn(&(f64, f64)) -> f64| self.rows.iter().map(of).sum::<f64>() / n;
-        let (beat, time_s) = (mean(|row| row.0), mean(|row| row.1));
-        let (square, product) = self.rows.iter().fold((0.0, 0.0), |(square, product), row| {
-            (square + (row.0 - beat).powi(2), product + (row.0 - beat) * (row.1 - time_s))
-        });
-        let between_s = product / square;
-        Some((time_s - between_s * beat, between_s))
+        self.square = keeps * self.square + off[0] * (beat - self.mean[0]);
+        self.product = keeps * self.product + off[0] * (time_s - self.mean[1]);
+        self.last = Some((beat, time_s));
+    }
+
+    /// A new beat begins; how long one lasts stays known, if enough rows have shown it.
+    fn new_beat(&mut self) {
+        let knows = self.rows >= LEAST_ROWS;
+        let before = if knows { [self.before[0] + self.square, self.before[1] + self.product] } else { self.before };
+        *self = Self { before, ..Self::default() };
+    }
+
+    /// Takes the row that ends an interval: by which share of its length that is late.
+    fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
+        let Some((last, last_s)) = self.last else {
+            self.add(0.0, from_s);
+            self.add(1.0, row_s);
+            return 0.0;
+        };
+        let line = self.line();
+        let between_s =
+            line.map_or_else(|| (last_s - self.mean[1]) / (last - self.mean[0]), |(_, between_s)| between_s);
+        let beats = ((row_s - last_s) / between_s).round();
+        if beats.is_nan() || beats < 1.0 {
+            return 0.0; // Between two beats: the row of a standstill.
+        }
+        let late_s = line.map(|(zero_s, between_s)| row_s - zero_s - (last + beats) * between_s);
+        if late_s.is_some_and(|late_s| late_s.abs() > MISSED * between_s) {
+            self.new_beat();
+            self.add(-1.0, row_s - between_s);
+            self.add(0.0, row_s);
+            return 0.0;
+        }
+        // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
+        // logged, speeds would average too low.
+        let share = late_s.map_or(0.0, |late_s| (late_s - self.late_s) / (beats * between_s));
+        self.late_s = late_s.unwrap_or(0.0);
+        self.add(last + beats, row_s);
+        share
     }
 }
 
@@ -122,7 +166,7 @@ impl ModelTerm for Term {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        *self = Self::default();
+        self.new_beat();
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -136,37 +180,6 @@ impl ModelTerm for Term {
             }
         };
         gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
-    }
-}
-
-impl Term {
-    /// Takes a row: by which share of its length the interval that ends there is late.
-    fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
-        let line = self.line();
-        let Some(&(last, last_s)) = self.rows.back() else {
-            self.rows.extend([(0.0, from_s), (1.0, row_s)]);
-            return 0.0;
-        };
-        let gaps_s = || self.rows.iter().zip(self.rows.range(1..)).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)).collect();
-        let Some(between_s) = line.map(|(_, between_s)| between_s).or_else(|| median(gaps_s())) else { return 0.0 };
-        let beats = ((row_s - last_s) / between_s).round();
-        if beats < 1.0 {
-            return 0.0; // Between two beats: the row of a standstill.
-        }
-        let late_s = line.map(|(zero_s, between_s)| row_s - zero_s - (last + beats) * between_s);
-        if late_s.is_some_and(|late_s| late_s.abs() > MISSED * between_s) {
-            *self = Self { rows: VecDeque::from([(-1.0, row_s - between_s), (0.0, row_s)]), ..Self::default() };
-            return 0.0;
-        }
-        // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
-        // logged, speeds would average too low.
-        let share = late_s.map_or(0.0, |late_s| (late_s - self.late_s) / (beats * between_s));
-        self.late_s = late_s.unwrap_or(0.0);
-        self.rows.push_back((last + beats, row_s));
-        if self.rows.len() > *ROWS.end() {
-            self.rows.pop_front();
-        }
-        share
     }
 }
 
