@@ -18,8 +18,8 @@ use crate::gross::{Fault, fault, follows, left_out, sessions};
 use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
-use crate::scatter::scatter;
-use crate::search::{Extended, Found, evidence, examine, reach, search};
+use crate::scatter::{SCATTER_LEVEL, differs_from_run_to_run, scatter};
+use crate::search::{Extended, Found, MOST_EFFECTS, evidence, examine, reach, search};
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
 /// What to leave out.
@@ -152,6 +152,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) checked: Checked,
     /// A model with a sparse term at its end, its chance, and how many were tried.
     pub(crate) sparse: Option<(Extended<'a>, f64, usize)>,
+    /// Chance of a wheelbase that differs as much from run to run, were it one; of the looks that are believed.
+    pub(crate) differs: f64,
     /// Correlation of looks that follow each other, where they had to be thinned.
     pub(crate) correlated: Option<(f64, f64)>,
     /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
@@ -159,11 +161,15 @@ pub(crate) struct Asked<'a> {
 }
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
-    let found = search(&base, catalogue);
+    let alone = |base: &JointFit<'a>| Extended { fit: base.clone(), choices: Vec::new() };
+    let differs = differs_from_run_to_run(&alone(&base));
+    let found = search(&base, catalogue, differs < SCATTER_LEVEL);
+    // What has a name does not scatter.
+    let differs = differs.max(differs_from_run_to_run(&found.model));
     let checked = check(&found.model);
-    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false };
+    let mut asked = Asked { base, found, checked, sparse: None, differs, correlated: None, in_disguise: false };
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
-    let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
+    let alone = alone(&asked.base);
     if !asked.found.model.choices.is_empty()
         && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
     {
@@ -193,7 +199,9 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue);
+            let differs = differs_from_run_to_run(&Extended { fit: thinned.clone(), choices: Vec::new() });
+            asked.found = search(&thinned, catalogue, differs < SCATTER_LEVEL);
+            asked.differs = differs.max(differs_from_run_to_run(&asked.found.model));
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
         }
@@ -246,6 +254,9 @@ fn continued(
     if !explained {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
+    naming::doubt(&mut findings, asked.found.model.choices.len() >= MOST_EFFECTS);
+    // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
+    findings[usize::from(fault.is_some())..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);
     let (sensitivity, blind_to) = blind(model, &catalogue);
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);

@@ -23,6 +23,8 @@ const WHEEL_SIGMA: f64 = 0.01;
 const TURN_SIGMA: f64 = 0.05;
 /// So many times as much and the counts do not follow the robot at all.
 const LOST: f64 = 3.0;
+/// Looks that err by this share of how far they saw the robot go, or by so many radians, hardly saw it.
+const BLURRED: f64 = 0.3;
 /// A share of looks that do not fit beyond which something is wrong with the records.
 const OUTLIERS: f64 = 0.01;
 /// Share of the looks that did not fit before which may still not fit in records that are rewritten.
@@ -114,7 +116,10 @@ fn is_sound(fit: &JointFit<'_>) -> bool {
 /// Does the robot go where a drive of any lengths would, by the counts?
 pub(crate) fn follows(fit: &JointFit<'_>) -> bool {
     let sigma = |of| fit.fit.noise.sigma(of);
-    sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
+    sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA
+        && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
+        && sigma(NoiseComponent::LookPosition) < BLURRED * fit.records.extent_m()
+        && sigma(NoiseComponent::LookHeading) < BLURRED
 }
 
 /// Are a fit's lengths and noise those of a drive?

@@ -122,13 +122,39 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     })
 }
 
+/// What is found beside something that has no name, or a scatter, that stands out as much as a third of it may be a part of that, or an accident of it.
+const DOUBTFUL: f64 = 3.0;
+
+/// Says of names that they may be part of something that has none: where that stands out as well, or where as many effects were found as are sought and there is
+/// still something left.
+pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
+    let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
+        findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
+    };
+    let unlisted = strongest(findings, |finding| finding.id == "unlisted");
+    let scatter = strongest(findings, |finding| finding.id == "contact_patch_wheelbase");
+    for finding in findings {
+        if !matches!(hypothesis(&finding.id), Some(Hypothesis::Terms(_))) {
+            continue;
+        }
+        let part = unlisted > 0.0 && (full || finding.z < DOUBTFUL * unlisted);
+        if part || DOUBTFUL * finding.z < scatter {
+            finding.id = "unlisted".to_owned();
+            finding.names.insert(0, "unlisted".to_owned());
+            finding.sentence = format!("perhaps part of what has no name, or else {}", finding.sentence);
+        }
+    }
+}
+
 /// The counts do not follow the robot, and no gross fault explains it.
 pub(crate) fn of_lost(base: &JointFit<'_>) -> Option<Finding> {
     let sigma = |of| base.fit.noise.sigma(of);
     let what = format!(
-        "the robot does not go where its wheels' counts say: to the best fit they err by {:.0} mm for each root of a metre and {:.0} mrad for each root of a radian",
+        "the robot was not seen where its wheels' counts say: to the best fit they err by {:.0} mm for each root of a metre and {:.0} mrad for each root of a radian, and looks by {:.0} mm and {:.0} mrad",
         1e3 * sigma(NoiseComponent::Wheel),
-        1e3 * sigma(NoiseComponent::Turn)
+        1e3 * sigma(NoiseComponent::Turn),
+        1e3 * sigma(NoiseComponent::LookPosition),
+        1e3 * sigma(NoiseComponent::LookHeading),
     );
     of_scatter(&[], 0.0, BTreeMap::new(), &what)
 }

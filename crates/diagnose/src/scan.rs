@@ -91,6 +91,17 @@ impl Projection {
         DVector::from_fn(columns.len(), |i, _| run.gradient[columns[i]]) - cross * &self.inverse * free
     }
 
+    /// The variance of that score.
+    pub(crate) fn variance_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DMatrix<f64> {
+        let of = |evidence: &Evidence, rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| evidence.information[(rows[i], columns[j])])
+        };
+        let weights = of(all, columns, &self.indices) * &self.free * &self.inverse * self.free.transpose();
+        let cross = of(run, columns, &self.indices) * weights.transpose();
+        of(run, columns, columns) - &cross - cross.transpose()
+            + &weights * of(run, &self.indices, &self.indices) * weights.transpose()
+    }
+
     pub(crate) fn of_columns(&self, evidence: &Evidence, columns: &[usize]) -> Projected {
         let cross = DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| {
             evidence.information[(columns[i], self.indices[j])]

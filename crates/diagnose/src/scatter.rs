@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::NoiseComponent;
+use calib::likelihood::{Column, NoiseComponent};
 use effects::Sign;
 
 use crate::candidate::terms;
@@ -13,11 +13,12 @@ use crate::checks::what_follows;
 use crate::diagnosis::{Asked, Options, is_covariate};
 use crate::document::{Finding, Value};
 use crate::naming;
-use crate::search::{cost, count};
+use crate::scan::{Projection, total};
+use crate::search::{Extended, cost, count};
 use crate::statistics::{p_of_chi_square, p_of_z};
 
 /// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
-const SCATTER_LEVEL: f64 = 1e-3;
+pub(crate) const SCATTER_LEVEL: f64 = 1e-3;
 
 /// With more, it is the model that is off, and not the looks.
 const MOST_OUTLIERS: f64 = 0.2;
@@ -35,9 +36,12 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
-    if asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name)) {
-        // Large errors that go with what was driven are no scatter.
-        return findings;
+    let turns = of_turns(asked, options);
+    let with_something = asked.checked.checks.iter().filter(|check| !check.passes && is_covariate(&check.name));
+    let with_something = with_something.map(|check| check.p_value).fold(1.0, f64::min);
+    if with_something < 1.0 {
+        // Large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
+        return turns.filter(|turns| turns.p_value < with_something).into_iter().collect();
     }
     if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
@@ -89,8 +93,33 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         }
         findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
     }
-    findings.extend(of_turns(asked, options));
+    findings.extend(turns);
     findings
+}
+
+/// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.
+///
+/// Noise of the turns grows with their root, and is soon lost in that of the wheels; a wheelbase that is drawn for each motion errs in proportion to the turn. u_r being
+/// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
+/// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
+pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
+    let mut others = model.fit.clone();
+    others.columns.retain(|column| *column != Column::Separation);
+    let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let Some(evidence) = total(&model.fit.fit.pass.runs) else { return 1.0 };
+    let Some(projection) = Projection::of(&others, &evidence) else { return 1.0 };
+    let own = [Column::Separation.index()];
+    let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);
+    for run in &runs {
+        let variance = projection.variance_of(run, &evidence, &own)[(0, 0)];
+        squares += projection.score_of(run, &evidence, &own)[0].powi(2);
+        mean += variance;
+        spread += variance * variance;
+    }
+    if runs.len() < 3 || mean <= 0.0 {
+        return 1.0;
+    }
+    p_of_chi_square(squares * mean / spread, mean * mean / spread)
 }
 
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
@@ -99,7 +128,7 @@ fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
-    let p_value = 0.5 * p_of_chi_square(statistic.max(0.0), 1.0);
+    let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(asked.differs);
     if p_value >= SCATTER_LEVEL {
         return None;
     }

@@ -11,7 +11,7 @@ use crate::statistics::{of_trials, p_of_statistic, p_of_student};
 /// Family-wise rate of false alarms of the scan over the catalogue.
 pub(crate) const SCAN_LEVEL: f64 = 0.02;
 /// Most effects that are sought.
-const MOST_EFFECTS: usize = 3;
+pub(crate) const MOST_EFFECTS: usize = 3;
 /// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
 const RIVAL_SHARE: f64 = 0.5;
 /// Most rivals that are refitted.
@@ -183,7 +183,7 @@ const RUNS_LEVEL: f64 = 0.05;
 ///
 /// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
 /// Liang & Zeger 1986.
-pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize) -> bool {
+pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64) -> bool {
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     if runs.len() < LEAST_RUNS {
         return true;
@@ -202,7 +202,7 @@ pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize) -> bool {
     let n = runs.len() as f64;
     let squares: f64 = runs.iter().map(|run| projection.score_of(run, &evidence, &own).dot(&sizes).powi(2)).sum();
     let t = stands / (squares * n / (n - 1.0)).sqrt();
-    t.is_nan() || p_of_student(t, n - 1.0) < RUNS_LEVEL
+    t.is_nan() || p_of_student(t, n - 1.0) < level
 }
 
 /// Refits a model with its choices; `None` when that diverges.
@@ -255,7 +255,9 @@ fn rivals<'a>(
 }
 
 /// Adds effects while the scan finds some.
-pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a> {
+///
+/// `scattered` says that turns scatter from run to run: what goes with turns then stands out by chance, and a size must hold over the runs as if the looks said nothing.
+pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], scattered: bool) -> Found<'a> {
     let mut model = Extended { fit: base.clone(), choices: Vec::new() };
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
@@ -294,7 +296,8 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
             break;
         }
         // Nor an accident of a few runs: what differs from run to run is no size.
-        if !holds_over_runs(&extended, place) {
+        let level = if scattered { SCAN_LEVEL / tests } else { RUNS_LEVEL };
+        if !holds_over_runs(&extended, place, level) {
             break;
         }
         // Nor is a term that predicts unseen runs worse than none, or with which odometry drifts more for certain.
@@ -330,6 +333,19 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         }
         if found[0].0.log_odds <= 0.0 {
             // Another one took over what this one stood for.
+            model = without;
+            continue;
+        }
+        let shapes =
+            |id| entries.iter().find(|entry| entry.scored.choice.id() == id).map_or(1, |entry| entry.shapes.max(1));
+        #[allow(clippy::cast_precision_loss)]
+        let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+        let stands = |(name, extended): &(Name, Extended<'_>)| {
+            examine(extended, place)
+                .is_some_and(|(test, _)| of_trials(test.p_value, shapes(name.choice.id())) * tests <= SCAN_LEVEL)
+        };
+        if !found.iter().any(stands) {
+            // Nor does a name that came in its place.
             model = without;
             continue;
         }

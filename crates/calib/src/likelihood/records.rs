@@ -195,6 +195,26 @@ impl<'a> Records<'a> {
         if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
     }
 
+    /// How far from where a chain begins the robot was seen at the most, metres; root mean square over the chains.
+    #[must_use]
+    pub fn extent_m(&self) -> f64 {
+        let squares: f64 = self
+            .chains
+            .iter()
+            .map(|chain| {
+                let (x_m, y_m) = match (chain.start, chain.looks.first()) {
+                    (Start::Seen, Some(first)) => (first.x_m, first.y_m),
+                    _ => (0.0, 0.0),
+                };
+                let far = chain.looks.iter().map(|look| (look.x_m - x_m).powi(2) + (look.y_m - y_m).powi(2));
+                far.fold(0.0, f64::max)
+            })
+            .sum();
+        #[allow(clippy::cast_precision_loss)]
+        let chains = self.chains.len().max(1) as f64;
+        (squares / chains).sqrt()
+    }
+
     /// Times between looks that follow each other, seconds.
     pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
         self.chains.iter().flat_map(|chain| chain.looks.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))
