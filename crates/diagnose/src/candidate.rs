@@ -8,8 +8,8 @@ use crate::sparse::Sparse;
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
-    /// One of the shapes of an effect of the catalogue.
-    Effect { id: &'static str, shape: usize },
+    /// One of the shapes of an effect of the catalogue; between them where `at` says so.
+    Effect { id: &'static str, shape: usize, at: Option<f64> },
     /// A product of covariates on one channel.
     Sparse(Sparse),
 }
@@ -18,7 +18,10 @@ impl Choice {
     /// The term, at the start of its life; `None` only for a shape that the catalogue does not have.
     pub(crate) fn term(&self) -> Option<Box<dyn ModelTerm>> {
         match self {
-            Self::Effect { id, shape } => shapes(id).into_iter().nth(*shape).map(|shape| shape.term),
+            Self::Effect { id, shape, at } => shapes(id).into_iter().nth(*shape).map(|shape| match at.zip(shape.at) {
+                Some((value, at)) => at(value),
+                None => shape.term,
+            }),
             Self::Sparse(sparse) => Some(sparse.term()),
         }
     }
@@ -34,10 +37,30 @@ impl Choice {
     /// Its held shape parameters.
     pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
         match self {
-            Self::Effect { id, shape } => {
-                shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default()
+            Self::Effect { id, shape, at } => {
+                let mut held = shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default();
+                if let (Some(value), [(_, own)]) = (at, &mut held[..]) {
+                    *own = *value;
+                }
+                held
             }
             Self::Sparse(_) => Vec::new(),
+        }
+    }
+
+    /// The values of its shape parameter that the scan tries, where anything between them is as possible.
+    pub(crate) fn grid(&self) -> Vec<f64> {
+        let Self::Effect { id, .. } = self else { return Vec::new() };
+        let shapes = shapes(id);
+        let values = shapes.iter().filter(|shape| shape.at.is_some()).filter_map(|shape| Some(shape.held.first()?.1));
+        values.collect()
+    }
+
+    /// The same effect with its shape parameter anywhere.
+    pub(crate) fn moved_to(&self, value: f64) -> Self {
+        match self {
+            Self::Effect { id, shape, .. } => Self::Effect { id, shape: *shape, at: Some(value) },
+            Self::Sparse(_) => self.clone(),
         }
     }
 
@@ -63,7 +86,7 @@ pub(crate) fn mean_terms(without: &[String]) -> Vec<Choice> {
     CATALOGUE
         .iter()
         .filter(|id| !without.iter().any(|out| out == *id))
-        .flat_map(|id| (0..shapes(id).len()).map(|shape| Choice::Effect { id, shape }))
+        .flat_map(|id| (0..shapes(id).len()).map(|shape| Choice::Effect { id, shape, at: None }))
         .collect()
 }
 

@@ -18,7 +18,7 @@ use crate::gross::{Fault, fault, follows, left_out, sessions};
 use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
-use crate::scatter::{SCATTER_LEVEL, differs_from_run_to_run, scatter};
+use crate::scatter::scatter;
 use crate::search::{Extended, Found, MOST_EFFECTS, evidence, examine, reach, search};
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
@@ -152,8 +152,6 @@ pub(crate) struct Asked<'a> {
     pub(crate) checked: Checked,
     /// A model with a sparse term at its end, its chance, and how many were tried.
     pub(crate) sparse: Option<(Extended<'a>, f64, usize)>,
-    /// Chance of a wheelbase that differs as much from run to run, were it one; of the looks that are believed.
-    pub(crate) differs: f64,
     /// Correlation of looks that follow each other, where they had to be thinned.
     pub(crate) correlated: Option<(f64, f64)>,
     /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
@@ -161,15 +159,11 @@ pub(crate) struct Asked<'a> {
 }
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
-    let alone = |base: &JointFit<'a>| Extended { fit: base.clone(), choices: Vec::new() };
-    let differs = differs_from_run_to_run(&alone(&base));
-    let found = search(&base, catalogue, differs < SCATTER_LEVEL);
-    // What has a name does not scatter.
-    let differs = differs.max(differs_from_run_to_run(&found.model));
+    let found = search(&base, catalogue);
     let checked = check(&found.model);
-    let mut asked = Asked { base, found, checked, sparse: None, differs, correlated: None, in_disguise: false };
+    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false };
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
-    let alone = alone(&asked.base);
+    let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
     if !asked.found.model.choices.is_empty()
         && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
     {
@@ -199,9 +193,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
-            let differs = differs_from_run_to_run(&Extended { fit: thinned.clone(), choices: Vec::new() });
-            asked.found = search(&thinned, catalogue, differs < SCATTER_LEVEL);
-            asked.differs = differs.max(differs_from_run_to_run(&asked.found.model));
+            asked.found = search(&thinned, catalogue);
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
         }

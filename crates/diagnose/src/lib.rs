@@ -19,6 +19,7 @@ mod scan;
 mod scatter;
 mod scenario_of;
 mod search;
+mod shape;
 mod sparse;
 mod statistics;
 mod unlisted;

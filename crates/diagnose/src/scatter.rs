@@ -6,7 +6,9 @@
 use std::collections::BTreeMap;
 
 use calib::likelihood::{Column, NoiseComponent};
+use calib::methods::joint::JointFit;
 use effects::Sign;
+use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::candidate::terms;
 use crate::checks::what_follows;
@@ -18,7 +20,9 @@ use crate::search::{Extended, cost, count};
 use crate::statistics::{p_of_chi_square, p_of_z};
 
 /// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
-pub(crate) const SCATTER_LEVEL: f64 = 1e-3;
+const SCATTER_LEVEL: f64 = 1e-3;
+/// That of turns that scatter: whatever the model lacks makes turns differ from run to run, so that they must do so beyond any doubt.
+pub(crate) const TURNS_LEVEL: f64 = 1e-7;
 
 /// With more, it is the model that is off, and not the looks.
 const MOST_OUTLIERS: f64 = 0.2;
@@ -65,8 +69,24 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             Some((p_value, what_follows(&asked.found.model.fit, component), sign))
         });
         if let Some((p_value, follows, sign)) = jump {
-            let stays = naming::with_sign(sign, &options.without);
-            let errs = naming::with_sign(Sign::IsolatedLooks, &options.without);
+            let ramps = ramps(&asked.found.model.fit);
+            let named = |signs: &[Sign]| {
+                let ids: Vec<&str> = signs.iter().flat_map(|sign| naming::with_sign(*sign, &options.without)).collect();
+                ids.into_iter().filter(|id| ramps.allow(id)).collect::<Vec<_>>()
+            };
+            // What jumps ahead may turn as well: a bump costs one wheel its way.
+            let jumps: &[Sign] =
+                if sign == Sign::WayJumps { &[Sign::HeadingJumps, Sign::WayJumps] } else { &[Sign::HeadingJumps] };
+            let (mut stays, mut errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
+            for ids in [&mut stays, &mut errs] {
+                let mut seen = Vec::new();
+                ids.retain(|id| {
+                    !seen.contains(id) && {
+                        seen.push(*id);
+                        true
+                    }
+                });
+            }
             let (ids, what) = if follows > FOLLOWS {
                 (stays, "single large errors that stay: the robot jumped")
             } else if follows < -FOLLOWS {
@@ -95,6 +115,62 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     }
     findings.extend(turns);
     findings
+}
+
+/// Where large errors lie: at starts and stops, or anywhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ramps {
+    /// At starts and stops, far more often than looks do.
+    Mostly,
+    /// As often as looks do, and too many to be there by chance.
+    Anywhere,
+    /// They are too few to tell, or all looks have a start or a stop before them.
+    CannotBeTold,
+}
+
+impl Ramps {
+    /// Whether an effect's errors may lie so: wheels stick and slide where they change their speed, and cables and markers lie anywhere.
+    fn allow(self, id: &str) -> bool {
+        let at_ramps = ["traction_loss", "stick_slip"].contains(&id);
+        match self {
+            Self::Mostly => at_ramps,
+            Self::Anywhere => !at_ramps,
+            Self::CannotBeTold => true,
+        }
+    }
+}
+
+/// An innovation this large, in standard deviations, is one that the tails are made of.
+const LARGE: f64 = 3.5;
+/// Chance at which where large errors lie is told.
+const RAMPS_LEVEL: f64 = 1e-3;
+
+/// Where the large errors of a fit lie, by a binomial test against where its looks are.
+fn ramps(fit: &JointFit<'_>) -> Ramps {
+    let Some(phase) = fit.fit.pass.innovations.first() else { return Ramps::CannotBeTold };
+    let at_ramp = |chain: usize, look: usize| fit.records.changes_speed(chain, look);
+    let mut all: Vec<(usize, usize)> = phase.iter().map(|innovation| (innovation.chain, innovation.look)).collect();
+    let large = phase.iter().filter(|innovation| innovation.z.abs() > LARGE);
+    let mut large: Vec<(usize, usize)> = large.map(|innovation| (innovation.chain, innovation.look)).collect();
+    large.extend(&fit.fit.pass.outliers);
+    all.extend(&fit.fit.pass.outliers);
+    for looks in [&mut all, &mut large] {
+        looks.sort_unstable();
+        looks.dedup();
+    }
+    let count = |looks: &[(usize, usize)]| looks.iter().filter(|(chain, look)| at_ramp(*chain, *look)).count();
+    #[allow(clippy::cast_precision_loss)]
+    let share = count(&all) as f64 / all.len().max(1) as f64;
+    let (found, of) = (count(&large) as u64, large.len() as u64);
+    let Ok(binomial) = Binomial::new(share, of) else { return Ramps::CannotBeTold };
+    // As many or more by chance; and, were nine of ten of them there, as few or fewer.
+    if found > 0 && binomial.sf(found - 1) < RAMPS_LEVEL {
+        Ramps::Mostly
+    } else if Binomial::new(share.max(0.9), of).is_ok_and(|mostly| mostly.cdf(found) < RAMPS_LEVEL) {
+        Ramps::Anywhere
+    } else {
+        Ramps::CannotBeTold
+    }
 }
 
 /// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.
@@ -128,8 +204,8 @@ fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
-    let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(asked.differs);
-    if p_value >= SCATTER_LEVEL {
+    let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));
+    if p_value >= TURNS_LEVEL {
         return None;
     }
     let sigma = model.fit.fit.noise.sigma(NoiseComponent::Turn);

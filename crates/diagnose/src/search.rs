@@ -6,6 +6,8 @@ use nalgebra::DVector;
 use crate::candidate::{Choice, terms};
 use crate::gain::gain;
 use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
+use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
+use crate::shape::fit_shape;
 use crate::statistics::{of_trials, p_of_statistic, p_of_student};
 
 /// Family-wise rate of false alarms of the scan over the catalogue.
@@ -255,9 +257,7 @@ fn rivals<'a>(
 }
 
 /// Adds effects while the scan finds some.
-///
-/// `scattered` says that turns scatter from run to run: what goes with turns then stands out by chance, and a size must hold over the runs as if the looks said nothing.
-pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], scattered: bool) -> Found<'a> {
+pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a> {
     let mut model = Extended { fit: base.clone(), choices: Vec::new() };
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
@@ -296,6 +296,8 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], scattered: b
             break;
         }
         // Nor an accident of a few runs: what differs from run to run is no size.
+        // Where turns scatter from run to run still, what goes with turns stands out by chance: it must hold over the runs as if looks said nothing.
+        let scattered = differs_from_run_to_run(&extended) < TURNS_LEVEL;
         let level = if scattered { SCAN_LEVEL / tests } else { RUNS_LEVEL };
         if !holds_over_runs(&extended, place, level) {
             break;
@@ -356,6 +358,31 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], scattered: b
         model = found.swap_remove(0).1;
         place += 1;
     }
-    let tests = (0..model.choices.len()).filter_map(|choice| Some(examine(&model, choice)?.0)).collect();
+    let mut wider: Vec<Vec<f64>> = (0..model.choices.len()).map(|place| fit_shape(base, &mut model, place)).collect();
+    // What stood for a shape that was not met is not needed any more.
+    #[allow(clippy::cast_precision_loss)]
+    let tests = first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    for place in (0..model.choices.len()).rev() {
+        let needed = examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= SCAN_LEVEL);
+        let others =
+            || model.choices.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, choice)| choice.clone());
+        if !needed
+            && model.choices.len() > 1
+            && names.len() == model.choices.len()
+            && let Some(without) = refit(base, others().collect())
+        {
+            model = without;
+            names.remove(place);
+            wider.remove(place);
+        }
+    }
+    let test = |(choice, wider): (usize, &Vec<f64>)| {
+        let (mut test, _) = examine(&model, choice)?;
+        for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
+            *sigma = sigma.hypot(*wider);
+        }
+        Some(test)
+    };
+    let tests = wider.iter().enumerate().filter_map(test).collect();
     Found { model, names, tests, first_scan }
 }

@@ -27,19 +27,27 @@ pub struct Shape {
     pub held: Vec<(&'static str, f64)>,
     /// The term.
     pub term: Box<dyn ModelTerm>,
+    /// The term at any other value of what is held, where that is one continuous number.
+    pub at: Option<fn(f64) -> Box<dyn ModelTerm>>,
 }
 
 impl Shape {
     /// A term without shape parameters.
     #[must_use]
     pub fn plain(term: impl ModelTerm + 'static) -> Vec<Self> {
-        vec![Self { held: Vec::new(), term: Box::new(term) }]
+        vec![Self { held: Vec::new(), term: Box::new(term), at: None }]
     }
 
-    /// A term at each of several values of one shape parameter.
+    /// A term at each of several values of one shape parameter, which is a number of things.
     #[must_use]
     pub fn over<T: ModelTerm + 'static>(name: &'static str, values: &[f64], term: impl Fn(f64) -> T) -> Vec<Self> {
-        values.iter().map(|&value| Self { held: vec![(name, value)], term: Box::new(term(value)) }).collect()
+        values.iter().map(|&value| Self { held: vec![(name, value)], term: Box::new(term(value)), at: None }).collect()
+    }
+
+    /// A term at each of several values of one positive shape parameter, between which it may be anything.
+    #[must_use]
+    pub fn along(name: &'static str, values: &[f64], at: fn(f64) -> Box<dyn ModelTerm>) -> Vec<Self> {
+        values.iter().map(|&value| Self { held: vec![(name, value)], term: at(value), at: Some(at) }).collect()
     }
 }
 

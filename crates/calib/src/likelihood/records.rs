@@ -195,6 +195,25 @@ impl<'a> Records<'a> {
         if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
     }
 
+    /// Whether a wheel changed its speed in the half second before a look, by more than a fifth of the fastest that either went in the chain.
+    #[must_use]
+    pub fn changes_speed(&self, chain: usize, look: usize) -> bool {
+        const BEFORE_S: f64 = 0.5;
+        const SHARE: f64 = 0.2;
+        let Some(chain) = self.chains.get(chain) else { return false };
+        let Some(look) = chain.looks.get(look) else { return false };
+        let speed = |piece: &Piece| piece.wheel_rad.map(|rad| if piece.dt_s > 0.0 { rad / piece.dt_s } else { 0.0 });
+        let fastest = chain.pieces.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
+        let near = chain.pieces[..look.after].iter().rev().take_while(|piece| piece.t_s > look.t_s - BEFORE_S);
+        let (mut low, mut high) = (Wheels::both(f64::INFINITY), Wheels::both(f64::NEG_INFINITY));
+        for of in near.map(speed) {
+            low = low.zip_with(of, f64::min);
+            high = high.zip_with(of, f64::max);
+        }
+        let change = high.zip_with(low, |high, low| high - low);
+        change.left.max(change.right) > SHARE * fastest
+    }
+
     /// How far from where a chain begins the robot was seen at the most, metres; root mean square over the chains.
     #[must_use]
     pub fn extent_m(&self) -> f64 {

@@ -37,7 +37,9 @@ impl PhysicalEffect for CastorDrag {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("castor_behind_m", &CASTOR_BEHIND_M, |castor_behind_m| Term { castor_behind_m }))
+        Hypothesis::Terms(Shape::along("castor_behind_m", &CASTOR_BEHIND_M, |castor_behind_m| {
+            Box::new(Term { castor_behind_m })
+        }))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

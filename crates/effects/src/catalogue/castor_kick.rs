@@ -38,7 +38,7 @@ impl PhysicalEffect for CastorKick {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("decay_m", &DECAY_M, Term::new))
+        Hypothesis::Terms(Shape::along("decay_m", &DECAY_M, |decay_m| Box::new(Term::new(decay_m))))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

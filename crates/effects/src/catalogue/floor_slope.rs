@@ -38,7 +38,7 @@ impl PhysicalEffect for FloorSlope {
     }
 
     fn hypothesis() -> Hypothesis {
-        let by = |way| Shape { held: Vec::new(), term: Box::new(Term { way }) };
+        let by = |way| Shape { held: Vec::new(), term: Box::new(Term { way }), at: None };
         Hypothesis::Terms(vec![by(false), by(true)])
     }
 

@@ -45,7 +45,7 @@ impl PhysicalEffect for MissedCounts {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Term { hinge_m_s }))
+        Hypothesis::Terms(Shape::along("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Box::new(Term { hinge_m_s })))
     }
 
     /// A counter whose lost share was found negative loses none.

@@ -38,7 +38,7 @@ impl PhysicalEffect for ThermalDrift {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("tau_s", &TAU_S, |tau_s| Term { tau_s }))
+        Hypothesis::Terms(Shape::along("tau_s", &TAU_S, |tau_s| Box::new(Term { tau_s })))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -1,0 +1,73 @@
+//! Shape parameters that may be anything between the values that the scan tries: a hinge speed, a time constant. They are fitted by their profile, and what is not
+//! known of them widens the sizes.
+//!
+//! Near its minimum the cost is a parabola of the parameter's logarithm; its curvature is what is known of it, beside that it lies in the range that is tried. A size
+//! that goes with the shape by dθ/dx is known by as much less: σ² = σ²(θ | x) + (dθ/dx)² σ²(x).
+//! Reference: Cox & Hinkley 1974 (profile likelihood); the delta method.
+
+use calib::methods::joint::JointFit;
+
+use crate::search::{Extended, cost, count, refit};
+
+/// Times that the parabola is drawn anew, each time closer.
+const ROUNDS: usize = 2;
+/// How much closer, at the most.
+const CLOSER: f64 = 0.25;
+
+/// One value of the parameter's logarithm, with the fit there.
+struct Point<'a> {
+    x: f64,
+    model: Extended<'a>,
+}
+
+/// Fits the shape of a choice of a model, where it has one that may be anything, and says how much wider its sizes are for it: their standard deviations.
+pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place: usize) -> Vec<f64> {
+    let choice = model.choices[place].clone();
+    let parameters = choice.parameters().len();
+    let first: usize = model.choices[..place].iter().map(|choice| choice.parameters().len()).sum();
+    let none = vec![0.0; parameters];
+    let grid: Vec<f64> = choice.grid().iter().map(|value| value.ln()).collect();
+    let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), choice.held().first()) else {
+        return none;
+    };
+    #[allow(clippy::cast_precision_loss)] // a handful of values
+    let mut reach = (high - low) / (grid.len().max(2) - 1) as f64;
+    // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other shapes.
+    let (low_end, high_end) = (low - 0.5 * reach, high + 0.5 * reach);
+    let at = |x: f64| -> Option<Point<'a>> {
+        let x = x.clamp(low_end, high_end);
+        let mut choices = model.choices.clone();
+        choices[place] = choice.moved_to(x.exp());
+        Some(Point { x, model: refit(base, choices)? })
+    };
+    let mut best = Point { x: held.ln(), model: model.clone() };
+    let mut wider = none.clone();
+    for _ in 0..ROUNDS {
+        let middle = best.x.clamp(low_end + 0.5 * reach, high_end - 0.5 * reach);
+        if middle != best.x {
+            let Some(point) = at(middle) else { return wider };
+            best = point;
+        }
+        reach = reach.min(high_end - best.x).min(best.x - low_end);
+        let (Some(below), Some(above)) = (at(best.x - reach), at(best.x + reach)) else { return wider };
+        let most = [&below, &best, &above].map(|point| count(&point.model.fit)).into_iter().fold(0.0, f64::max);
+        let costs = [&below, &best, &above].map(|point| cost(&point.model.fit, most));
+        let (slope, bend) =
+            ((costs[2] - costs[0]) / (2.0 * reach), (costs[2] - 2.0 * costs[1] + costs[0]) / (reach * reach));
+        // It lies in the range that is tried, anywhere: a twelfth of its square.
+        let variance = 1.0 / (bend.max(0.0) + 12.0 / (high - low).powi(2));
+        let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.sizes[first + k];
+        wider = (0..parameters)
+            .map(|k| (size(&above, k) - size(&below, k)).abs() / (2.0 * reach) * variance.sqrt())
+            .collect();
+        let vertex = if bend > 0.0 { best.x + (-slope / bend).clamp(-reach, reach) } else { best.x };
+        let points = [Some(below), at(vertex), Some(above)].into_iter().flatten();
+        best = points.fold(best, |best, point| {
+            let most = count(&best.model.fit).max(count(&point.model.fit));
+            if cost(&point.model.fit, most) < cost(&best.model.fit, most) { point } else { best }
+        });
+        reach = (1.5 * variance.sqrt()).clamp(CLOSER * reach, reach);
+    }
+    *model = best.model;
+    wider
+}
