@@ -469,12 +469,19 @@ fn the_scenario_document_has_every_key_and_every_effect() {
             assert!(document.contains(&format!("| `{key}` |")), "docs/scenario.md has no row for {key} of {part}");
         }
     }
-    for id in effects::CATALOGUE {
+    for id in effects::CATALOGUE.iter().chain([&"term"]) {
         let row = document.lines().find(|line| line.starts_with(&format!("| `{id}` |")));
         let row = row.unwrap_or_else(|| panic!("docs/scenario.md has no row for the effect {id}"));
         for key in keys::<effects::Effect>(id) {
             assert!(row.contains(&format!("`{key}`")), "docs/scenario.md: the row of {id} lacks {key}");
         }
+    }
+    let channels =
+        effects::Channel::MOTION.into_iter().chain(effects::Channel::SEEN).map(|channel| channel.name().to_owned());
+    for name in effects::Covariate::NAMED.iter().map(effects::Covariate::name).chain(channels) {
+        // A bar would end a table's cell.
+        let name = name.replace('|', "\\|");
+        assert!(document.contains(&format!("`{name}`")), "docs/scenario.md does not say what {name} is");
     }
 }
 

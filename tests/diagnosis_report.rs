@@ -46,3 +46,30 @@ fn a_report_shows_what_was_found() {
     let (before, after) = chances(&residuals, "left_wheel_phase", "along");
     assert!(before > 1e-3 && after > 1e-3, "{before} {after}");
 }
+
+/// What is found without a name is written, driven by the command, and found again.
+#[test]
+fn a_term_of_no_name_goes_from_the_command_to_the_command() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dir = folder.path();
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/motion-capture.toml"));
+    let mut scenario: toml::Table = text.expect("the shipped scenario").parse().expect("TOML");
+    let term = "channel = \"along\"\ncovariates = [\"|omega|\"]\ncoefficient = 0.004\nkind = \"term\"";
+    let term: toml::Table = term.parse().expect("TOML");
+    let effects = scenario["effect"].as_array_mut().expect("effects");
+    // The calibration's three stay.
+    effects.truncate(3);
+    effects.push(term.into());
+    std::fs::write(dir.join("hidden.toml"), scenario.to_string()).expect("written");
+    succeed(dir, &["simulate", "hidden.toml", "--out", "robot"]);
+    succeed(dir, &["diagnose", "robot", "--out", "first"]);
+    succeed(dir, &["simulate", "first/extended.toml", "--out", "again"]);
+    succeed(dir, &["diagnose", "again", "--out", "second"]);
+    for out in ["first", "second"] {
+        let text = std::fs::read_to_string(dir.join(out).join("findings.json")).expect("findings");
+        let found: Value = serde_json::from_str(&text).expect("JSON");
+        let term = &found["findings"][0]["unlisted_term"];
+        assert_eq!(found["verdict"], "unlisted", "{out}: {}", found["sentence"]);
+        assert_eq!((&term["channel"], &term["covariates"]), (&"along".into(), &vec!["|omega|"].into()), "{out}");
+    }
+}

@@ -5,7 +5,7 @@
 #![allow(clippy::print_stdout)] // every case with its seed
 
 use dataset::{Dataset, Schedule};
-use diagnose::{Document, Options, Verdict, diagnose};
+use diagnose::{Document, Options, UnlistedTerm, Verdict, diagnose};
 use effects::Effect;
 use scenario::Scenario;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -120,5 +120,57 @@ fn the_extended_scenario_shows_the_same_effect() {
         let again = diagnosed(&simulated(&extended, 32), &[]);
         println!("{id} again: {:?}", shown(&again));
         assert!(again.findings.iter().any(|finding| finding.names[0] == id), "{id}: {:?}", shown(&again));
+    }
+}
+
+/// Hidden terms that no effect of the catalogue does and no other product does on these paths: channel, covariates, coefficient, what else the effect says.
+const TERMS: [(&str, &[&str], f64, &str); 4] = [
+    ("along", &["|omega|"], 0.004, ""),
+    ("yaw", &["v", "x"], 0.02, ""),
+    ("along", &["v", "battery_v"], 0.002, "of_runs = { battery_v = [24.0, 23.5, 23.0, 22.0] }"),
+    ("seen_heading", &["sin(theta)"], 0.003, ""),
+];
+
+fn effect_of_term(channel: &str, covariates: &[impl AsRef<str>], coefficient: f64, more: &str) -> String {
+    let names: Vec<&str> = covariates.iter().map(AsRef::as_ref).collect();
+    format!(
+        "[[effect]]\nkind = \"term\"\nchannel = \"{channel}\"\ncovariates = {names:?}\ncoefficient = {coefficient:?}\n{more}\n"
+    )
+}
+
+/// The one finding, which must be a term outside of the catalogue on this channel with these covariates, and this size within five standard deviations.
+fn unlisted(document: &Document, channel: &str, covariates: &[&str], coefficient: f64) -> UnlistedTerm {
+    let [finding] = &document.findings[..] else { panic!("{channel} {covariates:?}: {:?}", shown(document)) };
+    let term = finding.unlisted_term.clone().unwrap_or_else(|| panic!("{channel} {covariates:?}: {finding:?}"));
+    println!("{channel} {covariates:?}: {}", finding.sentence);
+    let mut names: Vec<&str> = term.covariates.iter().map(String::as_str).collect();
+    names.sort_by_key(|name| covariates.iter().position(|own| own == name));
+    assert_eq!((document.verdict, term.channel.as_str(), &names[..]), (Verdict::Unlisted, channel, covariates));
+    // A chance of 5e-6 for all eight that are asked; half of the size would be off by 20 σ or more.
+    assert!((term.coefficient - coefficient).abs() < 5.0 * term.sigma, "{coefficient}: {term:?}");
+    term
+}
+
+/// What hides in a robot and has no name comes back with its channel and its covariates, and again from the extended scenario.
+#[test]
+fn a_term_of_no_name_comes_back_from_the_extended_scenario() {
+    for (number, (channel, covariates, coefficient, more)) in (0..).zip(TERMS) {
+        let hidden = robot(&effect_of_term(channel, covariates, coefficient, more));
+        let found = diagnose(&[simulated(&hidden, 40 + number)], &Options::default()).expect("a diagnosis");
+        let term = unlisted(&found.document, channel, covariates, coefficient);
+        let extended = found.extended.expect("a scenario");
+        // A finding can be pasted.
+        let more = if more.is_empty() { "" } else { "of_runs = { battery_v = [24.0, 23.5] }" };
+        let pasted = robot(&effect_of_term(&term.channel, &term.covariates, term.coefficient, more));
+        let (Some(Effect::Term(own)), Some(Effect::Term(pasted))) = (extended.effects.last(), pasted.effects.last())
+        else {
+            panic!("a term comes last: {:?}", extended.effects)
+        };
+        assert_eq!(
+            (own.channel, &own.covariates, own.coefficient),
+            (pasted.channel, &pasted.covariates, term.coefficient)
+        );
+        let again = diagnosed(&simulated(&extended, 60 + number), &[]);
+        unlisted(&again, channel, covariates, term.coefficient);
     }
 }

@@ -6,5 +6,6 @@
 mod faults;
 mod means;
 mod scatter;
+mod terms;
 mod variants;
 mod watched;

@@ -141,6 +141,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64],
             let interval = Interval {
                 t_s: row.t_s,
                 dt_s: row.dt_s,
+                row_s: [row.t_s, row.t_s + row.dt_s],
                 travel_m,
                 previous_m,
                 previous_dt_s,

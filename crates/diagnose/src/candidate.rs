@@ -1,9 +1,7 @@
 //! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
 
 use dataset::{ModelTerm, TermParameter};
-use effects::{CATALOGUE, Hypothesis, hypothesis};
-
-use crate::sparse::Sparse;
+use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
 
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,13 +6,13 @@
 
 use calib::likelihood::{Column, Innovation};
 use calib::methods::joint::JointFit;
+use effects::{Channel, Covariate, Sparse};
 use kinematics::Side;
 
 use crate::candidate::{Choice, terms};
 use crate::document::Check;
 use crate::scan::{Projected, Projection, freedom, principal, total};
 use crate::search::Extended;
-use crate::sparse::{Channel, Covariate, Sparse};
 use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z};
 
 /// Family-wise rate of false alarms of all checks.
@@ -82,11 +82,7 @@ pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
         .filter_map(|key| {
             let values: Vec<f64> =
                 fit.records.chains.iter().filter_map(|chain| chain.info.covariates.get(key).copied()).collect();
-            #[allow(clippy::cast_precision_loss)]
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let sd = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt();
-            (sd > 1e-9 * mean.abs().max(1e-9)).then(|| Covariate::OfRun { key: key.clone(), mean, sd })
+            Covariate::of_run(key, &values)
         })
         .collect()
 }
@@ -254,7 +250,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let library: Vec<Choice> = questions
         .iter()
         .flat_map(|(_, products)| products)
-        .flat_map(|product| Channel::ALL.map(|channel| Sparse { channel, covariates: product.clone() }))
+        .flat_map(|product| Channel::MOTION.map(|channel| Sparse { channel, covariates: product.clone() }))
         .map(Choice::Sparse)
         .collect();
     let mut all = terms(&model.choices);
@@ -266,7 +262,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let freedom = freedom(&model.fit, &evidence);
     let mut at = first;
     for (name, products) in &questions {
-        let own = products.len() * Channel::ALL.len();
+        let own = products.len() * Channel::MOTION.len();
         let columns: Vec<usize> = (at..at + own).collect();
         let parameters: Vec<_> =
             library[at - first..at - first + own].iter().map(|choice| choice.parameters()[0]).collect();

@@ -253,7 +253,7 @@ fn continued(
     let (sensitivity, blind_to) = blind(model, &catalogue);
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
     let verdict = verdict(&findings);
-    let extended = crate::scenario_of::scenario_of(datasets, model, &findings);
+    let extended = crate::scenario_of::scenario_of(datasets, model);
     let residuals = residuals(&asked.base, model);
     let alternatives = alternatives(&asked.found, &findings);
     let names: Vec<String> = datasets

@@ -104,11 +104,11 @@ pub struct Value {
 /// A term outside of the catalogue.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnlistedTerm {
-    /// `along`, `across` or `yaw`.
+    /// `along`, `across` or `yaw` of the motion, or `seen_along`, `seen_across`, `seen_heading` of what the instrument sees.
     pub channel: String,
-    /// Its rate is the coefficient times the product of these.
+    /// Its rate, or its size where it is seen, is the coefficient times the product of these; `1` for none. `kind = "term"` in a scenario takes them.
     pub covariates: Vec<String>,
-    /// In m/s or rad/s.
+    /// In m/s or rad/s; in metres or radians where it is seen.
     pub coefficient: f64,
     /// One standard deviation.
     pub sigma: f64,

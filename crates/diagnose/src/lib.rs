@@ -20,7 +20,6 @@ mod scatter;
 mod scenario_of;
 mod search;
 mod shape;
-mod sparse;
 mod statistics;
 mod unlisted;
 

@@ -86,9 +86,7 @@ fn z(test: &Test, p_value: f64) -> f64 {
 pub(crate) fn of_sparse(model: &Extended<'_>, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
     let Choice::Sparse(sparse) = model.choices.last()? else { return None };
     let (coefficient, sigma) = *test.sizes.first()?;
-    let covariates: Vec<String> = sparse.covariates.iter().map(crate::sparse::Covariate::name).collect();
-    let channel = sparse.channel.name();
-    let covariates = if covariates.is_empty() { vec!["1".to_owned()] } else { covariates };
+    let (channel, covariates) = (sparse.channel.name(), sparse.names());
     let sentence = format!(
         "not in the catalogue: {channel}, grows with {} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried",
         covariates.join(" · ")

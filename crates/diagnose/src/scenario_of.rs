@@ -1,12 +1,13 @@
 //! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry, estimated noise, found effects, and what was driven.
 
+use std::collections::BTreeMap;
+
 use calib::likelihood::NoiseComponent;
 use dataset::{Dataset, Protocol, Schedule, WheelLog};
-use effects::{Effect, effect_of_sizes};
+use effects::{Covariate, Effect, Sparse, SparseTerm, effect_of_sizes};
 use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
 use crate::candidate::Choice;
-use crate::document::Finding;
 use crate::search::Extended;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
@@ -17,11 +18,7 @@ const LEAST_COUNTS: f64 = 40_000.0;
 pub(crate) const READ_STANDING_S: f64 = 2.0;
 
 /// The scenario, or why it cannot be written.
-pub(crate) fn scenario_of(
-    datasets: &[Dataset],
-    model: &Extended<'_>,
-    findings: &[Finding],
-) -> Result<Scenario, String> {
+pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
     let fit = &model.fit.fit;
@@ -65,18 +62,21 @@ pub(crate) fn scenario_of(
     let mut at = 0;
     for choice in &model.choices {
         let parameters = choice.parameters();
-        let fitted = parameters.iter().zip(&fit.model.sizes[at..]).map(|(parameter, size)| (parameter.name, *size));
+        let fitted = &fit.model.sizes[at..at + parameters.len()];
         at += parameters.len();
-        if let Choice::Effect { id, .. } = choice {
-            let sizes: Vec<(&str, f64)> = fitted.chain(choice.held()).collect();
-            let effect = effect_of_sizes(id, &sizes)
-                .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?;
-            effect.physical().check().map_err(|error| error.to_string())?;
-            effects.push(effect);
-        }
-    }
-    if findings.iter().any(|finding| finding.unlisted_term.is_some()) {
-        return Err("a term outside of the catalogue cannot be simulated".to_owned());
+        let effect = match choice {
+            Choice::Effect { id, .. } => {
+                let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
+                let sizes: Vec<(&str, f64)> = named.chain(choice.held()).collect();
+                effect_of_sizes(id, &sizes)
+                    .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?
+            }
+            Choice::Sparse(sparse) => {
+                Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
+            }
+        };
+        effect.physical().check().map_err(|error| error.to_string())?;
+        effects.push(effect);
     }
     effects::sort_by_stage(&mut effects);
     let name = first.provenance.name.as_deref().unwrap_or("dataset");
@@ -97,6 +97,17 @@ pub(crate) fn scenario_of(
     // What is written must be readable.
     let text = scenario.to_toml().map_err(|error| error.to_string())?;
     Scenario::parse(&text, "extended.toml").map_err(|error| error.to_string())
+}
+
+/// What the runs had of the covariates of a product that are their own.
+fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec<f64>> {
+    let chains = &model.fit.records.chains;
+    let own = sparse.covariates.iter().filter_map(|covariate| match covariate {
+        Covariate::OfRun { key, .. } => Some(key),
+        _ => None,
+    });
+    own.map(|key| (key.clone(), chains.iter().filter_map(|chain| chain.info.covariates.get(key).copied()).collect()))
+        .collect()
 }
 
 /// The calibrated lengths as effects on the nominal ones.

@@ -1,6 +1,7 @@
 //! Structure that no name of the catalogue explains: one sparse term, if it earns its place on runs that it was not fitted to.
 
 use calib::methods::joint::JointFit;
+use effects::{Channel, Covariate, Sparse};
 use kinematics::Side;
 
 use crate::candidate::Choice;
@@ -8,7 +9,6 @@ use crate::checks::of_runs;
 use crate::gain::gain;
 use crate::scan::{Scored, scan};
 use crate::search::{Extended, refit};
-use crate::sparse::{Channel, Covariate, Sparse};
 use crate::statistics::of_trials;
 
 /// Rate of false alarms of the search for a sparse term.
@@ -70,7 +70,7 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         products.push(vec![SinPhase(side)]);
     }
     let moved = products.into_iter().flat_map(|covariates| {
-        Channel::ALL.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+        Channel::MOTION.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading]];
     let seen = seen.into_iter().flat_map(|covariates| {

@@ -21,6 +21,12 @@ pub enum EffectError {
         /// The range.
         must_be: &'static str,
     },
+    /// The parts of a term outside of the catalogue make none.
+    #[error("effect term: {problem}")]
+    NoTerm {
+        /// What is wrong with it, and what is known.
+        problem: String,
+    },
 }
 
 impl EffectError {

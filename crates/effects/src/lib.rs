@@ -4,17 +4,22 @@
 //! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
 //! The *hypothesis* face ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
 //!
-//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow.
+//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow. What has no name there
+//! is simulated as a [`SparseTerm`].
 
+mod covariate;
 mod effect;
 mod forward;
 mod hypothesis;
 mod stream;
+mod term;
 
+pub use covariate::{Channel, Covariate};
 pub use effect::{EffectError, PhysicalEffect};
 pub use forward::{Command, Forward, Hooks, Readout, RunStart, SampleClock, Sighting, Step};
 pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
 pub use stream::{Address, Stream, StreamName};
+pub use term::{Sparse, SparseTerm};
 
 /// Declares the catalogue: for each effect its module and its parameters' type.
 macro_rules! contents {
@@ -48,7 +53,7 @@ macro_rules! contents {
         }
         $(pub use catalogue::$module::$Type;)*
 
-        /// One effect of the catalogue with its sizes; `kind` in a scenario is its id.
+        /// One effect of the catalogue with its sizes, or a term outside of it; `kind` in a scenario is its id.
         #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(tag = "kind", rename_all = "snake_case")]
         pub enum Effect {
@@ -56,6 +61,8 @@ macro_rules! contents {
                 #[doc = concat!("`", stringify!($module), "`")]
                 $Type($Type),
             )*
+            /// `term`, of no name in the catalogue.
+            Term(SparseTerm),
         }
 
         impl Effect {
@@ -64,14 +71,25 @@ macro_rules! contents {
             pub fn physical(&self) -> &dyn PhysicalEffect {
                 match self {
                     $(Self::$Type(effect) => effect,)*
+                    Self::Term(term) => term,
                 }
             }
 
-            /// The id that scenarios, findings and tests use.
+            /// The id that scenarios, findings and tests use; of a term outside of the catalogue `term`.
             #[must_use]
             pub const fn id(&self) -> &'static str {
                 match self {
                     $(Self::$Type(_) => stringify!($module),)*
+                    Self::Term(_) => term::TERM,
+                }
+            }
+
+            /// How data would show the effect; a term outside of the catalogue is its own one shape, or `None` where it is not physical.
+            #[must_use]
+            pub fn hypothesis(&self) -> Option<Hypothesis> {
+                match self {
+                    $(Self::$Type(_) => Some(<$Type as PhysicalEffect>::hypothesis()),)*
+                    Self::Term(term) => term.shown(),
                 }
             }
         }
@@ -144,9 +162,9 @@ contents! {
     truth_outliers::TruthOutliers,
 }
 
-/// Puts effects into the order in which they act, so that a scenario's order does not matter.
+/// Puts effects into the order in which they act, so that a scenario's order does not matter; terms outside of the catalogue act last.
 pub fn sort_by_stage(effects: &mut [Effect]) {
-    effects.sort_by_key(|effect| CATALOGUE.iter().position(|id| *id == effect.id()));
+    effects.sort_by_key(|effect| CATALOGUE.iter().position(|id| *id == effect.id()).unwrap_or(CATALOGUE.len()));
 }
 
 #[cfg(test)]
@@ -168,11 +186,18 @@ mod tests {
     #[test]
     fn the_order_of_a_scenario_does_not_matter() {
         let mut effects = vec![
+            Effect::Term(SparseTerm {
+                channel: Channel::Yaw,
+                covariates: vec!["v".to_owned()],
+                coefficient: 0.01,
+                of_runs: std::collections::BTreeMap::new(),
+            }),
             Effect::CounterWrap(CounterWrap { bits: 16 }),
             Effect::WheelScale(WheelScale { scale: 1.01 }),
             Effect::SlipSpeed(SlipSpeed { slip_s_m: 0.01 }),
         ];
         sort_by_stage(&mut effects);
-        assert_eq!(effects.iter().map(Effect::id).collect::<Vec<_>>(), ["wheel_scale", "slip_speed", "counter_wrap"]);
+        let ids: Vec<&str> = effects.iter().map(Effect::id).collect();
+        assert_eq!(ids, ["wheel_scale", "slip_speed", "counter_wrap", "term"]);
     }
 }

@@ -455,6 +455,34 @@ mod tests {
     }
 
     #[test]
+    fn a_term_outside_of_the_catalogue_is_read_checked_and_written() {
+        let with =
+            |term: &str| PAPER.replacen("[[effect]]", &format!("[[effect]]\nkind = \"term\"\n{term}\n\n[[effect]]"), 1);
+        let term =
+            "channel = \"yaw\"\ncovariates = [\"|v|\", \"load\"]\ncoefficient = 0.01\nof_runs = { load = [0, 2.5] }";
+        let scenario = Scenario::parse(&with(term), "x.toml").expect("a scenario");
+        let Effect::Term(read) = &scenario.effects[0] else { panic!("{:?}", scenario.effects[0]) };
+        assert_eq!(
+            (read.channel.name(), &read.covariates[..], read.coefficient),
+            ("yaw", &["|v|".to_owned(), "load".to_owned()][..], 0.01)
+        );
+        assert_eq!(read.of_runs["load"], [0.0, 2.5]);
+        let text = scenario.to_toml().expect("serialises");
+        assert_eq!(Scenario::parse(&text, "again").expect("parses"), scenario);
+        let refusals = [
+            ("\"load\"]", "\"lode\"]", "x.toml: effect term: of_runs.load is not among the covariates"),
+            ("\"|v|\"", "\"speed\"", "x.toml: effect term: no covariate \"speed\"; known: \"v\", \"|v|\""),
+            ("\"yaw\"", "\"heading\"", "unknown variant `heading`, expected one of `along`"),
+            ("coefficient = 0.01", "coefficient = inf", "effect term: coefficient is inf; it must be finite"),
+            ("coefficient", "size", "unknown field `size`"),
+        ];
+        for (right, wrong, why) in refusals {
+            let refusal = error(&with(&term.replace(right, wrong)));
+            assert!(refusal.contains(why) && !refusal.contains('\n'), "{refusal}");
+        }
+    }
+
+    #[test]
     fn mistakes_are_named_with_their_line() {
         let line_of = |needle: &str| PAPER[..PAPER.find(needle).expect("in the file")].matches('\n').count() + 1;
         let wrong_unit = error(&PAPER.replace("wheel_separation_m =", "wheel_separation_mm ="));

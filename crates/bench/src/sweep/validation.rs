@@ -34,9 +34,9 @@ impl Validation {
         let interval_s = scenario.log.map_or(LARGEST_INTERVAL_S, |log| log.interval_s.min(LARGEST_INTERVAL_S));
         certain.log = Some(Log { interval_s });
         certain.instruments = Vec::new();
-        certain.effects.retain(|effect| {
-            matches!(effects::hypothesis(effect.id()), Some(Hypothesis::Geometry | Hypothesis::Terms(_)))
-        });
+        certain
+            .effects
+            .retain(|effect| matches!(effect.hypothesis(), Some(Hypothesis::Geometry | Hypothesis::Terms(_))));
         let driven =
             simulate_programs(&certain, &programs, Address { seed: scenario.seed, point: 0, trial: 0, run: 0 })?;
         let true_motion = driven

@@ -1,0 +1,350 @@
+//! What terms outside of the catalogue are made of: channels, and covariates with their names, normalisation and values.
+//!
+//! Both faces of [`crate::SparseTerm`] read this one list, and so do scenarios and findings: a name means the same wherever it stands. How the speeds, the
+//! heading or the way come about is each face's own.
+
+use std::collections::BTreeMap;
+
+use kinematics::{Side, Wheels};
+use serde::{Deserialize, Serialize};
+
+/// Which increment a term adds to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Along the robot, m/s.
+    Along,
+    /// Across, to the left, m/s.
+    Across,
+    /// The heading, rad/s.
+    Yaw,
+    /// What the instrument sees, ahead of the robot, metres.
+    SeenAlong,
+    /// What the instrument sees, to the left of the robot, metres.
+    SeenAcross,
+    /// The heading that the instrument sees, radians.
+    SeenHeading,
+}
+
+impl Channel {
+    /// Of the motion.
+    pub const MOTION: [Self; 3] = [Self::Along, Self::Across, Self::Yaw];
+    /// Of the instrument.
+    pub const SEEN: [Self; 3] = [Self::SeenAlong, Self::SeenAcross, Self::SeenHeading];
+
+    /// Its name in findings and scenarios.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Along => "along",
+            Self::Across => "across",
+            Self::Yaw => "yaw",
+            Self::SeenAlong => "seen_along",
+            Self::SeenAcross => "seen_across",
+            Self::SeenHeading => "seen_heading",
+        }
+    }
+
+    /// Is it what the instrument sees, and not the motion?
+    #[must_use]
+    pub fn is_seen(self) -> bool {
+        Self::SEEN.contains(&self)
+    }
+}
+
+/// What was recorded of an interval, each over a size that makes it about 1.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Covariate {
+    /// `v`: speed over 1 m/s.
+    Speed,
+    /// `|v|`.
+    AbsSpeed,
+    /// `omega`: yaw rate over 1 rad/s.
+    YawRate,
+    /// `|omega|`.
+    AbsYawRate,
+    /// `acceleration`: change of v, over 1 m/s².
+    Acceleration,
+    /// `yaw_acceleration`: change of ω, over 1 rad/s².
+    YawAcceleration,
+    /// `cos(theta)`: of the heading in the room.
+    CosHeading,
+    /// `sin(theta)`: of the heading in the room.
+    SinHeading,
+    /// `v cos(left wheel)`, `v cos(right wheel)`: cosine of a wheel's angle times its contact's speed.
+    CosPhase(Side),
+    /// `v sin(left wheel)`, `v sin(right wheel)`: sine of a wheel's angle times its contact's speed.
+    SinPhase(Side),
+    /// `time in run`, over a minute.
+    RunTime,
+    /// `session time`: on the session's clock, over ten minutes.
+    SessionTime,
+    /// `distance driven` in the session, over 100 m.
+    Way,
+    /// `exp(-distance since reversal / 0.1 m)`: of the way since the robot last went the other way; 0 before it first does.
+    SinceReversal,
+    /// `x`: place in the room, over 1 m.
+    X,
+    /// `y`: place in the room, over 1 m.
+    Y,
+    /// A covariate of the run, by its own name, less its mean and over its standard deviation; 0 in a run that has none.
+    OfRun {
+        /// Its name in the run's record.
+        key: String,
+        /// Mean over the runs.
+        mean: f64,
+        /// Standard deviation over the runs.
+        sd: f64,
+    },
+}
+
+impl Covariate {
+    /// Those that have a name of their own: all but [`Self::OfRun`].
+    pub const NAMED: [Self; 18] = [
+        Self::Speed,
+        Self::AbsSpeed,
+        Self::YawRate,
+        Self::AbsYawRate,
+        Self::Acceleration,
+        Self::YawAcceleration,
+        Self::CosHeading,
+        Self::SinHeading,
+        Self::CosPhase(Side::Left),
+        Self::CosPhase(Side::Right),
+        Self::SinPhase(Side::Left),
+        Self::SinPhase(Side::Right),
+        Self::RunTime,
+        Self::SessionTime,
+        Self::Way,
+        Self::SinceReversal,
+        Self::X,
+        Self::Y,
+    ];
+
+    /// Its name in findings and scenarios.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Speed => "v",
+            Self::AbsSpeed => "|v|",
+            Self::YawRate => "omega",
+            Self::AbsYawRate => "|omega|",
+            Self::Acceleration => "acceleration",
+            Self::YawAcceleration => "yaw_acceleration",
+            Self::CosHeading => "cos(theta)",
+            Self::SinHeading => "sin(theta)",
+            Self::CosPhase(Side::Left) => "v cos(left wheel)",
+            Self::CosPhase(Side::Right) => "v cos(right wheel)",
+            Self::SinPhase(Side::Left) => "v sin(left wheel)",
+            Self::SinPhase(Side::Right) => "v sin(right wheel)",
+            Self::RunTime => "time in run",
+            Self::SessionTime => "session time",
+            Self::Way => "distance driven",
+            Self::SinceReversal => "exp(-distance since reversal / 0.1 m)",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::OfRun { key, .. } => return key.clone(),
+        }
+        .to_owned()
+    }
+
+    /// The covariate of a name; `None` where it is none of [`Self::NAMED`].
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::NAMED.into_iter().find(|covariate| covariate.name() == name)
+    }
+
+    /// The covariate of a run whose values over the runs are these; `None` where they do not differ.
+    #[must_use]
+    pub fn of_run(key: &str, values: &[f64]) -> Option<Self> {
+        #[allow(clippy::cast_precision_loss)]
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let sd = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt();
+        (sd > 1e-9 * mean.abs().max(1e-9)).then(|| Self::OfRun { key: key.to_owned(), mean, sd })
+    }
+
+    /// Is it 0 whenever the robot stands?
+    #[must_use]
+    pub const fn vanishes_at_rest(&self) -> bool {
+        matches!(
+            self,
+            Self::Speed
+                | Self::AbsSpeed
+                | Self::YawRate
+                | Self::AbsYawRate
+                | Self::Acceleration
+                | Self::YawAcceleration
+                | Self::CosPhase(_)
+                | Self::SinPhase(_)
+        )
+    }
+
+    /// Is it known of a look: of the robot's twist and heading then?
+    #[must_use]
+    pub const fn is_of_a_look(&self) -> bool {
+        matches!(self, Self::CosHeading | Self::SinHeading) || self.is_a_speed()
+    }
+
+    /// Is it v or ω, with or without its sign?
+    pub(crate) const fn is_a_speed(&self) -> bool {
+        matches!(self, Self::Speed | Self::AbsSpeed | Self::YawRate | Self::AbsYawRate)
+    }
+
+    /// Its value at a moment.
+    pub(crate) fn value(&self, at: &Moment<'_>) -> f64 {
+        match self {
+            Self::Speed => at.v_m_s,
+            Self::AbsSpeed => at.v_m_s.abs(),
+            Self::YawRate => at.omega_rad_s,
+            Self::AbsYawRate => at.omega_rad_s.abs(),
+            Self::Acceleration => at.acceleration_m_s2,
+            Self::YawAcceleration => at.yaw_acceleration_rad_s2,
+            Self::CosHeading => at.heading_rad.cos(),
+            Self::SinHeading => at.heading_rad.sin(),
+            Self::CosPhase(side) => at.wheel_m_s[*side] * at.wheel_rad[*side].cos(),
+            Self::SinPhase(side) => at.wheel_m_s[*side] * at.wheel_rad[*side].sin(),
+            Self::RunTime => at.run_s / 60.0,
+            Self::SessionTime => at.session_s / 600.0,
+            Self::Way => at.session_m / 100.0,
+            Self::SinceReversal => (-at.since_reversal_m / 0.1).exp(),
+            Self::X => at.x_m,
+            Self::Y => at.y_m,
+            Self::OfRun { key, mean, sd } => at.of_run.get(key).map_or(0.0, |value| (value - mean) / sd),
+        }
+    }
+}
+
+/// What covariates are made of.
+pub(crate) struct Moment<'r> {
+    pub(crate) v_m_s: f64,
+    pub(crate) omega_rad_s: f64,
+    pub(crate) acceleration_m_s2: f64,
+    pub(crate) yaw_acceleration_rad_s2: f64,
+    pub(crate) heading_rad: f64,
+    pub(crate) wheel_m_s: Wheels<f64>,
+    pub(crate) wheel_rad: Wheels<f64>,
+    pub(crate) run_s: f64,
+    pub(crate) session_s: f64,
+    pub(crate) session_m: f64,
+    pub(crate) since_reversal_m: f64,
+    pub(crate) x_m: f64,
+    pub(crate) y_m: f64,
+    pub(crate) of_run: &'r BTreeMap<String, f64>,
+}
+
+/// Way back that counts as a reversal, metres: more than the counts of a standstill.
+const REVERSAL_M: f64 = 1e-3;
+
+/// The way since the robot last went the other way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reversals {
+    swung_m: f64,
+    ahead: Option<bool>,
+    since_m: f64,
+}
+
+impl Reversals {
+    /// None yet.
+    pub(crate) const NONE: Self = Self { swung_m: 0.0, ahead: None, since_m: f64::INFINITY };
+
+    /// The way since the last one, after going this far on, or back where that is negative.
+    pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
+        self.swung_m = (self.swung_m + distance_m).clamp(-0.5 * REVERSAL_M, 0.5 * REVERSAL_M);
+        if self.swung_m.abs() >= 0.5 * REVERSAL_M {
+            let ahead = self.swung_m > 0.0;
+            if self.ahead.is_some_and(|before| before != ahead) {
+                self.since_m = 0.0;
+            }
+            self.ahead = Some(ahead);
+        }
+        self.since_m += distance_m.abs();
+        self.since_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_back_to_what_they_name() {
+        for covariate in Covariate::NAMED {
+            assert_eq!(Covariate::named(&covariate.name()), Some(covariate));
+        }
+        assert_eq!(Covariate::named("speed"), None);
+        for channel in Channel::MOTION.into_iter().chain(Channel::SEEN) {
+            let read =
+                Channel::deserialize(serde::de::value::StrDeserializer::<serde::de::value::Error>::new(channel.name()))
+                    .expect("a channel");
+            assert_eq!(read, channel);
+        }
+    }
+
+    #[test]
+    fn every_covariate_is_what_the_document_says_over_its_size() {
+        let load = BTreeMap::from([("load".to_owned(), 7.0)]);
+        let at = Moment {
+            v_m_s: -0.3,
+            omega_rad_s: -0.7,
+            acceleration_m_s2: 0.2,
+            yaw_acceleration_rad_s2: 0.9,
+            heading_rad: 0.5,
+            wheel_m_s: Wheels { left: 0.4, right: -0.6 },
+            wheel_rad: Wheels { left: 1.1, right: 2.3 },
+            run_s: 30.0,
+            session_s: 900.0,
+            session_m: 25.0,
+            since_reversal_m: 0.2,
+            x_m: 1.5,
+            y_m: -2.5,
+            of_run: &load,
+        };
+        let (cos, sin) = (f64::cos, f64::sin);
+        let expected = [
+            -0.3,
+            0.3,
+            -0.7,
+            0.7,
+            0.2,
+            0.9,
+            cos(0.5),
+            sin(0.5),
+            0.4 * cos(1.1),
+            -0.6 * cos(2.3),
+            0.4 * sin(1.1),
+            -0.6 * sin(2.3),
+            0.5,
+            1.5,
+            0.25,
+            f64::exp(-2.0),
+            1.5,
+            -2.5,
+        ];
+        for (covariate, expected) in Covariate::NAMED.into_iter().zip(expected) {
+            // 0.2 / 0.1 rounds.
+            assert!((covariate.value(&at) - expected).abs() < 1e-15, "{covariate:?}: {}", covariate.value(&at));
+        }
+        let of_run = |key: &str| Covariate::OfRun { key: key.to_owned(), mean: 3.0, sd: 2.0 }.value(&at);
+        assert_eq!((of_run("load"), of_run("battery_v")), (2.0, 0.0));
+    }
+
+    #[test]
+    fn a_covariate_of_runs_is_normalised_by_their_values() {
+        let Some(Covariate::OfRun { key, mean, sd }) = Covariate::of_run("load", &[1.0, 5.0]) else {
+            panic!("they differ")
+        };
+        assert_eq!((key.as_str(), mean, sd), ("load", 3.0, 2.0));
+        assert_eq!(Covariate::of_run("load", &[5.0, 5.0]), None);
+        assert_eq!(Covariate::of_run("load", &[]), None);
+    }
+
+    #[test]
+    fn a_reversal_takes_more_than_the_counts_of_a_standstill() {
+        let mut reversals = Reversals::NONE;
+        assert_eq!(reversals.after(0.5), f64::INFINITY);
+        assert_eq!(reversals.after(-0.9 * REVERSAL_M), f64::INFINITY);
+        assert_eq!(reversals.after(-0.2 * REVERSAL_M), 0.2 * REVERSAL_M);
+        assert_eq!(reversals.after(-0.1), 0.2 * REVERSAL_M + 0.1);
+    }
+}

@@ -1,0 +1,460 @@
+//! `term`: what no name of the catalogue explains, as a coefficient times a product of at most three covariates on one channel.
+//!
+//! Model: along, across and yaw gain coefficient · Π covariates per second; seen_along, seen_across and seen_heading are off by coefficient · Π covariates.
+//! [`Sparse`] is the hypothesis face, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the forward face, as
+//! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes with.
+//!
+//! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised because a threshold on raw coefficients depends on
+//! units.
+
+use std::collections::BTreeMap;
+
+use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
+use kinematics::{Increment, Pose, Wheels};
+use serde::{Deserialize, Serialize};
+
+use crate::covariate::{Channel, Covariate, Moment, Reversals};
+use crate::effect::{EffectError, PhysicalEffect};
+use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
+use crate::hypothesis::{Hypothesis, Shape};
+
+/// `kind` of a [`SparseTerm`] in a scenario.
+pub(crate) const TERM: &str = "term";
+/// How a product of no covariates is written.
+const CONSTANT: &str = "1";
+/// Most covariates of a product.
+const MOST_COVARIATES: usize = 3;
+
+/// A channel and the product of covariates that it goes with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sparse {
+    /// What it adds to.
+    pub channel: Channel,
+    /// The factors; none for a constant.
+    pub covariates: Vec<Covariate>,
+}
+
+impl Sparse {
+    /// The names of its covariates, as findings and scenarios have them.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        if self.covariates.is_empty() {
+            return vec![CONSTANT.to_owned()];
+        }
+        self.covariates.iter().map(Covariate::name).collect()
+    }
+
+    /// How recorded data show it.
+    #[must_use]
+    pub fn term(&self) -> Box<dyn ModelTerm> {
+        Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false })
+    }
+
+    fn product(&self, at: &Moment<'_>) -> f64 {
+        self.covariates.iter().map(|covariate| covariate.value(at)).product()
+    }
+}
+
+/// A term of a given size, for the simulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SparseTerm {
+    /// What it adds to.
+    pub channel: Channel,
+    /// Names of one to three covariates ([`Covariate`]), or keys of `of_runs`; `["1"]` for a constant. The same one may come several times.
+    pub covariates: Vec<String>,
+    /// Size where the covariates' product is 1: m/s along and across, rad/s in yaw; metres and radians on what the instrument sees.
+    pub coefficient: f64,
+    /// What runs have in turn, over and over, of covariates that are the runs' own. Every run's record says its value, unless another effect has said it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub of_runs: BTreeMap<String, Vec<f64>>,
+}
+
+impl SparseTerm {
+    /// A product with its size; `of_runs` has the values of the runs' own covariates.
+    #[must_use]
+    pub fn new(sparse: &Sparse, coefficient: f64, of_runs: BTreeMap<String, Vec<f64>>) -> Self {
+        Self { channel: sparse.channel, covariates: sparse.names(), coefficient, of_runs }
+    }
+
+    /// The product that its names mean.
+    ///
+    /// # Errors
+    /// [`EffectError`]: too many or no covariates, unknown ones, ones that the channel cannot have, or values of runs that make no covariate.
+    pub fn sparse(&self) -> Result<Sparse, EffectError> {
+        let no_term = |problem: String| Err(EffectError::NoTerm { problem });
+        let channel = self.channel.name();
+        for (key, values) in &self.of_runs {
+            if Covariate::named(key).is_some() || key == CONSTANT {
+                return no_term(format!("of_runs.{key}: the name is taken"));
+            }
+            if !self.covariates.contains(key) {
+                return no_term(format!("of_runs.{key} is not among the covariates"));
+            }
+            if values.iter().any(|value| !value.is_finite()) || Covariate::of_run(key, values).is_none() {
+                return no_term(format!("of_runs.{key} must be finite values that differ"));
+            }
+        }
+        if self.covariates.is_empty() || self.covariates.len() > MOST_COVARIATES {
+            let count = self.covariates.len();
+            return no_term(format!("{count} covariates; one to {MOST_COVARIATES}, or \"{CONSTANT}\" for a constant"));
+        }
+        let covariates = if self.covariates == [CONSTANT] {
+            Vec::new()
+        } else {
+            self.covariates.iter().map(|name| self.covariate(name)).collect::<Result<_, _>>()?
+        };
+        let (what, holds) = if self.channel.is_seen() {
+            ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
+        } else {
+            ("must vanish at standstill and needs one of these", covariates.iter().any(Covariate::vanishes_at_rest))
+        };
+        if !holds {
+            let fits = |covariate: &&Covariate| {
+                if self.channel.is_seen() { covariate.is_of_a_look() } else { covariate.vanishes_at_rest() }
+            };
+            return no_term(format!("{channel} {what}: {}", listed(Covariate::NAMED.iter().filter(fits))));
+        }
+        Ok(Sparse { channel: self.channel, covariates })
+    }
+
+    fn covariate(&self, name: &str) -> Result<Covariate, EffectError> {
+        let of_runs = || Covariate::of_run(name, self.of_runs.get(name)?);
+        Covariate::named(name).or_else(of_runs).ok_or_else(|| {
+            let known = listed(Covariate::NAMED.iter());
+            let problem = format!("no covariate \"{name}\"; known: {known}, and what of_runs has values of");
+            EffectError::NoTerm { problem }
+        })
+    }
+
+    /// How recorded data show it: a mean term without shape parameters. `None` where its names mean none.
+    #[must_use]
+    pub(crate) fn shown(&self) -> Option<Hypothesis> {
+        let term = self.sparse().ok()?.term();
+        Some(Hypothesis::Terms(vec![Shape { held: Vec::new(), term }]))
+    }
+}
+
+fn listed<'c>(covariates: impl Iterator<Item = &'c Covariate>) -> String {
+    covariates.map(|covariate| format!("\"{}\"", covariate.name())).collect::<Vec<_>>().join(", ")
+}
+
+impl PhysicalEffect for SparseTerm {
+    fn check(&self) -> Result<(), EffectError> {
+        EffectError::unless_finite(TERM, [("coefficient", self.coefficient)])?;
+        self.sparse().map(|_| ())
+    }
+
+    fn forward(&self) -> Option<Box<dyn Forward>> {
+        let sparse = self.sparse().ok()?;
+        Some(Box::new(State {
+            size: self.clone(),
+            sparse,
+            of_run: BTreeMap::new(),
+            session_s: 0.0,
+            session_m: 0.0,
+            reversals: Reversals::NONE,
+            speeds: (0.0, 0.0),
+        }))
+    }
+
+    /// A mean term; of which form, an instance says.
+    fn hypothesis() -> Hypothesis {
+        Hypothesis::Terms(Vec::new())
+    }
+}
+
+/// The forward face in a run.
+struct State {
+    size: SparseTerm,
+    sparse: Sparse,
+    of_run: BTreeMap<String, f64>,
+    /// Start of the run on the session's clock, seconds.
+    session_s: f64,
+    /// Way of the drive's centre in the session, metres.
+    session_m: f64,
+    reversals: Reversals,
+    /// v and ω of the last step, for what is seen after it.
+    speeds: (f64, f64),
+}
+
+impl Forward for State {
+    fn hooks(&self) -> Hooks {
+        Hooks { begin_run: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
+    }
+
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        (self.session_s, self.session_m) = (run.session_s, run.session_m);
+        (self.reversals, self.speeds) = (Reversals::NONE, (0.0, 0.0));
+        for (key, values) in &self.size.of_runs {
+            let value = values[run.number as usize % values.len()];
+            let said = *run.info.covariates.entry(key.clone()).or_insert(value);
+            self.of_run.insert(key.clone(), said);
+        }
+    }
+
+    fn floor(&mut self, step: &mut Step) {
+        let mean = |wheels: Wheels<f64>| 0.5 * (wheels.left + wheels.right);
+        let turn = |wheels: Wheels<f64>| (wheels.right - wheels.left) / step.wheel_separation_m;
+        // By the wheels' true size, which is what counts come to once they are calibrated.
+        let wheel_m_s = step.radius_m.zip_with(step.rate_rad_s, |radius_m, rate| radius_m * rate);
+        let wheel_m_s2 = step.radius_m.zip_with(step.acceleration_rad_s2, |radius_m, rate| radius_m * rate);
+        let (v_m_s, omega_rad_s) = (mean(wheel_m_s), turn(wheel_m_s));
+        self.speeds = (v_m_s, omega_rad_s);
+        if self.sparse.channel.is_seen() {
+            return;
+        }
+        let half_s = 0.5 * step.dt_s;
+        let distance_m = v_m_s * step.dt_s;
+        let at = Moment {
+            v_m_s,
+            omega_rad_s,
+            acceleration_m_s2: mean(wheel_m_s2),
+            yaw_acceleration_rad_s2: turn(wheel_m_s2),
+            heading_rad: step.world_from_body.theta_rad + omega_rad_s * half_s,
+            wheel_m_s,
+            wheel_rad: step.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turned| angle + 0.5 * turned),
+            run_s: step.t_s + half_s,
+            session_s: self.session_s + step.t_s + half_s,
+            session_m: self.session_m,
+            since_reversal_m: self.reversals.after(distance_m),
+            x_m: step.world_from_body.x_m,
+            y_m: step.world_from_body.y_m,
+            of_run: &self.of_run,
+        };
+        self.session_m += distance_m.abs();
+        let size = self.size.coefficient * self.sparse.product(&at) * step.dt_s;
+        match self.sparse.channel {
+            Channel::Along => step.travel_m = step.travel_m.map(|travel_m| travel_m + size),
+            Channel::Across => step.lateral_m += size,
+            _ => step.extra_turn_rad += size,
+        }
+    }
+
+    fn instrument(&mut self, sighting: &mut Sighting) {
+        let size = self.size.coefficient * self.sparse.product(&seen(self.speeds, sighting.world_from_body));
+        sighting.world_from_body = sighting.world_from_body * on_channel(self.sparse.channel, size);
+    }
+
+    fn needs_stepping(&self) -> Option<&'static str> {
+        let is_exact = |covariate: &Covariate| match (self.sparse.channel.is_seen(), covariate) {
+            (true, Covariate::CosHeading | Covariate::SinHeading) | (false, Covariate::OfRun { .. }) => true,
+            (is_seen, covariate) => !is_seen && covariate.is_a_speed(),
+        };
+        let exact = self.sparse.covariates.iter().all(is_exact);
+        (!exact).then_some("what it goes with changes within a motion")
+    }
+
+    /// What goes with v or ω alone goes with the way or the turn, however fast.
+    fn depends_on_speed(&self) -> bool {
+        self.size.coefficient != 0.0 && self.sparse.covariates.iter().filter(|of| of.is_a_speed()).count() > 1
+    }
+}
+
+/// A moment at which an instrument looks: twist and heading alone are known of it.
+fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose) -> Moment<'static> {
+    static NONE: BTreeMap<String, f64> = BTreeMap::new();
+    Moment {
+        v_m_s,
+        omega_rad_s,
+        acceleration_m_s2: 0.0,
+        yaw_acceleration_rad_s2: 0.0,
+        heading_rad: world_from_body.theta_rad,
+        wheel_m_s: Wheels::both(0.0),
+        wheel_rad: Wheels::both(0.0),
+        run_s: 0.0,
+        session_s: 0.0,
+        session_m: 0.0,
+        since_reversal_m: f64::INFINITY,
+        x_m: 0.0,
+        y_m: 0.0,
+        of_run: &NONE,
+    }
+}
+
+fn on_channel(channel: Channel, size: f64) -> Pose {
+    match channel {
+        Channel::Along | Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
+        Channel::Across | Channel::SeenAcross => Pose::new(0.0, size, 0.0),
+        Channel::Yaw | Channel::SeenHeading => Pose::new(0.0, 0.0, size),
+    }
+}
+
+/// The hypothesis face in a run.
+struct Recorded {
+    of: Sparse,
+    reversals: Reversals,
+    started: bool,
+}
+
+/// A rate of 1 per cent at unit covariates would be large for a real robot.
+const ALONG: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m/s", plausible: 0.02 }];
+const YAW: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad/s", plausible: 0.02 }];
+const SEEN: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m", plausible: 0.02 }];
+const SEEN_HEADING: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad", plausible: 0.02 }];
+
+impl ModelTerm for Recorded {
+    fn parameters(&self) -> &'static [TermParameter] {
+        match self.of.channel {
+            Channel::Along | Channel::Across => &ALONG,
+            Channel::Yaw => &YAW,
+            Channel::SeenAlong | Channel::SeenAcross => &SEEN,
+            Channel::SeenHeading => &SEEN_HEADING,
+        }
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        (self.reversals, self.started) = (Reversals::NONE, false);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if interval.dt_s <= 0.0 || self.of.channel.is_seen() {
+            return;
+        }
+        let Increment { distance_m, turn_rad } = interval.increment();
+        let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
+        let before = interval.previous_speed_m_s();
+        let between_s = 0.5 * (interval.dt_s + interval.previous_dt_s);
+        let (mut acceleration_m_s2, mut yaw_acceleration_rad_s2) = (0.0, 0.0);
+        if std::mem::replace(&mut self.started, true) {
+            acceleration_m_s2 = (v_m_s - 0.5 * (before.left + before.right)) / between_s;
+            let omega_before = (before.right - before.left) / interval.wheel_separation_m;
+            yaw_acceleration_rad_s2 = (omega_rad_s - omega_before) / between_s;
+        }
+        let at = Moment {
+            v_m_s,
+            omega_rad_s,
+            acceleration_m_s2,
+            yaw_acceleration_rad_s2,
+            heading_rad: interval.world_from_body.theta_rad + 0.5 * turn_rad,
+            wheel_m_s: interval.speed_m_s(),
+            wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
+            run_s: interval.t_s,
+            session_s: interval.session_s(),
+            session_m: interval.session_m,
+            since_reversal_m: self.reversals.after(distance_m),
+            x_m: interval.world_from_body.x_m,
+            y_m: interval.world_from_body.y_m,
+            of_run: &interval.run.covariates,
+        };
+        gradient[0] = on_channel(self.of.channel, self.of.product(&at) * interval.dt_s);
+    }
+
+    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+        if self.of.channel.is_seen() {
+            let speeds = (look.twist.v_m_s, look.twist.omega_rad_s);
+            gradient[0] = on_channel(self.of.channel, self.of.product(&seen(speeds, look.world_from_body)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::specimen_step;
+
+    fn term(channel: Channel, covariates: &[&str]) -> SparseTerm {
+        let covariates = covariates.iter().map(ToString::to_string).collect();
+        SparseTerm { channel, covariates, coefficient: 0.1, of_runs: BTreeMap::new() }
+    }
+
+    fn problem(term: &SparseTerm) -> String {
+        term.check().expect_err("no term").to_string()
+    }
+
+    #[test]
+    fn a_step_gains_the_product_on_its_channel() {
+        let gained = |channel| {
+            let mut state = term(channel, &["v", "|omega|", "sin(theta)"]).forward().expect("a term");
+            let mut step = specimen_step();
+            step.rate_rad_s = Wheels { left: -1.0, right: -3.0 };
+            step.world_from_body.theta_rad = 0.7;
+            step.travel_m = Wheels { left: -8e-5, right: -2.4e-4 };
+            state.floor(&mut step);
+            (0.5 * (step.travel_m.left + step.travel_m.right) + 1.6e-4, step.lateral_m, step.extra_turn_rad)
+        };
+        // v = −0.16 m/s and ω = −0.16/0.363 rad/s; the middle of the step is half of its turn on.
+        let omega_rad_s = -0.16 / 0.363;
+        let size = 0.1 * -0.16 * 0.16 / 0.363 * f64::sin(0.7 + 5e-4 * omega_rad_s) * 1e-3;
+        // Rounding of millimetres alone.
+        let is = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-18, "{found:e} {expected:e}");
+        for (channel, expected) in
+            [(Channel::Along, [size, 0.0, 0.0]), (Channel::Across, [0.0, size, 0.0]), (Channel::Yaw, [0.0, 0.0, size])]
+        {
+            let (along, across, yaw) = gained(channel);
+            is(along, expected[0]);
+            is(across, expected[1]);
+            is(yaw, expected[2]);
+        }
+    }
+
+    #[test]
+    fn an_instrument_is_off_in_the_frame_of_the_robot() {
+        let mut state = term(Channel::SeenAcross, &["v"]).forward().expect("a term");
+        let mut sighting = Sighting { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, std::f64::consts::FRAC_PI_2) };
+        let before = sighting;
+        state.instrument(&mut sighting);
+        assert_eq!(sighting, before, "nothing has moved yet");
+        let mut step = specimen_step();
+        step.rate_rad_s = Wheels::both(2.5);
+        let untouched = step;
+        state.floor(&mut step);
+        assert_eq!(step, untouched, "it is seen, and not driven");
+        state.instrument(&mut sighting);
+        // Left of a robot that looks along y is −x: 0.1 × 0.2 m/s.
+        assert!((sighting.world_from_body.x_m - 0.98).abs() < 1e-15, "{sighting:?}");
+        assert!((sighting.world_from_body.y_m - 2.0).abs() < 1e-15, "{sighting:?}");
+    }
+
+    #[test]
+    fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
+        let mut of_load = term(Channel::Along, &["v", "load"]);
+        of_load.of_runs.insert("load".to_owned(), vec![1.0, 5.0]);
+        let mut state = of_load.forward().expect("a term");
+        let gained_m = |state: &mut dyn Forward, number, said: Option<f64>| {
+            let mut info = RunInfo::default();
+            info.covariates.extend(said.map(|said| ("load".to_owned(), said)));
+            state.begin_run(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
+            let mut step = specimen_step();
+            step.rate_rad_s = Wheels::both(2.5);
+            state.floor(&mut step);
+            (info.covariates["load"], step.travel_m.left)
+        };
+        // (value − 3)/2 × 0.2 m/s × 0.1 × 1 ms.
+        for (number, said, load, expected) in
+            [(0, None, 1.0, -2e-5), (1, None, 5.0, 2e-5), (2, None, 1.0, -2e-5), (3, Some(3.5), 3.5, 5e-6)]
+        {
+            let (found, gained_m) = gained_m(&mut *state, number, said);
+            assert_eq!(found, load);
+            assert!((gained_m - expected).abs() < 1e-18, "{number}: {gained_m:e}");
+        }
+    }
+
+    #[test]
+    fn what_makes_no_term_says_why() {
+        assert_eq!(term(Channel::Yaw, &["|v|", "sin(theta)"]).check(), Ok(()));
+        assert_eq!(term(Channel::SeenHeading, &["1"]).check(), Ok(()));
+        let unknown = problem(&term(Channel::Yaw, &["v", "speed"]));
+        assert!(unknown.contains("no covariate \"speed\"") && unknown.contains("\"|omega|\""), "{unknown}");
+        assert!(problem(&term(Channel::Yaw, &[])).contains("0 covariates"));
+        assert!(problem(&term(Channel::Yaw, &["v", "v", "v", "v"])).contains("4 covariates"));
+        let at_rest = problem(&term(Channel::Along, &["cos(theta)", "x"]));
+        assert!(at_rest.contains("along must vanish at standstill") && at_rest.contains("\"v\""), "{at_rest}");
+        assert!(problem(&term(Channel::Along, &["1"])).contains("vanish at standstill"));
+        assert!(problem(&term(Channel::Along, &["1", "v"])).contains("no covariate \"1\""));
+        let seen = problem(&term(Channel::SeenAlong, &["time in run"]));
+        assert!(seen.contains("seen_along goes with these alone") && seen.contains("\"cos(theta)\""), "{seen}");
+        let endless = SparseTerm { coefficient: f64::NAN, ..term(Channel::Yaw, &["v"]) };
+        assert!(problem(&endless).contains("coefficient is NaN"));
+        let of_runs = |key: &str, values: &[f64]| {
+            let mut term = term(Channel::Yaw, &["v", "load"]);
+            term.of_runs.insert(key.to_owned(), values.to_vec());
+            problem(&term)
+        };
+        assert!(of_runs("load", &[2.0, 2.0]).contains("of_runs.load must be finite values that differ"));
+        assert!(of_runs("load", &[]).contains("must be finite"));
+        assert!(of_runs("load", &[2.0, f64::INFINITY]).contains("must be finite"));
+        assert!(of_runs("mass", &[1.0, 2.0]).contains("of_runs.mass is not among the covariates"));
+        assert!(of_runs("v", &[1.0, 2.0]).contains("the name is taken"));
+    }
+}
