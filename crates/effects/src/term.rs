@@ -131,7 +131,7 @@ impl SparseTerm {
     #[must_use]
     pub(crate) fn shown(&self) -> Option<Hypothesis> {
         let term = self.sparse().ok()?.term();
-        Some(Hypothesis::Terms(vec![Shape { held: Vec::new(), term }]))
+        Some(Hypothesis::Terms(vec![Shape { held: Vec::new(), term, at: None }]))
     }
 }
 
