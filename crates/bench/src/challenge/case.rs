@@ -134,8 +134,8 @@ fn drive_session(
         scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     }
     scenario.effects.extend(case.robot.harmless(ids));
-    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model.
-    if case.watching.class == NoiseClass::Dropouts && point < HELD_OUT && !ids.contains(&"dropped_samples") {
+    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
+    if noisy && case.watching.class == NoiseClass::Dropouts && point < HELD_OUT && !ids.contains(&"dropped_samples") {
         scenario.effects.push(Effect::DroppedSamples(effects::DroppedSamples { probability: 0.02 }));
     }
     let mut more = Vec::new();

@@ -5,8 +5,10 @@
 //! Observability: a moving robot and an irregular log; looks between the rows blur it. Alias: wheel noise, but for the slope against ξ.
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes; milliseconds.
 
+use std::collections::VecDeque;
+
 use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
-use kinematics::Pose;
+use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
@@ -94,9 +96,29 @@ struct Term {
     last: Option<(f64, f64)>,
     /// How late the last row was by its beat; 0 while there is none.
     late_s: f64,
-    /// End of the logged interval whose parts come in, and by which share of it what came before its end was late.
-    row: Option<(f64, f64)>,
+    /// The logged interval whose parts come in.
+    row: Option<Row>,
+    /// Length and travel of the rows before, of a beat that goes on.
+    recent: VecDeque<(f64, Wheels<f64>)>,
 }
+
+/// A logged interval.
+#[derive(Clone, Copy)]
+struct Row {
+    end_s: f64,
+    length_s: f64,
+    /// By how much more its end is late than its start, seconds.
+    later_s: f64,
+    /// Of the wheels, by the rows before.
+    speed_m_s: Wheels<f64>,
+    /// What came in so far.
+    travel_m: Wheels<f64>,
+}
+
+/// Rows whose speed is taken for that of the wheels, the last of them left out.
+const RECENT: usize = 5;
+/// A wheel that went faster by this than it goes now has changed its speed.
+const CHANGES: f64 = 1.5;
 
 impl Term {
     /// When beat 0 is and the time between two beats, where rows enough are known.
@@ -129,7 +151,7 @@ impl Term {
         *self = Self { before, ..Self::default() };
     }
 
-    /// Takes the row that ends an interval: by which share of its length that is late.
+    /// Takes the row that ends an interval: by how much more than at the row before it is late, seconds.
     fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
         let Some((last, last_s)) = self.last else {
             self.add(0.0, from_s);
@@ -150,12 +172,26 @@ impl Term {
             self.add(0.0, row_s);
             return 0.0;
         }
-        // A beat most often begins where a run or a standstill does: nothing had been late then. The counts are of whole beats: by the length that was
-        // logged, speeds would average too low.
-        let share = late_s.map_or(0.0, |late_s| (late_s - self.late_s) / (beats * between_s));
+        // A beat most often begins where a run or a standstill does: nothing had been late then.
+        let later_s = late_s.map_or(0.0, |late_s| late_s - self.late_s);
         self.late_s = late_s.unwrap_or(0.0);
         self.add(last + beats, row_s);
-        share
+        later_s
+    }
+
+    /// The speed of the wheels by rows that have nothing to do with when this one and the one before were stamped: the speed of an interval by its own stamps goes
+    /// with their errors, and would lengthen or shorten all ways.
+    fn speed_m_s(&self, now_m_s: Wheels<f64>) -> Wheels<f64> {
+        let known = self.recent.iter().take(self.recent.len().saturating_sub(1));
+        let (length_s, travel_m) = known.fold((0.0, Wheels::both(0.0)), |(length_s, sum), (of_row_s, travel_m)| {
+            (length_s + of_row_s, sum.zip_with(*travel_m, |sum, travel_m| sum + travel_m))
+        });
+        if length_s <= 0.0 {
+            return Wheels::both(0.0);
+        }
+        // At a start or a stop the rows before say little.
+        travel_m
+            .zip_with(now_m_s, |travel_m, now| (travel_m / length_s).clamp(-CHANGES * now.abs(), CHANGES * now.abs()))
     }
 }
 
@@ -171,15 +207,24 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let [from_s, row_s] = interval.row_s;
-        let share = match self.row {
-            Some((known_s, share)) if known_s == row_s => share,
-            _ => {
-                let share = self.next_row(from_s, row_s);
-                self.row = Some((row_s, share));
-                share
+        if self.row.is_none_or(|row| row.end_s != row_s) {
+            if let Some(Row { length_s, travel_m, .. }) = self.row.take() {
+                self.recent.push_back((length_s, travel_m));
+                if self.recent.len() > RECENT {
+                    self.recent.pop_front();
+                }
             }
-        };
-        gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
+            let later_s = self.next_row(from_s, row_s);
+            let speed_m_s = self.speed_m_s(interval.speed_m_s());
+            self.row =
+                Some(Row { end_s: row_s, length_s: row_s - from_s, later_s, speed_m_s, travel_m: Wheels::both(0.0) });
+        }
+        let Some(row) = &mut self.row else { return };
+        row.travel_m = row.travel_m.zip_with(interval.travel_m, |sum, travel_m| sum + travel_m);
+        if row.length_s > 0.0 {
+            let late_s = row.later_s * interval.dt_s / row.length_s;
+            gradient[0] = interval.change(row.speed_m_s.map(|speed_m_s| speed_m_s * late_s));
+        }
     }
 }
 
@@ -187,7 +232,6 @@ impl ModelTerm for Term {
 mod tests {
     use super::*;
     use crate::{Address, StreamName};
-    use kinematics::Wheels;
 
     #[test]
     fn a_false_share_of_the_stamp_is_not_in_the_reading() {
