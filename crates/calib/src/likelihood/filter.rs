@@ -6,6 +6,7 @@
 use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use rayon::prelude::*;
 
 use super::apart::{Follow, Instrument};
 use super::evidence::Evidence;
@@ -20,6 +21,8 @@ pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
 /// After so many looks in a row that do not fit, it is the filter that is wrong: it starts again.
 const LOST_AFTER: u32 = 2;
 const NOISES: usize = 4;
+/// From so many legs on, which take a millisecond, chains are filtered on all cores.
+const LEGS_AT_ONCE: usize = 4096;
 
 /// One whitened component of a look's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,10 +131,27 @@ pub(crate) fn pass(
     let mut result = Pass::nothing();
     #[allow(clippy::cast_precision_loss)] // a handful of phases
     let weight = 1.0 / selections.len() as f64;
+    let of_chain = |number: usize, legs: &[Leg], terms: &mut [Box<dyn ModelTerm>]| {
+        let mut filter = Filter::new(&records.chains[number], number, model, noise, columns, terms, want);
+        filter.run(legs, free_headings[number]);
+        let Filter { sums, outliers, innovations, noise_score, .. } = filter;
+        let (evidence, heading) = sums.eliminated(records.chains[number].run, columns);
+        OfChain { evidence, heading, innovations, outliers, noise_score }
+    };
     for (phase, selection) in selections.iter().enumerate() {
-        let mut innovations = Vec::new();
+        let legs = &selection.legs;
+        // Terms have a state, and go through the chains one after the other. Sums are taken in the order of the chains either way.
+        let at_once = terms.is_empty() && legs.iter().map(Vec::len).sum::<usize>() >= LEGS_AT_ONCE;
+        let mut ready: Vec<Option<OfChain>> = if at_once {
+            let of = |(number, legs): (usize, &Vec<Leg>)| (!legs.is_empty()).then(|| of_chain(number, legs, &mut []));
+            legs.par_iter().enumerate().map(of).collect()
+        } else {
+            Vec::new()
+        };
+        let known = ready.iter().flatten().map(|chain| chain.innovations.len()).sum();
+        let mut innovations = Vec::with_capacity(known);
         let mut position = 0;
-        for (number, (chain, legs)) in records.chains.iter().zip(&selection.legs).enumerate() {
+        for (number, (chain, legs)) in records.chains.iter().zip(legs).enumerate() {
             if phase == 0 && result.runs.last().is_none_or(|run| run.run != chain.run) {
                 result.runs.push(Evidence::new(chain.run, columns));
             }
@@ -141,19 +161,18 @@ pub(crate) fn pass(
             if legs.is_empty() {
                 continue;
             }
-            let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
-            filter.run(legs, free_headings[number]);
-            let Filter { sums, outliers, innovations: of_chain, noise_score: of_noise, .. } = filter;
-            innovations.extend(of_chain);
-            if phase == 0 {
-                result.outliers.extend(outliers.into_iter().map(|look| (number, look)));
+            let found = ready.get_mut(number).and_then(Option::take).unwrap_or_else(|| of_chain(number, legs, terms));
+            if want.innovations {
+                innovations.extend(found.innovations);
             }
-            let (evidence, heading) = sums.eliminated(chain.run, columns);
-            if let (0, Some((rest, by))) = (phase, heading) {
+            if phase == 0 {
+                result.outliers.extend(found.outliers.into_iter().map(|look| (number, look)));
+            }
+            if let (0, Some((rest, by))) = (phase, found.heading) {
                 result.headings.push(FreeHeading { chain: number, run: chain.run, rest, by });
             }
-            result.runs[position].add(&evidence, weight);
-            result.noise.add(&of_noise, weight);
+            result.runs[position].add(&found.evidence, weight);
+            result.noise.add(&found.noise_score, weight);
         }
         if want.innovations {
             result.innovations.push(innovations);
@@ -163,6 +182,15 @@ pub(crate) fn pass(
         result.own = own.take_out(&mut result.runs, model);
     }
     result
+}
+
+/// What one chain says in one phase.
+struct OfChain {
+    evidence: Evidence,
+    heading: Option<(f64, Vec<f64>)>,
+    innovations: Vec<Innovation>,
+    outliers: Vec<usize>,
+    noise_score: NoiseScore,
 }
 
 struct Filter<'f, 'a> {

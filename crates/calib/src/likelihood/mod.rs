@@ -27,7 +27,7 @@ pub use evidence::{Evidence, Information};
 pub(crate) use filter::{Gate, Want, pass};
 pub use filter::{Innovation, Pass};
 pub use fit::{Fit, FitError, FitOptions, fit, pass_with_innovations};
-pub(crate) use fit::{From, basis, fit_from, start_heading};
+pub(crate) use fit::{From, NOISE_SETTLED, basis, fit_from, pass_settled, start_heading};
 pub use model::{Column, Model};
 pub(crate) use noise::{LEAST_SIGMA, NoisePrior};
 pub use noise::{Noise, NoiseComponent};
