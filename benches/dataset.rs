@@ -1,7 +1,8 @@
 //! A large dataset imported, evaluated and calibrated, beside the time that reading and parsing it takes, and the memory of each.
 //!
 //! The source is made first: a session in `OptiOdom`'s format of runs of 100 000 rows, the robot turning elsewhere every ten seconds. Argument: its size in
-//! megabytes (100 where none is given). `docs/performance.md` has a run of it.
+//! megabytes (100 where none is given). With `--whole`, also calibrated with all runs held
+//! and fitted as a whole; with `--lasting`, the instrument's errors last for seconds, as those of real ones do, and looks are thinned. `docs/performance.md` has a run of it.
 
 use std::f64::consts::PI;
 use std::fs::File;
@@ -9,7 +10,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
-use dataset::{Existing, RunByRun, Writer, import};
+use calib::methods::joint::{Joint, is_large};
+use dataset::{Blocks, Existing, RunByRun, Writer, import, read_ahead};
 use peak_alloc::PeakAlloc;
 use rand::{RngExt, SeedableRng};
 
@@ -18,18 +20,21 @@ static PEAK: PeakAlloc = PeakAlloc;
 
 const ROWS: usize = 100_000;
 
+/// How long the instrument's errors last with `--lasting`, seconds.
+const LASTING_S: f64 = 2.0;
+
 /// Counts a turn of the wheel, and the robot: metres a count of each wheel and the wheels' distance.
 const COUNTS_PER_TURN: f64 = 43.7 * 64.0;
 const M_PER_COUNT: [f64; 2] = [PI * 0.0848 / COUNTS_PER_TURN, PI * 0.0853 / COUNTS_PER_TURN];
 const SEPARATION_M: f64 = 0.2065;
 
 /// Writes a session of so many megabytes; gives its runs.
-fn write_session(dir: &Path, megabytes: usize) -> std::io::Result<usize> {
+fn write_session(dir: &Path, megabytes: usize, lasts: f64) -> std::io::Result<usize> {
     let (mut runs, mut bytes) = (0, 0);
     while bytes < megabytes * 1_000_000 {
         runs += 1;
         let file = dir.join(format!("large_run-{runs:03}.csv"));
-        write_run(&file, runs as u64)?;
+        write_run(&file, runs as u64, lasts)?;
         bytes += usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
     }
     let metadata = format!("type,diff\nngear,43.7\nencRes,64\nLi,0.205\nDi,0.085,0.085\nN,{runs}\nL,\n");
@@ -37,16 +42,20 @@ fn write_session(dir: &Path, megabytes: usize) -> std::io::Result<usize> {
     Ok(runs)
 }
 
-fn write_run(file: &Path, seed: u64) -> std::io::Result<()> {
+/// The instrument's error in a row is this share of the one before, and something new.
+fn write_run(file: &Path, seed: u64, lasts: f64) -> std::io::Result<()> {
     let mut chance = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut out = BufWriter::with_capacity(1 << 16, File::create(file)?);
-    let (mut pose, mut speed, mut counts) = ([0.0_f64; 3], [0.0; 2], [0.0_f64; 2]);
+    let (mut pose, mut speed, mut counts, mut off) = ([0.0_f64; 3], [0.0; 2], [0.0_f64; 2], [0.0; 3]);
     for row in 0..ROWS {
         if row % 200 == 0 {
             speed = [0; 2].map(|_| chance.random_range(20.0..90.0));
         }
         let [left, right] = counts.map(f64::trunc);
-        let seen = pose.map(|value: f64| value + chance.random_range(-3e-4..3e-4));
+        for off in &mut off {
+            *off = lasts * *off + (1.0 - lasts * lasts).sqrt() * chance.random_range(-3e-4..3e-4);
+        }
+        let seen: [f64; 3] = std::array::from_fn(|k| pose[k] + off[k]);
         writeln!(out, "{},{},{},{},{right},{left}", 0.05 * row as f64, seen[0], seen[1], seen[2])?;
         let turned = speed.map(|speed: f64| speed + chance.random_range(-1.0..1.0));
         let [left_m, right_m] = [turned[0] * M_PER_COUNT[0], turned[1] * M_PER_COUNT[1]];
@@ -74,7 +83,9 @@ fn main() {
     let temp = tempfile::tempdir().expect("a temporary folder");
     let (source, set) = (temp.path().join("large"), temp.path().join("set"));
     std::fs::create_dir(&source).expect("made");
-    let runs = write_session(&source, megabytes).expect("written");
+    let given = |option: &str| std::env::args().any(|argument| argument == option);
+    let lasts = if given("--lasting") { f64::exp(-0.05 / LASTING_S) } else { 0.0 };
+    let runs = write_session(&source, megabytes, lasts).expect("written");
     println!("{megabytes} MB, {runs} runs, {} rows", runs * ROWS);
     println!("{:<28} {:>7} {:>9} {:>8}", "", "s", "x parsing", "heap MB");
     let show = |what: &str, (seconds, megabytes): (f64, f64), parsing_s: f64| {
@@ -87,9 +98,7 @@ fn main() {
     let imported = measured(|| {
         let session = open();
         let mut writer = Writer::create(session.header, &set, Existing::Refuse).expect("begun");
-        for loaded in session.runs {
-            writer.push(&loaded.expect("readable").dataset.runs[0]).expect("written");
-        }
+        read_ahead(session.runs, |loaded| writer.push(&loaded?.dataset.runs[0])).expect("written");
         writer.finish().expect("written");
     });
     show("imported", imported, parse.0);
@@ -104,12 +113,20 @@ fn main() {
         calib::CalibrationDrift::of_runs(None, runs.collect())
     });
     show("evaluated", evaluated, parse.0);
-    for name in ["linear", "joint"] {
+    let calibrated = measured(|| {
+        let mut blocks = [Blocks::open(&set).expect("readable").expect("runs stand together")];
+        assert!(is_large(&blocks), "this session is small: make it larger");
+        Joint::DEFAULT.calibrate_large(&mut blocks, |_, _| ()).expect("calibrated")
+    });
+    show("calibrated by joint", calibrated, parse.0);
+    // What holds all runs.
+    let methods = if given("--whole") { &["linear", "joint"][..] } else { &[] };
+    for name in methods {
         let method = calib::method(name).expect("there");
         let calibrated = measured(|| {
             let dataset = dataset::read(&set).expect("readable").dataset;
             method.calibrate(&[dataset.session()]).map_err(|error| println!("{name}: {error}"))
         });
-        show(&format!("calibrated by {name}"), calibrated, parse.0);
+        show(&format!("by {name}, as a whole"), calibrated, parse.0);
     }
 }

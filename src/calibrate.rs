@@ -6,14 +6,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use calib::likelihood::Column;
-use calib::methods::joint::{Joint, RISE_95};
-use calib::{CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters};
+use calib::methods::joint::{Joint, OneStep, OneStepError, RISE_95, is_large};
+use calib::{
+    CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters,
+};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::{NominalRobot, Session};
+use dataset::{Blocks, NominalRobot, Session, Warning};
 
 use crate::simulate::write_whole;
-use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
 
 /// Calibrate one robot from its sessions.
 #[derive(Args)]
@@ -44,18 +46,41 @@ fn methods() -> String {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let datasets = read_datasets(&arguments.datasets, terminal)?;
+    let joint = Joint::DEFAULT.name();
+    let chosen: Vec<&dyn Method> =
+        METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
+    let has_joint = chosen.iter().any(|method| method.name() == joint);
+    let large = if has_joint && !arguments.online && !arguments.profile { large(arguments)? } else { None };
+    // What is large is held for the methods that can do nothing else.
+    let datasets =
+        if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     refuse_wrapped_counters(&sessions)?;
     if arguments.online {
         return follow::run(&sessions, terminal);
     }
-    let chosen: Vec<&dyn Method> =
-        METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
-    let outcomes: Vec<_> = chosen.iter().map(|method| (method.name(), method.calibrate(&sessions))).collect();
+    let headers: Vec<&dataset::Dataset> = match &large {
+        Some(large) => large.iter().map(Blocks::header).collect(),
+        None => datasets.iter().collect(),
+    };
+    let names = Names::of(headers.iter().filter_map(|header| header.provenance.name.clone()).collect());
+    let robot = headers[0].robot;
+    let runs = match &large {
+        Some(large) => large.iter().map(|blocks| blocks.infos().len()).sum(),
+        None => sessions.iter().map(|session| session.runs.len()).sum(),
+    };
+    let mut large = large;
+    let mut outcomes = Vec::with_capacity(chosen.len());
+    for method in chosen {
+        let outcome = match &mut large {
+            Some(large) if method.name() == joint => calibrate_large(large, &arguments.datasets, terminal)?,
+            _ => method.calibrate(&sessions),
+        };
+        outcomes.push((method.name(), outcome));
+    }
     let mut report = CalibrationReport {
-        dataset: Names::of(sessions.iter().map(|session| session.name.to_owned()).collect()),
-        methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome, sessions[0].robot)).collect(),
+        dataset: names,
+        methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome, &robot)).collect(),
     };
     if arguments.profile {
         add_profiles(&mut report, &sessions)?;
@@ -71,9 +96,41 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         write_whole(out, report.to_toml()?.as_bytes())?;
         terminal.remark(&format!("calibration in {}", out.display()));
     }
-    show(&report, &sessions, terminal)?;
+    show(&report, &robot, runs, terminal)?;
     terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The datasets by blocks, where they are too large for a fit as a whole.
+fn large(arguments: &Arguments) -> Result<Option<Vec<Blocks>>, Failure> {
+    let mut all = Vec::new();
+    for path in datasets_at(&arguments.datasets)? {
+        // What cannot be read is told by whoever reads it as a whole.
+        let Ok(Some(mut blocks)) = Blocks::open(&path) else { return Ok(None) };
+        blocks.name_if_nameless(|| folder_name(&path));
+        all.push(blocks);
+    }
+    Ok(is_large(&all).then_some(all))
+}
+
+/// `joint` on large datasets; what was noticed of them is said.
+fn calibrate_large(
+    datasets: &mut [Blocks],
+    paths: &[PathBuf],
+    terminal: &Terminal,
+) -> Result<Result<Calibration, CalibError>, Failure> {
+    let paths = datasets_at(paths)?;
+    let remark = |number: usize, warning: &Warning| {
+        terminal.remark(&format!("warning: {}: {warning}", paths[number].display()));
+    };
+    for (number, blocks) in datasets.iter().enumerate() {
+        blocks.warnings().iter().for_each(|warning| remark(number, warning));
+    }
+    match Joint::DEFAULT.calibrate_large(datasets, remark) {
+        Ok(found) => Ok(Ok(found)),
+        Err(OneStepError::Calib(error)) => Ok(Err(error)),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Profile intervals of what `joint` fits, in the report's own parameters.
@@ -110,9 +167,7 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
     Ok(())
 }
 
-fn show(report: &CalibrationReport, sessions: &[Session<'_>], terminal: &Terminal) -> Result<(), Failure> {
-    let robot = sessions[0].robot;
-    let runs: usize = sessions.iter().map(|session| session.runs.len()).sum();
+fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal: &Terminal) -> Result<(), Failure> {
     let profiled =
         report.methods.iter().flat_map(|method| method.parameters.values()).any(|value| value.interval_95.is_some());
     let mut headers = vec!["method", "parameter", "nominal", "value", "sigma", "unit"];
@@ -147,6 +202,9 @@ fn show(report: &CalibrationReport, sessions: &[Session<'_>], terminal: &Termina
         }
         let rejected = method.runs_rejected.len();
         terminal.say(&format!("{name}: {} of {runs} runs used, {rejected} values rejected", method.runs_used))?;
+        if let Some(OneStep { looks, first_looks, .. }) = method.one_step {
+            terminal.say(&format!("  {first_looks} looks fitted, then one step over all {looks}"))?;
+        }
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
         }

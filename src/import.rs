@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::Loaded;
 use dataset::import::{IMPORTERS, Source, importer};
+use dataset::{Loaded, read_ahead};
 use serde::Serialize;
 
 use crate::simulate::begin_dataset;
@@ -73,17 +73,19 @@ fn write(sources: Vec<Source>, dirs: Vec<PathBuf>, force: bool, terminal: &Termi
     for (source, dir) in sources.into_iter().zip(dirs) {
         let mut writer = begin_dataset(source.header, &dir, force)?;
         let (mut runs, mut odometry_rows) = (0, 0);
-        for loaded in source.runs {
+        let name = source.name;
+        read_ahead(source.runs, |loaded| {
             let Loaded { dataset, warnings } = loaded?;
             for warning in &warnings {
-                terminal.remark(&format!("warning: {}: {warning}", source.name));
+                terminal.remark(&format!("warning: {name}: {warning}"));
             }
             for run in &dataset.runs {
                 writer.push(run)?;
                 runs += 1;
                 odometry_rows += run.odometry.t_s.len();
             }
-        }
+            Ok::<(), Failure>(())
+        })?;
         written.push((writer, dir, runs, odometry_rows));
     }
     let mut datasets = Vec::with_capacity(written.len());

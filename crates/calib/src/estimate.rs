@@ -5,6 +5,8 @@ use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
+use crate::methods::joint::OneStep;
+
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
@@ -141,6 +143,8 @@ pub struct Calibration {
     pub runs_used: usize,
     /// What was left out, run by run and wheel by wheel.
     pub runs_rejected: Vec<Rejected>,
+    /// How it was made where the datasets are large; `None` where all runs were fitted as a whole.
+    pub one_step: Option<OneStep>,
     /// False when an iteration stopped without an answer; closed-form methods always converge.
     pub converged: bool,
 }
@@ -161,6 +165,7 @@ impl Calibration {
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
+            one_step: None,
             converged: true,
         }
     }

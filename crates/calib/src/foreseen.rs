@@ -6,7 +6,7 @@
 use dataset::Session;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::likelihood::{Column, Fit, Model, Noise, NoisePrior, Pass, Records, Selection, Thinning};
+use crate::likelihood::{Column, Fit, Model, NOISE_SETTLED, Noise, NoisePrior, Pass, Records, Selection, Thinning};
 use crate::methods::joint::{Joint, JointFit};
 
 impl Joint {
@@ -16,7 +16,7 @@ impl Joint {
         let records = Records::of(sessions);
         let headings = records.chains.iter().map(|chain| crate::likelihood::start_heading(chain, &model)).collect();
         JointFit {
-            selections: Selection::of(&records, Thinning::NONE, &model),
+            selections: Selection::of(&records, Thinning::NONE, &model).into(),
             thinning: Thinning::NONE,
             nominal: model.clone(),
             start: model.clone(),
@@ -24,7 +24,9 @@ impl Joint {
             columns: Column::GEOMETRY.to_vec(),
             unseen: Vec::new(),
             prior: NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default()),
-            records,
+            records: records.into(),
+            noise_settled: NOISE_SETTLED,
+            parts: Vec::new(),
         }
     }
 }
@@ -35,7 +37,7 @@ impl JointFit<'_> {
     pub fn foreseeing<'b>(&self, sessions: &[Session<'b>]) -> JointFit<'b> {
         let model = Model { sizes: vec![0.0; self.fit.model.sizes.len()], own: None, ..self.fit.model.clone() };
         let mut foreseen = Joint::unfitted(model, self.fit.noise, sessions);
-        foreseen.selections = Selection::of(&foreseen.records, self.thinning, &self.nominal);
+        foreseen.selections = Selection::of(&foreseen.records, self.thinning, &self.nominal).into();
         foreseen.thinning = self.thinning;
         foreseen.nominal = self.nominal.clone();
         foreseen.columns = self.columns.clone();

@@ -9,6 +9,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, OwnInstrument, Parameter};
+use crate::methods::joint::OneStep;
 
 /// Why a calibration file is not one.
 #[derive(Debug, thiserror::Error)]
@@ -92,6 +93,9 @@ pub struct MethodReport {
     /// What was left out.
     #[serde(default)]
     pub runs_rejected: Vec<ReportedRejection>,
+    /// How the values were found where the datasets are too large to be fitted as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub one_step: Option<OneStep>,
     /// Whether the method came to an answer.
     #[serde(default)]
     pub converged: bool,
@@ -162,6 +166,7 @@ impl MethodReport {
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
+            one_step: None,
             converged: false,
             warnings: Vec::new(),
         };
@@ -195,6 +200,7 @@ impl MethodReport {
                 .iter()
                 .map(|rejected| ReportedRejection { run: rejected.run.clone(), why: rejected.why.clone() })
                 .collect(),
+            one_step: calibration.one_step,
             converged: calibration.converged,
             warnings: calibration.hard_to_believe(nominal),
             ..empty
@@ -340,6 +346,7 @@ mod tests {
                 }],
                 runs_used: 6,
                 runs_rejected: vec![ReportedRejection { run: "run-01".to_owned(), why: "far".to_owned() }],
+                one_step: Some(OneStep { looks: 1_000_000, first_looks: 65_536, passes: 1 }),
                 converged: true,
                 warnings: Vec::new(),
             }],

@@ -5,6 +5,7 @@
 //! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
 //! simulator here, a real robot elsewhere.
 
+mod ahead;
 mod cost;
 mod counter;
 mod error;
@@ -19,12 +20,13 @@ mod term;
 mod warning;
 mod write;
 
+pub use ahead::read_ahead;
 pub use cost::{Cost, Pace};
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
 pub use platform::{Platform, record_session};
 pub use program::{Motion, MotionProgram, Schedule};
-pub use read::{Loaded, RunByRun, read};
+pub use read::{Blocks, Loaded, RunByRun, read};
 pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,

@@ -1,4 +1,4 @@
-//! One pass over all runs: innovations, their derivatives by the mean parameters, and the score of the noise.
+//! The filter of one chain: innovations, their derivatives by the mean parameters, and the score of the noise.
 //!
 //! Scalar updates, one component of a look after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
 //! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
@@ -7,13 +7,12 @@ use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
-use super::apart::{Follow, Instrument};
-use super::evidence::Evidence;
+use super::apart::Instrument;
 use super::model::{Column, Model};
 use super::noise::Noise;
 use super::normal::Sums;
-use super::records::{Chain, Piece, Records, Start};
-use super::thinning::{Leg, Selection, carry};
+use super::records::{Chain, Piece, Start};
+use super::thinning::{Leg, carry};
 
 /// A look whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
 pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
@@ -62,129 +61,27 @@ pub(crate) struct NoiseScore {
 }
 
 impl NoiseScore {
-    fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         Self { gradient: Vector4::zeros(), information: Matrix4::zeros() }
     }
 
-    fn add(&mut self, other: &Self, weight: f64) {
+    pub(super) fn add(&mut self, other: &Self, weight: f64) {
         self.gradient += weight * other.gradient;
         self.information += weight * other.information;
     }
 }
 
-/// The result of a pass.
-#[derive(Debug, Clone)]
-pub struct Pass {
-    /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
-    pub runs: Vec<Evidence>,
-    /// The whitened innovations, phase by phase, in the order of chains and looks.
-    pub innovations: Vec<Vec<Innovation>>,
-    /// Looks left out as outliers in the first phase: chain and look.
-    pub outliers: Vec<(usize, usize)>,
-    /// Score of the cost by the logarithms of the variances.
-    pub(crate) noise: NoiseScore,
-    /// How the free headings of chains without one follow a step of the parameters.
-    pub(crate) headings: Vec<FreeHeading>,
-    /// How the instruments that groups have for themselves follow one.
-    pub(crate) own: Vec<Follow>,
-}
-
-/// How the free start heading of a chain follows a step of the parameters.
-#[derive(Debug, Clone)]
-pub(crate) struct FreeHeading {
-    pub(crate) chain: usize,
-    pub(crate) run: (usize, usize),
-    /// Without one.
-    pub(crate) rest: f64,
-    /// By each column.
-    pub(crate) by: Vec<f64>,
-}
-
-impl Pass {
-    /// Of no run.
-    pub(crate) fn nothing() -> Self {
-        Self {
-            runs: Vec::new(),
-            innovations: Vec::new(),
-            outliers: Vec::new(),
-            noise: NoiseScore::zero(),
-            headings: Vec::new(),
-            own: Vec::new(),
-        }
-    }
-}
-
-/// Runs the filter over all selections.
-pub(crate) fn pass(
-    records: &Records<'_>,
-    selections: &[Selection],
-    model: &Model,
-    noise: &Noise,
-    free_headings: &[f64],
-    terms: &mut [Box<dyn ModelTerm>],
-    want: Want,
-) -> Pass {
-    let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let mut result = Pass::nothing();
-    #[allow(clippy::cast_precision_loss)] // a handful of phases
-    let weight = 1.0 / selections.len() as f64;
-    for (phase, selection) in selections.iter().enumerate() {
-        let mut innovations = Vec::new();
-        let mut position = 0;
-        let mut trail: Option<Trail> = None;
-        for (number, (chain, legs)) in records.chains.iter().zip(&selection.legs).enumerate() {
-            if phase == 0 && result.runs.last().is_none_or(|run| run.run != chain.run) {
-                result.runs.push(Evidence::new(chain.run, columns));
-            }
-            while result.runs[position].run != chain.run {
-                position += 1;
-            }
-            let unseen = legs.is_empty();
-            // Terms remember what was driven on the way to the next displacement, seen or not.
-            if unseen && (terms.is_empty() || chain.start == Start::Seen) {
-                continue;
-            }
-            let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
-            if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
-                filter.go_on(trail);
-            }
-            filter.run(legs, free_headings[number]);
-            trail = Some(filter.trail());
-            if unseen {
-                continue;
-            }
-            let Filter { sums, outliers, innovations: of_chain, noise_score: of_noise, .. } = filter;
-            innovations.extend(of_chain);
-            if phase == 0 {
-                result.outliers.extend(outliers.into_iter().map(|look| (number, look)));
-            }
-            let (evidence, heading) = sums.eliminated(chain.run, columns);
-            if let (0, Some((rest, by))) = (phase, heading) {
-                result.headings.push(FreeHeading { chain: number, run: chain.run, rest, by });
-            }
-            result.runs[position].add(&evidence, weight);
-            result.noise.add(&of_noise, weight);
-        }
-        if want.innovations {
-            result.innovations.push(innovations);
-        }
-    }
-    if let Some(own) = &model.own {
-        result.own = own.take_out(&mut result.runs, model);
-    }
-    result
-}
-
 /// Where the displacements of a run have led: the next one's terms go on from there.
 #[derive(Debug, Clone, Copy)]
-struct Trail {
+pub(super) struct Trail {
     /// The next chain's frame in that of the first.
     run_from_chain: Pose,
     session_m: f64,
     previous: Option<Piece>,
 }
 
-struct Filter<'f, 'a> {
+/// The filter of one chain.
+pub(super) struct Filter<'f, 'a> {
     chain: &'f Chain<'a>,
     number: usize,
     model: &'f Model,
@@ -205,10 +102,10 @@ struct Filter<'f, 'a> {
     previous: Option<Piece>,
     goes_on: bool,
     gradients: Vec<Pose>,
-    sums: Sums,
-    innovations: Vec<Innovation>,
-    outliers: Vec<usize>,
-    noise_score: NoiseScore,
+    pub(super) sums: Sums,
+    pub(super) innovations: Vec<Innovation>,
+    pub(super) outliers: Vec<usize>,
+    pub(super) noise_score: NoiseScore,
     j: Vec<f64>,
 }
 
@@ -220,7 +117,7 @@ struct Moved {
 }
 
 impl<'f, 'a> Filter<'f, 'a> {
-    fn new(
+    pub(super) fn new(
         chain: &'f Chain<'a>,
         number: usize,
         model: &'f Model,
@@ -259,18 +156,18 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     /// Goes on where the chain before ended.
-    fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
+    pub(super) fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
         (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
         self.goes_on = true;
     }
 
     /// Where this chain ended.
-    fn trail(&self) -> Trail {
+    pub(super) fn trail(&self) -> Trail {
         let run_from_sensor = self.run_from_chain * self.pose * self.instrument.body_from_sensor;
         Trail { run_from_chain: run_from_sensor, session_m: self.session_m, previous: self.previous }
     }
 
-    fn run(&mut self, legs: &[Leg], free_heading_rad: f64) {
+    pub(super) fn run(&mut self, legs: &[Leg], free_heading_rad: f64) {
         if !self.goes_on {
             for term in self.terms.iter_mut() {
                 term.restart(self.chain.info);

@@ -5,9 +5,10 @@ use kinematics::{Increment, Pose, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::evidence::{Information, total};
-use super::filter::{FreeHeading, Gate, Pass, Want, pass};
+use super::filter::{Gate, Want};
 use super::model::{Column, Model};
 use super::noise::{LEAST_SIGMA, Noise, NoisePrior};
+use super::pass::{FreeHeading, Pass, pass};
 use super::records::{Chain, Records, Start};
 use super::thinning::Selection;
 
@@ -15,7 +16,7 @@ use super::thinning::Selection;
 const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 /// A step this small, squared and over its variance, changes nothing that a print shows.
 const SETTLED: f64 = 1e-8;
-const NOISE_SETTLED: f64 = 1e-4;
+pub(crate) const NOISE_SETTLED: f64 = 1e-4;
 const LARGEST_NOISE_STEP: f64 = 1.5;
 /// Steps before outliers are told: at least, and at most.
 const LEAST_STARTS: usize = 3;
@@ -33,6 +34,8 @@ pub struct FitOptions {
     pub held: Vec<DVector<f64>>,
     /// The noise stays as it is.
     pub noise_held: bool,
+    /// Steps of the noise end below this share of a variance.
+    pub noise_settled: f64,
     /// Most steps.
     pub max_steps: usize,
 }
@@ -41,7 +44,13 @@ impl FitOptions {
     /// Fits some columns.
     #[must_use]
     pub fn of(columns: &[Column]) -> Self {
-        Self { columns: columns.to_vec(), held: Vec::new(), noise_held: false, max_steps: 60 }
+        Self {
+            columns: columns.to_vec(),
+            held: Vec::new(),
+            noise_held: false,
+            noise_settled: NOISE_SETTLED,
+            max_steps: 60,
+        }
     }
 }
 
@@ -152,13 +161,39 @@ pub(crate) fn fit_from(
         let found = pass(records, selections, &model, &noise, &headings, terms, want);
         let moved = step(&mut model, &mut headings, &found, options, &basis)?;
         let noise_moved = if options.noise_held { 0.0 } else { step_noise(&mut noise, &mut pace, &found, prior) };
-        if moved < SETTLED && noise_moved < NOISE_SETTLED {
+        if moved < SETTLED && noise_moved < options.noise_settled {
             converged = true;
             break;
         }
     }
     let pass = pass_with_innovations(records, selections, &model, &noise, &headings, terms);
     Ok(Fit { model, noise, free_headings: headings, pass, converged })
+}
+
+/// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
+const HEADING_SETTLED_RAD: f64 = 1e-6;
+
+/// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for
+/// themselves, are followed until they settle; nothing else moves.
+pub(crate) fn pass_settled(
+    records: &Records<'_>,
+    selections: &[Selection],
+    mut model: Model,
+    noise: &Noise,
+) -> Result<(Model, Pass), FitError> {
+    let options = FitOptions::of(&[]);
+    let mut headings: Vec<f64> = records.chains.iter().map(|chain| start_heading(chain, &model)).collect();
+    for round in 1.. {
+        let found = pass(records, selections, &model, noise, &headings, &mut [], Want::default());
+        let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
+        let mut next = model.clone();
+        let moved = step(&mut next, &mut headings, &found, &options, &basis(&options))?;
+        if (turned < HEADING_SETTLED_RAD && moved < SETTLED) || round == MOST_STARTS {
+            return Ok((model, found));
+        }
+        model = next;
+    }
+    Err(FitError::Diverges)
 }
 
 /// A pass at given values, with its innovations; free headings are those of chains whose instrument sees none, one for each chain.

@@ -145,6 +145,12 @@ impl<'a> Records<'a> {
         records
     }
 
+    /// The records of a part of one run, as those of that run among others.
+    pub(crate) fn belonging_to(mut self, run: (usize, usize)) -> Self {
+        self.chains.iter_mut().for_each(|chain| chain.run = run);
+        self
+    }
+
     /// How many looks there are, starts left out.
     #[must_use]
     pub fn looks(&self) -> usize {
@@ -259,7 +265,13 @@ fn add_poses<'a>(
 ) {
     let mut cursor = track.cursor();
     let mut chain: Option<Chain<'a>> = None;
-    let mut close = |chain: Option<Chain<'a>>| chains.extend(chain.filter(|chain| chain.looks.len() > 1));
+    let mut close = |chain: Option<Chain<'a>>| {
+        chains.extend(chain.filter(|chain| chain.looks.len() > 1).map(|mut chain| {
+            chain.pieces.shrink_to_fit();
+            chain.looks.shrink_to_fit();
+            chain
+        }));
+    };
     for (t_s, x_m, y_m, theta_rad) in looks {
         let Some(before_s) = chain.as_ref().and_then(|chain| chain.looks.last()).map(|look| look.t_s) else {
             chain = begin(base, &mut cursor, (t_s, x_m, y_m, theta_rad));

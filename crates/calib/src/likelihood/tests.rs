@@ -6,7 +6,8 @@ use dataset::{
 };
 use kinematics::{Increment, Pose, Wheels};
 
-use super::filter::{Want, pass};
+use super::filter::Want;
+use super::pass::pass;
 use super::{Column, Model, Noise, Pass, Records, Selection, Thinning};
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
@@ -167,7 +168,7 @@ fn a_free_heading_is_at_its_best() {
     let mut headings = [0.6, 1.6];
     for _ in 0..8 {
         let found = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
-        for super::filter::FreeHeading { chain, rest, .. } in &found.headings {
+        for super::pass::FreeHeading { chain, rest, .. } in &found.headings {
             headings[*chain] += rest;
         }
     }

@@ -32,11 +32,15 @@ pub struct Source {
     /// All but the runs.
     pub header: Dataset,
     /// Datasets of one run each, in order, up to the first fault.
-    pub runs: Box<dyn Iterator<Item = Result<Loaded, DatasetError>>>,
+    pub runs: Box<dyn Iterator<Item = Result<Loaded, DatasetError>> + Send>,
 }
 
 impl Source {
-    fn new(name: String, header: Dataset, runs: impl Iterator<Item = Result<Run, DatasetError>> + 'static) -> Self {
+    fn new(
+        name: String,
+        header: Dataset,
+        runs: impl Iterator<Item = Result<Run, DatasetError>> + Send + 'static,
+    ) -> Self {
         let of_run = header.clone();
         let runs = runs.map(move |run| {
             let dataset = Dataset { runs: vec![run?], ..of_run.clone() };

@@ -2,6 +2,8 @@
 //!
 //! All headers are read before any table, so that a wrong file among large ones is named at once.
 
+mod blocks;
+mod grouped;
 mod manifest;
 mod odometry;
 mod run_by_run;
@@ -18,6 +20,7 @@ use manifest::Manifest;
 use odometry::OdometryTable;
 use truth::{PointIndex, TruthTable};
 
+pub use blocks::Blocks;
 pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};
 pub(crate) use odometry::wheel_columns;
 pub use run_by_run::RunByRun;

@@ -1,6 +1,7 @@
 //! `odometry.csv`: what the robot counted, in one of three forms.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use kinematics::{Side, Wheels};
@@ -9,7 +10,7 @@ use super::warn_of_unknown;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{ExtraChannel, Odometry, Run, WheelLog};
-use crate::table::{Row, RunIndex, Survey, Table};
+use crate::table::{MARKED_ROWS, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
 const HEADER: &str = "a header like run,t_s,left_ticks,right_ticks";
@@ -109,13 +110,13 @@ impl OdometryTable {
     }
 
     /// Where each run's rows are; goes back to the first.
-    pub(super) fn survey(&mut self, index: &RunIndex) -> Result<Survey, DatasetError> {
-        self.table.survey(index)
+    pub(super) fn survey(&mut self, index: &RunIndex, marked: bool) -> Result<Survey, DatasetError> {
+        self.table.survey(index, marked.then_some(self.columns.t_s))
     }
 
     /// Fills every run's odometry.
     pub(super) fn read(mut self, index: &RunIndex, runs: &mut [Run]) -> Result<(), DatasetError> {
-        let rows = self.table.survey(index)?.rows;
+        let rows = self.table.survey(index, None)?.rows;
         for (run, &rows) in runs.iter_mut().zip(&rows) {
             run.odometry = self.columns.empty(rows);
         }
@@ -130,6 +131,21 @@ impl OdometryTable {
         self.has_rows(run, rows)?;
         run.odometry = self.columns.empty(rows);
         self.table.for_each_row_of(number, survey, |row| self.columns.push(&mut run.odometry, row, rows))
+    }
+
+    /// Fills a part of one run's odometry: rows from a mark on.
+    pub(super) fn read_rows(
+        &mut self,
+        number: usize,
+        survey: &Survey,
+        rows: Range<usize>,
+        run: &mut Run,
+    ) -> Result<(), DatasetError> {
+        self.has_rows(run, survey.rows[number])?;
+        run.odometry = self.columns.empty(rows.len());
+        let from = survey.marks[number][rows.start / MARKED_ROWS].position;
+        let push = |row: &Row<'_>| self.columns.push(&mut run.odometry, row, rows.len());
+        self.table.for_each_row_from(from, rows.len(), push)
     }
 
     fn has_rows(&self, run: &Run, rows: usize) -> Result<(), DatasetError> {

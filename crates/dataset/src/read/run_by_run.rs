@@ -3,14 +3,13 @@
 //! The tables are gone through once for where each run's rows are; then each run's rows are read where they stand. Tables whose rows of several runs are mixed
 //! cannot be read so, and are read as a whole.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::truth::{PointIndex, TruthTable};
-use super::{Loaded, Opened, has_truth, odometry, read, without_truth};
+use super::grouped::Grouped;
+use super::{Loaded, Opened, read};
 use crate::counter;
 use crate::error::DatasetError;
 use crate::record::{Dataset, Run};
-use crate::table::Survey;
 use crate::warning::Warning;
 
 /// Reads a dataset one run at a time: an iterator over datasets of one run each, in the order of `dataset.toml`, with what was noticed of the run.
@@ -26,22 +25,12 @@ pub struct RunByRun {
 /// The runs that have not been handed out.
 #[derive(Debug)]
 enum Rest {
-    Grouped(Box<Grouped>),
+    /// With the number of the next.
+    Grouped(Box<Grouped>, usize),
     /// All are in memory.
     Mixed(std::vec::IntoIter<Run>),
     /// There was a fault.
     Failed,
-}
-
-#[derive(Debug)]
-struct Grouped {
-    manifest_file: PathBuf,
-    runs: std::iter::Enumerate<std::vec::IntoIter<Run>>,
-    run_lines: Vec<u64>,
-    odometry: odometry::OdometryTable,
-    odometry_rows: Survey,
-    truths: Vec<(TruthTable, Survey)>,
-    points: PointIndex,
 }
 
 impl RunByRun {
@@ -50,23 +39,13 @@ impl RunByRun {
     /// # Errors
     /// [`DatasetError`] of a fault in the manifest, a header or a run's id.
     pub fn open(dir: &Path) -> Result<Self, DatasetError> {
-        let Opened { mut dataset, manifest_file, run_lines, mut odometry, truths, index, warnings } =
-            Opened::open(dir)?;
-        let odometry_rows = odometry.survey(&index)?;
-        let mut surveyed = Vec::with_capacity(truths.len());
-        for mut truth in truths {
-            let rows = truth.survey(&index)?;
-            surveyed.push((truth, rows));
+        let (header, warnings, grouped) = Grouped::survey(Opened::open(dir)?, false)?;
+        if let Some(grouped) = grouped {
+            return Ok(Self { header, warnings, rest: Rest::Grouped(Box::new(grouped), 0) });
         }
-        if !odometry_rows.is_grouped || surveyed.iter().any(|(_, rows)| !rows.is_grouped) {
-            let Loaded { mut dataset, warnings } = read(dir)?;
-            let runs = std::mem::take(&mut dataset.runs);
-            return Ok(Self { header: dataset, warnings, rest: Rest::Mixed(runs.into_iter()) });
-        }
-        let runs = std::mem::take(&mut dataset.runs).into_iter().enumerate();
-        let points = PointIndex::new(&dataset.points);
-        let grouped = Grouped { manifest_file, runs, run_lines, odometry, odometry_rows, truths: surveyed, points };
-        Ok(Self { header: dataset, warnings, rest: Rest::Grouped(Box::new(grouped)) })
+        let Loaded { mut dataset, warnings } = read(dir)?;
+        let runs = std::mem::take(&mut dataset.runs);
+        Ok(Self { header: dataset, warnings, rest: Rest::Mixed(runs.into_iter()) })
     }
 
     /// All but the runs.
@@ -82,35 +61,15 @@ impl RunByRun {
     }
 }
 
-impl Grouped {
-    fn next(&mut self, counter_bits: Option<u8>) -> Option<Result<Run, DatasetError>> {
-        let (number, mut run) = self.runs.next()?;
-        Some(self.fill(number, &mut run, counter_bits).map(|()| run))
-    }
-
-    fn fill(&mut self, number: usize, run: &mut Run, counter_bits: Option<u8>) -> Result<(), DatasetError> {
-        self.odometry.read_run(number, &self.odometry_rows, run)?;
-        if let Some(bits) = counter_bits {
-            odometry::unwrap_counters(run, bits);
-        }
-        for (truth, rows) in &mut self.truths {
-            truth.read_run(number, rows, &self.points, run)?;
-        }
-        if has_truth(run) {
-            return Ok(());
-        }
-        let tables: Vec<_> = self.truths.iter().map(|(truth, _)| truth.name()).collect();
-        Err(without_truth(self.manifest_file.clone(), self.run_lines[number], run, &tables))
-    }
-}
-
 impl Iterator for RunByRun {
     type Item = Result<Loaded, DatasetError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         match &mut self.rest {
-            Rest::Grouped(grouped) => match grouped.next(self.header.robot.counter_bits)? {
+            Rest::Grouped(grouped, next) => match grouped.read(grouped.info(*next)?.clone(), *next, &self.header.robot)
+            {
                 Ok(run) => {
+                    *next += 1;
                     let dataset = Dataset { runs: vec![run], ..self.header.clone() };
                     let warnings = counter::wrap_warnings(&dataset);
                     Some(Ok(Loaded { dataset, warnings }))

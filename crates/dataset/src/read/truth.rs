@@ -8,7 +8,7 @@ use kinematics::{Point, Wheels};
 use super::warn_of_unknown;
 use crate::error::{DatasetError, shown};
 use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
-use crate::table::{RUN_COLUMN, Row, RunIndex, Survey, Table};
+use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
 pub(crate) const TRUTH: &str = "truth.csv";
@@ -59,6 +59,11 @@ const KINDS: [Kind; 4] = [
 trait TruthColumns: std::fmt::Debug {
     fn reserve(&self, run: &mut Run, rows: usize);
     fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
+
+    /// The instants' column, where a row speaks of one instant and stands for itself: only then can a run be cut between two of them.
+    fn instant(&self) -> Option<usize> {
+        None
+    }
 }
 
 /// An open truth table.
@@ -91,13 +96,13 @@ impl TruthTable {
     }
 
     /// Where each run's rows are; goes back to the first.
-    pub(super) fn survey(&mut self, index: &RunIndex) -> Result<Survey, DatasetError> {
-        self.table.survey(index)
+    pub(super) fn survey(&mut self, index: &RunIndex, marked: bool) -> Result<Survey, DatasetError> {
+        self.table.survey(index, self.columns.instant().filter(|_| marked))
     }
 
     /// Fills every run's records of this kind.
     pub(super) fn read(mut self, index: &RunIndex, points: &PointIndex, runs: &mut [Run]) -> Result<(), DatasetError> {
-        let rows = self.table.survey(index)?.rows;
+        let rows = self.table.survey(index, None)?.rows;
         for (run, &rows) in runs.iter_mut().zip(&rows) {
             self.columns.reserve(run, rows);
         }
@@ -116,6 +121,31 @@ impl TruthTable {
         self.columns.reserve(run, survey.rows[number]);
         let columns = &self.columns;
         self.table.for_each_row_of(number, survey, |row| columns.push(row, run, points))
+    }
+
+    /// Fills one run's records of this kind from one instant to a later one, both among them. The order is checked from the mark before to the mark behind, so that
+    /// parts that touch check all of it.
+    pub(super) fn read_between(
+        &mut self,
+        number: usize,
+        survey: &Survey,
+        (from_s, to_s): (f64, f64),
+        points: &PointIndex,
+        run: &mut Run,
+    ) -> Result<(), DatasetError> {
+        let (Some(instant), Some(marks)) = (self.columns.instant(), survey.marks.get(number)) else { return Ok(()) };
+        let marks_until = |t_s: f64| marks.partition_point(|mark| mark.t_s <= t_s);
+        let first = marks_until(from_s).saturating_sub(1);
+        let Some(from) = marks.get(first) else { return Ok(()) };
+        let rows = (marks_until(to_s) * MARKED_ROWS + 1).min(survey.rows[number]) - first * MARKED_ROWS;
+        self.columns.reserve(run, rows);
+        let columns = &self.columns;
+        let mut previous_s = None;
+        self.table.for_each_row_from(from.position, rows, |row| {
+            let t_s = row.time_after(instant, previous_s)?;
+            previous_s = Some(t_s);
+            if t_s < from_s || t_s > to_s { Ok(()) } else { columns.push(row, run, points) }
+        })
     }
 }
 
@@ -171,6 +201,10 @@ impl PoseColumns {
 pub(crate) const UNKNOWN_SIGMA: TruthSigma = TruthSigma { sigma_xy_m: None, sigma_theta_rad: None };
 
 impl TruthColumns for PoseColumns {
+    fn instant(&self) -> Option<usize> {
+        Some(self.t_s)
+    }
+
     fn reserve(&self, run: &mut Run, rows: usize) {
         run.truth.reserve_exact(rows);
     }

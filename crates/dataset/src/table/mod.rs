@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{DatasetError, shown};
 use fields::Fields;
-use lines::{Line, Lines, Position};
+use lines::{Line, Lines};
 
 pub(crate) use fields::quoted_where_needed;
-pub(crate) use lines::{LINE_LIMIT_BYTES, open as open_file, read_all as read_lines};
+pub(crate) use lines::{LINE_LIMIT_BYTES, Position, open as open_file, read_all as read_lines};
 
 /// The column that says to which run a row belongs.
 pub(crate) const RUN_COLUMN: &str = "run";
@@ -63,7 +63,20 @@ pub(crate) struct Survey {
     first: Vec<Position>,
     /// Do the rows of every run stand together?
     pub(crate) is_grouped: bool,
+    /// Of each run, where every [`MARKED_ROWS`]th row stands, the first among them; none unless asked for.
+    pub(crate) marks: Vec<Vec<Mark>>,
 }
+
+/// A row between two of which a run can be cut.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mark {
+    /// Before the row.
+    pub(crate) position: Position,
+    pub(crate) t_s: f64,
+}
+
+/// Rows from one mark to the next: what is read in vain when a cut falls between two is small beside a part, and marks are small beside the rows.
+pub(crate) const MARKED_ROWS: usize = 1024;
 
 /// Where a table is and what its columns are called.
 #[derive(Debug)]
@@ -132,11 +145,13 @@ impl Table {
         &self.columns.names
     }
 
-    /// Finds each run's rows and goes back to the first.
-    pub(crate) fn survey(&mut self, runs: &RunIndex) -> Result<Survey, DatasetError> {
+    /// Finds each run's rows, with marks by a column of times where one is given, and goes back to the first.
+    pub(crate) fn survey(&mut self, runs: &RunIndex, marked_by: Option<usize>) -> Result<Survey, DatasetError> {
         let run_column = self.require(RUN_COLUMN)?;
         let start = self.lines.position();
-        let mut survey = Survey { rows: vec![0; runs.ids.len()], first: vec![start; runs.ids.len()], is_grouped: true };
+        let count = runs.ids.len();
+        let marks = if marked_by.is_some() { vec![Vec::new(); count] } else { Vec::new() };
+        let mut survey = Survey { rows: vec![0; count], first: vec![start; count], is_grouped: true, marks };
         let mut previous = None;
         loop {
             let position = self.lines.position();
@@ -157,6 +172,13 @@ impl Table {
             } else if previous != Some(run) {
                 survey.is_grouped = false;
             }
+            if let Some(column) = marked_by
+                && survey.rows[run].is_multiple_of(MARKED_ROWS)
+            {
+                let row = self.columns.split(&mut self.fields, line)?;
+                let t_s = row.time_after(column, survey.marks[run].last().map(|mark| mark.t_s))?;
+                survey.marks[run].push(Mark { position, t_s });
+            }
             survey.rows[run] += 1;
             previous = Some(run);
         }
@@ -169,10 +191,20 @@ impl Table {
         &mut self,
         run: usize,
         survey: &Survey,
+        visit: impl FnMut(&Row<'_>) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        self.for_each_row_from(survey.first[run], survey.rows[run], visit)
+    }
+
+    /// Calls `visit` with so many rows from a place on.
+    pub(crate) fn for_each_row_from(
+        &mut self,
+        from: Position,
+        rows: usize,
         mut visit: impl FnMut(&Row<'_>) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
-        self.lines.go_to(survey.first[run])?;
-        for _ in 0..survey.rows[run] {
+        self.lines.go_to(from)?;
+        for _ in 0..rows {
             // A file that someone cuts meanwhile ends sooner.
             let Some(row) = self.next_row()? else { break };
             visit(&row)?;

@@ -8,7 +8,10 @@
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
 
 mod nuisances;
+mod one_step;
 mod profile;
+
+use std::sync::Arc;
 
 use dataset::{ModelTerm, Schedule, Session};
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
@@ -17,9 +20,12 @@ use crate::estimate::{
     CalibError, Calibration, Covariance, Method, Mounting, Rejected, drive, nominal, refuse_wrapped_counters,
 };
 use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning};
-use crate::likelihood::{From, NoisePrior, basis, fit_from, pass_with_innovations};
+use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, basis, fit_from, pass_with_innovations};
 
+pub use one_step::{LARGE_ROWS, OneStep, OneStepError, is_large};
 pub use profile::RISE_95;
+
+use nuisances::Explained;
 
 /// The method with its settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,11 +56,11 @@ const SCATTER_OF_RUNS: usize = 20;
 #[derive(Debug, Clone)]
 pub struct JointFit<'a> {
     /// The runs.
-    pub records: Records<'a>,
+    pub records: Arc<Records<'a>>,
     /// How their looks are thinned.
     pub thinning: Thinning,
     /// The looks taken.
-    pub selections: Vec<Selection>,
+    pub selections: Arc<Vec<Selection>>,
     /// The nominal drive.
     pub nominal: Model,
     /// Where fits start: the nominal drive with its instrument turned as it seems to be.
@@ -66,6 +72,10 @@ pub struct JointFit<'a> {
     /// Directions of the three lengths that the data do not determine, and that stay nominal: rows left, right, separation.
     pub unseen: Vec<DVector<f64>>,
     pub(crate) prior: NoisePrior,
+    /// Steps of the noise end below this share of a variance.
+    pub(crate) noise_settled: f64,
+    /// The evidence of parts, where there are no records to make it of.
+    pub(crate) parts: Vec<Evidence>,
 }
 
 impl Joint {
@@ -79,36 +89,41 @@ impl Joint {
     /// # Errors
     /// [`CalibError`] when the sessions hold no looks, or the fit diverges.
     pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
+        self.fit_until(NOISE_SETTLED, sessions)
+    }
+
+    /// The fit, its noise followed until no step of a variance is a larger share of it.
+    fn fit_until<'a>(&self, noise_settled: f64, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
         refuse_wrapped_counters(sessions)?;
         let (_, geometry) = nominal(Self::NAME, sessions)?;
         let records = Records::of(sessions);
         let nominal = Model::of(&geometry, 0);
         let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
         let mut found = JointFit {
-            selections: Selection::of(&records, Thinning::NONE, &nominal),
+            selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
             thinning: Thinning::NONE,
             fit: Fit::nothing(&nominal, &prior),
             columns: Column::GEOMETRY.to_vec(),
             unseen: Vec::new(),
-            records,
+            records: Arc::new(records),
             start: nominal.clone(),
             nominal,
             prior,
+            noise_settled,
+            parts: Vec::new(),
         };
         found.look_at_the_mounting();
         found.refit(None)?;
         found.hold_what_is_unseen()?;
-        let explained = if self.nuisances { found.explained_by_nuisances(self.thin)? } else { None };
+        let explained = if self.nuisances { found.explained_by_nuisances(self.thin)? } else { Explained::NotTried };
+        let is_explained = matches!(explained, Explained::Yes(_));
         match explained {
-            Some(explained) => found = explained,
-            None => {
-                if self.thin {
-                    found.thin()?;
-                }
-                if self.nuisances {
-                    found.add_nuisances(Gate::Shut)?;
-                }
-            }
+            Explained::Yes(other) | Explained::No { thinned: other } => found = other,
+            Explained::NotTried if self.thin => found.thin()?,
+            Explained::NotTried => {}
+        }
+        if self.nuisances && !is_explained {
+            found.add_nuisances(Gate::Shut)?;
         }
         found.hold_what_is_unseen()?;
         Ok(found)
@@ -139,7 +154,8 @@ impl JointFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
-        let options = FitOptions { held: self.held(), ..FitOptions::of(&self.columns) };
+        let noise_settled = self.noise_settled;
+        let options = FitOptions { held: self.held(), noise_settled, ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
         Ok(())
     }
@@ -164,15 +180,24 @@ impl JointFit<'_> {
         let mut every_s = between_s;
         while !self.is_white() {
             every_s *= 2.0;
-            let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
-            let selections = Selection::of(&self.records, thinning, &self.nominal);
-            if selections[0].mean_looks() < LEAST_LOOKS_A_RUN {
-                break;
-            }
-            (self.selections, self.thinning) = (selections, thinning);
+            let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
+            (self.selections, self.thinning) = (Arc::new(selections), thinning);
             self.refit(Some(self.here()))?;
         }
         Ok(())
+    }
+
+    /// Looks so far apart; `None` when a run has too few left.
+    fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
+        let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
+        let selections = Selection::of(&self.records, thinning, &self.nominal);
+        (selections[0].mean_looks() >= LEAST_LOOKS_A_RUN).then_some((thinning, selections))
+    }
+
+    /// Does [`Self::thin`] take looks farther apart than all of them?
+    fn is_to_be_thinned(&self) -> bool {
+        let between_s = median_between(&self.records).filter(|_| !self.is_white());
+        between_s.is_some_and(|between_s| self.thinned(2.0 * between_s, between_s).is_some())
     }
 
     fn is_white(&self) -> bool {
@@ -212,19 +237,17 @@ impl JointFit<'_> {
         if self.fit.pass.runs.len() >= LEAST_RUNS {
             return self.fit.pass.runs.clone();
         }
+        if !self.parts.is_empty() {
+            return self.parts.clone();
+        }
         self.in_blocks(&mut [], LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
     }
 
     /// Names the directions of the lengths that the looks do not determine, and keeps them nominal.
     fn hold_what_is_unseen(&mut self) -> Result<(), CalibError> {
         let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
-        let geometry = geometry_information(&information.matrix);
-        let SymmetricEigen { eigenvalues, eigenvectors } = geometry.symmetric_eigen();
         let held_before = !self.unseen.is_empty();
-        self.unseen = (0..3)
-            .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
-            .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
-            .collect();
+        self.unseen = unseen(&information.matrix);
         if self.unseen.is_empty() {
             // What has come to be seen since is free again.
             return if held_before { self.refit(Some(self.here())) } else { Ok(()) };
@@ -312,6 +335,15 @@ impl JointFit<'_> {
     }
 }
 
+/// The directions of the three lengths that a normal equation, which begins with them, does not determine.
+fn unseen(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
+    (0..3)
+        .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
+        .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
+        .collect()
+}
+
 /// Information on the three lengths with the other columns at their best.
 fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
     let n = matrix.nrows();
@@ -355,16 +387,23 @@ impl Method for Joint {
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, _) = nominal(Self::NAME, sessions)?;
-        let found = self.fit(sessions)?;
-        let Model { m_per_rad, separation_m, .. } = found.fit.model;
-        let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
-        let covariance = found.covariance();
+        let names: Vec<&str> = sessions.iter().map(|session| session.name).collect();
+        self.fit(sessions)?.calibration(robot.ticks_per_rev, &names)
+    }
+}
+
+impl JointFit<'_> {
+    /// The fit as a calibration of sessions with these names.
+    fn calibration(&self, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
+        let Model { m_per_rad, separation_m, .. } = self.fit.model;
+        let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
+        let covariance = self.covariance();
         let diameter_m = geometry.wheel_diameter_m();
         let sizes = [diameter_m.left, diameter_m.right, separation_m];
-        let at = |column: Column| found.columns.iter().position(|of| *of == column);
+        let at = |column: Column| self.columns.iter().position(|of| *of == column);
         let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
-        let instrument = found.mean_instrument();
-        let mounting = found.has(Column::MountX).then(|| Mounting {
+        let instrument = self.mean_instrument();
+        let mounting = self.has(Column::MountX).then(|| Mounting {
             body_from_sensor: instrument.body_from_sensor,
             covariance: at(Column::MountX)
                 .filter(|_| covariance.is_some())
@@ -376,18 +415,16 @@ impl Method for Joint {
                 .as_ref()
                 .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
             mounting,
-            latency_s: found.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
-            own_instruments: found.own_instruments(sessions),
-            not_observable: found.not_observable(),
-            runs_used: found.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
-            runs_rejected: found.rejected(),
-            converged: found.fit.converged,
-            ..Calibration::new(Self::NAME, geometry, robot.ticks_per_rev)
+            latency_s: self.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
+            own_instruments: self.own_instruments(names),
+            not_observable: self.not_observable(),
+            runs_used: self.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+            runs_rejected: self.rejected(),
+            converged: self.fit.converged,
+            ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
         })
     }
-}
 
-impl JointFit<'_> {
     /// Runs without use and runs of which no look fitted.
     fn rejected(&self) -> Vec<Rejected> {
         let id = |run: (usize, usize)| self.records.ids[run.0][run.1].to_owned();

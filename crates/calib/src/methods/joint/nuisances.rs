@@ -1,6 +1,5 @@
 //! The instrument's mounting and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
 
-use dataset::Session;
 use kinematics::Pose;
 use nalgebra::DVector;
 
@@ -37,6 +36,16 @@ struct Earned {
     columns: Vec<Column>,
     own: Option<Own>,
     held_out: HeldOut,
+}
+
+/// Whether nuisances explain what is not white or lies far off.
+pub(super) enum Explained<T> {
+    /// The fit with them.
+    Yes(T),
+    /// The fit without them, thinned as far as it has to be.
+    No { thinned: T },
+    /// There was nothing to explain, or nothing to do it.
+    NotTried,
 }
 
 fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
@@ -119,23 +128,23 @@ impl JointFit<'_> {
 
     /// Looks that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all looks, if
     /// they are then white, and were not before or less than half as many lie far off. If they are not, their number says little for what they seem to show.
-    pub(super) fn explained_by_nuisances(&self, thin: bool) -> Result<Option<Self>, CalibError> {
+    pub(super) fn explained_by_nuisances(&self, thin: bool) -> Result<Explained<Self>, CalibError> {
         if (self.is_white() || !thin) && self.fit.pass.outliers.is_empty() {
-            return Ok(None);
+            return Ok(Explained::NotTried);
         }
         let mut explained = self.clone();
         explained.add_nuisances(Gate::Open)?;
         if explained.columns == self.columns && explained.fit.model.own.is_none() {
-            return Ok(None);
+            return Ok(Explained::NotTried);
         }
         let mut plain = self.clone();
         if thin {
             plain.thin()?;
-            explained.thin()?;
         }
         let far = |found: &Self| found.fit.pass.outliers.len();
         let uses_more = plain.thinning != Thinning::NONE || 2 * far(&explained) < far(&plain);
-        Ok((explained.thinning == Thinning::NONE && uses_more).then_some(explained))
+        let is_better = uses_more && !(thin && explained.is_to_be_thinned());
+        Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
     }
 
     /// Fits some columns, and what is own to groups, to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not
@@ -237,14 +246,14 @@ impl JointFit<'_> {
         model.own.as_ref().zip(follow).is_some_and(|(own, follow)| own.is_shown(follow, column))
     }
 
-    /// The instruments of groups, by name.
-    pub(super) fn own_instruments(&self, sessions: &[Session<'_>]) -> Vec<OwnInstrument> {
+    /// The instruments of groups, by the sessions' names.
+    pub(super) fn own_instruments(&self, names: &[&str]) -> Vec<OwnInstrument> {
         let Some(own) = &self.fit.model.own else { return Vec::new() };
         let name = |(session, run): (usize, usize)| {
-            let session_name = sessions[session].name.to_owned();
+            let session_name = names[session].to_owned();
             match own.apart {
                 Apart::Session => session_name,
-                Apart::Run if sessions.len() == 1 => self.records.ids[session][run].to_owned(),
+                Apart::Run if names.len() == 1 => self.records.ids[session][run].to_owned(),
                 Apart::Run => format!("{session_name}/{}", self.records.ids[session][run]),
             }
         };
