@@ -93,8 +93,14 @@ const CORRELATED_SIGMAS: f64 = 4.0;
 
 /// A model that leaves out more of the looks is none.
 const MOST_LEFT_OUT: f64 = 0.2;
-/// With fewer looks a run, a fit that follows nothing may have gone astray by itself: no fault is named then.
+/// With fewer looks a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
 const LEAST_LOOKS_A_RUN: f64 = 3.0;
+
+#[allow(clippy::cast_precision_loss)] // thousands
+fn looks_a_run(fit: &JointFit<'_>) -> f64 {
+    let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    fit.records.looks() as f64 / runs.max(1) as f64
+}
 
 const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false };
 const THINNED: Joint = Joint { nuisances: false, thin: true };
@@ -117,13 +123,9 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
     }
     let measured = sessions(datasets);
     let first = ALL_LOOKS.fit(&measured);
-    if let Ok(first) = &first
-        && left_out(first) > MOST_LEFT_OUT
-        && first.selections.first().is_some_and(|taken| taken.mean_looks() < LEAST_LOOKS_A_RUN)
-    {
-        return Err(DiagnoseError::NothingFollows { percent: 100.0 * left_out(first) });
-    }
-    match fault(datasets, first.as_ref().ok(), &options.without) {
+    let astray =
+        first.as_ref().is_ok_and(|first| left_out(first) > MOST_LEFT_OUT && looks_a_run(first) < LEAST_LOOKS_A_RUN);
+    match fault(datasets, first.as_ref().ok(), &options.without, astray) {
         Some(found) => {
             let rewritten = sessions(&found.records);
             let base = ALL_LOOKS.fit(&rewritten)?;

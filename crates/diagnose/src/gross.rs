@@ -49,8 +49,13 @@ pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one.
-pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: &[String]) -> Option<Fault> {
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one; `astray` leaves it at the former.
+pub(crate) fn fault(
+    datasets: &[Dataset],
+    base: Option<&JointFit<'_>>,
+    without: &[String],
+    astray: bool,
+) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
@@ -60,6 +65,9 @@ pub(crate) fn fault(datasets: &[Dataset], base: Option<&JointFit<'_>>, without: 
             continue;
         }
         for Form { sizes, sentence, evident, records } in together(datasets, rewritings) {
+            if astray && !evident {
+                continue;
+            }
             let own = sessions(&records);
             let Ok(fit) = PLAIN.fit(&own) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not

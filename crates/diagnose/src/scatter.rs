@@ -24,6 +24,8 @@ const SCATTER_LEVEL: f64 = 1e-3;
 /// That of turns that scatter: whatever the model lacks makes turns differ from run to run, so that they must do so beyond any doubt.
 pub(crate) const TURNS_LEVEL: f64 = 1e-7;
 
+/// Where tails are heavy, what residuals seem to go with must do so beyond doubt: few large errors make such a test fail.
+const CERTAINLY: f64 = 1e-6;
 /// With more, it is the model that is off, and not the looks.
 const MOST_OUTLIERS: f64 = 0.2;
 /// What follows large errors is told from chance at this many standard errors.
@@ -43,10 +45,10 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     let turns = of_turns(asked, options);
     let with_something = asked.checked.checks.iter().filter(|check| !check.passes && is_covariate(&check.name));
     let with_something = with_something.map(|check| check.p_value).fold(1.0, f64::min);
-    if with_something < 1.0 {
-        // Large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
-        return turns.filter(|turns| turns.p_value < with_something).into_iter().collect();
-    }
+    let tails =
+        asked.checked.checks.iter().filter(|check| check.name.starts_with("kurtosis_") || check.name == "outliers");
+    let tails = tails.map(|check| check.p_value).fold(1.0, f64::min);
+    let goes_with_something = with_something < tails.max(CERTAINLY);
     if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
@@ -56,7 +58,13 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
         findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
-    } else {
+    }
+    if goes_with_something {
+        // Other large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
+        findings.extend(turns.filter(|turns| turns.p_value < with_something));
+        return findings;
+    }
+    if findings.is_empty() {
         // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
         let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
         let kurtosis = |name: &str| {

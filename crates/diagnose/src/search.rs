@@ -362,15 +362,14 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
     // What stood for a shape that was not met is not needed any more.
     #[allow(clippy::cast_precision_loss)]
     let tests = first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
-    for place in (0..model.choices.len()).rev() {
-        let needed = examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= SCAN_LEVEL);
-        let others =
-            || model.choices.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, choice)| choice.clone());
-        if !needed
-            && model.choices.len() > 1
-            && names.len() == model.choices.len()
-            && let Some(without) = refit(base, others().collect())
-        {
+    for place in (0..names.len()).rev() {
+        if examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= SCAN_LEVEL) {
+            continue;
+        }
+        let mut others = model.choices.clone();
+        others.remove(place);
+        let alone = || Some(Extended { fit: base.clone(), choices: Vec::new() });
+        if let Some(without) = if others.is_empty() { alone() } else { refit(base, others) } {
             model = without;
             names.remove(place);
             wider.remove(place);
