@@ -248,6 +248,9 @@ fn the_catalogue_is_whole_and_every_effect_says_how_data_show_it() {
             Hypothesis::Records(_) => gross.contains(id),
             Hypothesis::Silent => noise.contains(id),
             Hypothesis::Terms(shapes) => !shapes.is_empty() && ![geometry, gross, noise].concat().contains(id),
+            Hypothesis::TermsAndScatter(shapes, signs) => {
+                !shapes.is_empty() && !signs.is_empty() && ![geometry, gross, noise].concat().contains(id)
+            }
             Hypothesis::Scatter(signs) => !signs.is_empty() && ![geometry, gross, noise].concat().contains(id),
         };
         assert!(is, "{id}");

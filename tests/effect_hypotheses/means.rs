@@ -143,7 +143,7 @@ fn every_mean_term_is_tried() {
 fn plausible_sizes_of_every_shape_make_a_physical_effect_that_says_the_same_sizes() {
     for id in CATALOGUE {
         let Some(Hypothesis::Terms(shapes)) = effects::hypothesis(id) else { continue };
-        for Shape { held, term } in shapes {
+        for Shape { held, term, .. } in shapes {
             let parameters = term.parameters();
             assert!(!parameters.is_empty() && parameters.iter().all(|parameter| parameter.plausible > 0.0), "{id}");
             let sizes = |scale: f64| {

@@ -73,10 +73,7 @@ pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
 }
 
 fn shapes(id: &str) -> Vec<effects::Shape> {
-    match hypothesis(id) {
-        Some(Hypothesis::Terms(shapes)) => shapes,
-        _ => Vec::new(),
-    }
+    hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_default()
 }
 
 /// Every shape of every effect whose hypothesis is a mean term, without those taken out.

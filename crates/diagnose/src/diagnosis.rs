@@ -239,7 +239,10 @@ fn continued(
     if lost {
         findings.extend(naming::of_lost(&asked.base));
     } else if !restored {
-        findings.extend(scatter(&asked, options));
+        // What has a size is not told again by its sign.
+        let told = |sign: &Finding| findings.iter().any(|finding| sign.names.contains(&finding.id));
+        let signs: Vec<Finding> = scatter(&asked, options).into_iter().filter(|sign| !told(sign)).collect();
+        findings.extend(signs);
     }
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let explained = restored
@@ -286,7 +289,12 @@ fn continued(
 }
 
 fn is_scatter(finding: &Finding) -> bool {
-    matches!(effects::hypothesis(&finding.id), Some(effects::Hypothesis::Scatter(_)))
+    match effects::hypothesis(&finding.id) {
+        Some(effects::Hypothesis::Scatter(_)) => true,
+        // Found by its sign it has no sizes.
+        Some(effects::Hypothesis::TermsAndScatter(..)) => finding.parameters.is_empty(),
+        _ => false,
+    }
 }
 
 fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<String>) {

@@ -135,7 +135,7 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let unlisted = strongest(findings, |finding| finding.id == "unlisted");
     let scatter = strongest(findings, |finding| finding.id == "contact_patch_wheelbase");
     for finding in findings {
-        if !matches!(hypothesis(&finding.id), Some(Hypothesis::Terms(_))) {
+        if hypothesis(&finding.id).and_then(Hypothesis::into_shapes).is_none() || finding.parameters.is_empty() {
             continue;
         }
         let part = unlisted > 0.0 && (full || finding.z < DOUBTFUL * unlisted);
@@ -185,7 +185,7 @@ pub(crate) fn with_sign(sign: Sign, without: &[String]) -> Vec<&'static str> {
         .iter()
         .copied()
         .filter(|id| !without.iter().any(|out| out == id))
-        .filter(|id| matches!(hypothesis(id), Some(Hypothesis::Scatter(signs)) if signs.contains(&sign)))
+        .filter(|id| hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign)))
         .collect()
 }
 

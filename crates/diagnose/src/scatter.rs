@@ -49,7 +49,9 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         asked.checked.checks.iter().filter(|check| check.name.starts_with("kurtosis_") || check.name == "outliers");
     let tails = tails.map(|check| check.p_value).fold(1.0, f64::min);
     let goes_with_something = with_something < tails.max(CERTAINLY);
-    if outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
+    // Of displacements nothing follows that could be back.
+    let followed = asked.base.selections.first().is_some_and(|taken| taken.mean_looks() >= 2.0);
+    if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
@@ -70,7 +72,7 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         let kurtosis = |name: &str| {
             asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
         };
-        let far_off = outliers.p_value < SCATTER_LEVEL && outliers.staying > 0;
+        let far_off = outliers.p_value < SCATTER_LEVEL && (outliers.staying > 0 || !followed);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(name, component, sign)| {
             let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;

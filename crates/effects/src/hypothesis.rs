@@ -17,6 +17,8 @@ pub enum Hypothesis {
     Records(fn(&Dataset) -> Vec<Rewriting>),
     /// It scatters: it shows in these checks of a fit and in no mean.
     Scatter(&'static [Sign]),
+    /// Both: a mean, and what chance does beside it.
+    TermsAndScatter(Vec<Shape>, &'static [Sign]),
     /// Innocent, or not told from data alone.
     Silent,
 }
@@ -29,6 +31,26 @@ pub struct Shape {
     pub term: Box<dyn ModelTerm>,
     /// The term at any other value of what is held, where that is one continuous number.
     pub at: Option<fn(f64) -> Box<dyn ModelTerm>>,
+}
+
+impl Hypothesis {
+    /// Its mean terms, if it has any.
+    #[must_use]
+    pub fn into_shapes(self) -> Option<Vec<Shape>> {
+        match self {
+            Self::Terms(shapes) | Self::TermsAndScatter(shapes, _) => Some(shapes),
+            _ => None,
+        }
+    }
+
+    /// Its signs in the checks of a fit.
+    #[must_use]
+    pub const fn signs(&self) -> &'static [Sign] {
+        match self {
+            Self::Scatter(signs) | Self::TermsAndScatter(_, signs) => signs,
+            _ => &[],
+        }
+    }
 }
 
 impl Shape {

@@ -27,7 +27,7 @@ pub(crate) fn hideable() -> Vec<(&'static str, EffectKind)> {
         .iter()
         .filter_map(|id| match hypothesis(id)? {
             Hypothesis::Terms(_) => Some((*id, EffectKind::Mean)),
-            Hypothesis::Scatter(_) => Some((*id, EffectKind::Scatter)),
+            Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => Some((*id, EffectKind::Scatter)),
             Hypothesis::Records(_) => Some((*id, EffectKind::Gross)),
             Hypothesis::Geometry | Hypothesis::Silent => None,
         })

@@ -124,7 +124,7 @@ impl Shown {
         let mut candidates = Vec::new();
         let mut at = Column::BASE.len();
         for id in CATALOGUE {
-            let Some(Hypothesis::Terms(shapes)) = hypothesis(id) else { continue };
+            let Some(shapes) = hypothesis(id).and_then(Hypothesis::into_shapes) else { continue };
             for shape in shapes {
                 let parameters = shape.term.parameters();
                 let columns = at..at + parameters.len();

@@ -1,15 +1,17 @@
 //! `traction_loss`: a wheel that is accelerated harder than the floor can hold slides until it is caught.
 //!
 //! Model: the contact sticks while the acceleration stays under μ_s g; then it slides with Stribeck friction
-//! μ(u) = μ_k + (μ_s − μ_k) exp(−|u|/u_s) of the sliding speed u, until the speeds meet. Signature: a one-sided heavy tail of e_dx above some |a|.
-//! Observability: hard starts and stops. Alias: `bumps`. Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
+//! μ(u) = μ_k + (μ_s − μ_k) exp(−|u|/u_s) of the sliding speed u, until the speeds meet. Signature: a one-sided heavy tail of e_dx above some |a|; where many
+//! starts and stops are as hard, a mean: ground lost at starts and gained at stops, by the wheel that is accelerated harder than the floor holds.
+//! Observability: hard starts and stops. Alias: `bumps`; `slip_acceleration` where looks are few. Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
 
-use kinematics::{Side, Wheels};
+use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::hypothesis::{Hypothesis, Shape, Sign, size};
 
 /// Standard gravity, m/s² (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -49,10 +51,15 @@ impl PhysicalEffect for TractionLoss {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Scatter(&[Sign::WayJumps, Sign::HeadingJumps])
+        let terms = Shape::along("holds_m_s2", &HOLDS_M_S2, |holds_m_s2| Box::new(Term::new(holds_m_s2)));
+        Hypothesis::TermsAndScatter(terms, &[Sign::WayJumps, Sign::HeadingJumps])
     }
 
+    /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's sliding there is beyond it.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+        if let Some((sliding, holds_m_s2)) = size(sizes, "sliding").zip(size(sizes, "holds_m_s2")) {
+            return (sliding >= 0.0).then(|| Self::usual(holds_m_s2));
+        }
         Some(Self {
             static_friction: size(sizes, "static_friction")?,
             kinetic_friction: size(sizes, "kinetic_friction")?,
@@ -72,6 +79,22 @@ impl State {
         let TractionLoss { static_friction, kinetic_friction, stribeck_speed_m_s } = self.size;
         let excess = (static_friction - kinetic_friction) * (-sliding_m_s.abs() / stribeck_speed_m_s).exp();
         GRAVITY_M_S2 * (kinetic_friction + excess)
+    }
+}
+
+impl State {
+    /// Slides for a while under a tread of some speed, until the speeds meet; the ground's speed then.
+    fn slide(&mut self, side: Side, speed_m_s: f64, dt_s: f64) -> f64 {
+        let before_m_s = self.ground_m_s[side];
+        let gap_m_s = speed_m_s - before_m_s;
+        let gain_m_s = self.held_m_s2(gap_m_s) * dt_s;
+        if gap_m_s.abs() <= gain_m_s {
+            self.ground_m_s[side] = speed_m_s;
+            self.sliding[side] = false;
+        } else {
+            self.ground_m_s[side] = before_m_s + gain_m_s * gap_m_s.signum();
+        }
+        self.ground_m_s[side]
     }
 }
 
@@ -96,14 +119,7 @@ impl Forward for State {
                 }
                 self.sliding[side] = true;
             }
-            let gap_m_s = speed_m_s[side] - before_m_s;
-            let gain_m_s = self.held_m_s2(gap_m_s) * step.dt_s;
-            if gap_m_s.abs() <= gain_m_s {
-                self.ground_m_s[side] = speed_m_s[side];
-                self.sliding[side] = false;
-            } else {
-                self.ground_m_s[side] = before_m_s + gain_m_s * gap_m_s.signum();
-            }
+            self.slide(side, speed_m_s[side], step.dt_s);
             // While sliding the ground passes at the contact's own speed and not at the tread's.
             step.travel_m[side] = 0.5 * (before_m_s + self.ground_m_s[side]) * step.dt_s;
         }
@@ -111,6 +127,79 @@ impl Forward for State {
 
     fn needs_stepping(&self) -> Option<&'static str> {
         Some("sliding is a transient")
+    }
+}
+
+/// Accelerations up to which the floor holds that are tried, m/s².
+const HOLDS_M_S2: [f64; 6] = [0.1, 0.2, 0.35, 0.55, 0.8, 1.2];
+/// Kinetic over static friction, and the Stribeck speed, m/s, of a usual floor: rubber slides with two thirds to four fifths of what it holds.
+const USUAL_KINETIC: f64 = 0.7;
+const USUAL_STRIBECK_M_S: f64 = 0.05;
+
+impl TractionLoss {
+    /// A usual floor that holds up to an acceleration.
+    fn usual(holds_m_s2: f64) -> Self {
+        let static_friction = holds_m_s2 / GRAVITY_M_S2;
+        let kinetic_friction = USUAL_KINETIC * static_friction;
+        Self { static_friction, kinetic_friction, stribeck_speed_m_s: USUAL_STRIBECK_M_S }
+    }
+}
+
+/// What a usual floor would lose, by the treads' speeds from row to row.
+struct Term {
+    floor: State,
+    holds_m_s2: f64,
+    /// End, length and speeds of the logged interval in force.
+    row: Option<(f64, f64, Wheels<f64>)>,
+}
+
+impl Term {
+    fn new(holds_m_s2: f64) -> Self {
+        let floor = State {
+            size: TractionLoss::usual(holds_m_s2),
+            ground_m_s: Wheels::both(0.0),
+            sliding: Wheels::both(false),
+        };
+        Self { floor, holds_m_s2, row: None }
+    }
+}
+
+impl ModelTerm for Term {
+    /// Plausible: what a usual floor loses.
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "sliding", unit: "1", plausible: 1.0 }]
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        *self = Self::new(self.holds_m_s2);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let [from_s, to_s] = interval.row_s;
+        let speed_m_s = interval.speed_m_s();
+        if self.row.is_none_or(|(end_s, _, _)| end_s != to_s) {
+            let length_s = to_s - from_s;
+            let (before_s, before_m_s) =
+                self.row.map_or((length_s, Wheels::both(0.0)), |(_, length_s, speed)| (length_s, speed));
+            for side in Side::BOTH {
+                let acceleration_m_s2 = (speed_m_s[side] - before_m_s[side]) / (0.5 * (length_s + before_s));
+                if !self.floor.sliding[side] {
+                    self.floor.ground_m_s[side] = before_m_s[side];
+                    self.floor.sliding[side] = acceleration_m_s2.abs() > self.holds_m_s2;
+                }
+            }
+            self.row = Some((to_s, length_s, speed_m_s));
+        }
+        let lost_m = Wheels::from_sides(|side| {
+            if !self.floor.sliding[side] {
+                return 0.0;
+            }
+            let before_m_s = self.floor.ground_m_s[side];
+            let ground_m_s = self.floor.slide(side, speed_m_s[side], interval.dt_s);
+            // The tread's speed is the mean of a row in which it changes; what it had on average is not lost.
+            (speed_m_s[side] - 0.5 * (before_m_s + ground_m_s)) * interval.dt_s
+        });
+        gradient[0] = interval.change(lost_m.map(|lost_m| -lost_m));
     }
 }
 
@@ -151,5 +240,53 @@ mod tests {
         let loss = |held_m_s2: f64| 0.08 * (1.0 / held_m_s2 - 1.0 / 3.0);
         let lost_m = tread_m - ground_m;
         assert!(lost_m > loss(0.1 * GRAVITY_M_S2) && lost_m < loss(0.06 * GRAVITY_M_S2), "{lost_m}");
+    }
+
+    /// The hypothesis sees rows of the log and no frictions, but for a usual floor's.
+    #[test]
+    fn rows_of_the_log_show_what_a_usual_floor_loses() {
+        let (holds_m_s2, acceleration_m_s2, cruise_m_s) = (0.98, 3.0, 0.4);
+        let mut floor = State { size: TractionLoss::usual(holds_m_s2), ..Term::new(holds_m_s2).floor };
+        let mut term = Term::new(holds_m_s2);
+        let run = RunInfo::default();
+        let (mut lost_m, mut expected_m, mut previous_m) = (0.0, 0.0, 0.0);
+        let (dt_s, steps) = (1e-4, 200_u32);
+        for row in 0..50 {
+            let mut travel_m = 0.0;
+            for k in 0..steps {
+                let t_s = dt_s * f64::from(row * steps + k);
+                let speed_m_s = (acceleration_m_s2 * t_s).min(cruise_m_s);
+                let mut step = specimen_step();
+                step.dt_s = dt_s;
+                step.travel_m.left = speed_m_s * dt_s;
+                step.rate_rad_s.left = speed_m_s / 0.08;
+                step.acceleration_rad_s2.left = if speed_m_s < cruise_m_s { acceleration_m_s2 / 0.08 } else { 0.0 };
+                travel_m += step.travel_m.left;
+                floor.floor(&mut step);
+                expected_m += speed_m_s * dt_s - step.travel_m.left;
+            }
+            let (from_s, length_s) = (0.02 * f64::from(row), 0.02);
+            let interval = Interval {
+                t_s: from_s,
+                dt_s: length_s,
+                row_s: [from_s, from_s + length_s],
+                travel_m: Wheels { left: travel_m, right: 0.0 },
+                previous_m: Wheels { left: previous_m, right: 0.0 },
+                previous_dt_s: length_s,
+                wheel_separation_m: 0.4,
+                wheel_rad: Wheels::both(0.0),
+                turned_rad: Wheels { left: travel_m / 0.08, right: 0.0 },
+                world_from_body: Pose::IDENTITY,
+                session_m: 0.0,
+                run: &run,
+            };
+            let mut gradient = [Pose::IDENTITY];
+            term.motion(&interval, &mut gradient);
+            // Half of a wheel's way is the centre's.
+            lost_m -= 2.0 * gradient[0].x_m;
+            previous_m = travel_m;
+        }
+        // A start of 0.13 s is seven rows: the instants at which it begins and ends are known to half a row each.
+        assert!((lost_m / expected_m - 1.0).abs() < 0.15, "{lost_m} for {expected_m}");
     }
 }
