@@ -164,8 +164,10 @@ mod tests {
     }
 
     fn rivals(before: &Evidence) -> Rivals {
-        let candidate =
-            |column| Candidate { choice: Choice::Effect { id: "slip_speed", shape: 0, at: None }, columns: vec![column] };
+        let candidate = |column| Candidate {
+            choice: Choice::Effect { id: "slip_speed", shape: 0, at: None },
+            columns: vec![column],
+        };
         let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
         Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
     }
