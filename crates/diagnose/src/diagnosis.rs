@@ -12,7 +12,7 @@ use crate::alternatives::{Alternative, alternatives};
 use crate::blind::blind;
 use crate::candidate::{Choice, mean_terms};
 use crate::checks::{Checked, check};
-use crate::document::{Document, Finding, Gain, Verdict};
+use crate::document::{Check, Document, Finding, Gain, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, follows, left_out, sessions};
 use crate::naming;
@@ -208,6 +208,9 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
     asked
 }
 
+/// What residuals go with by less chance than this, no scatter makes them go with.
+const BEYOND_SCATTER: f64 = 1e-8;
+
 /// Whether a check asks what residuals go with, not how they scatter.
 pub(crate) fn is_covariate(name: &str) -> bool {
     !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
@@ -245,10 +248,10 @@ fn continued(
         findings.extend(signs);
     }
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let explained = restored
-        || asked.sparse.is_some()
-        || findings.iter().any(|finding| is_scatter(finding) || finding.id == "unlisted");
-    if !explained {
+    let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
+    let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
+    let told = asked.sparse.is_some() || findings.iter().any(|finding| finding.id == "unlisted");
+    if !(restored || scatters || told) {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
     naming::doubt(&mut findings, asked.found.model.choices.len() >= MOST_EFFECTS);

@@ -8,6 +8,7 @@ use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
 
 use crate::candidate::Choice;
 use crate::checks::Checked;
+use crate::diagnosis::is_covariate;
 use crate::document::{Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
 use crate::search::{Extended, Found, LEAST_REACH, Name, Test, reach};
@@ -107,7 +108,12 @@ pub(crate) fn of_sparse(model: &Extended<'_>, test: &Test, p_value: f64, trials:
 pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     let failed: Vec<&str> =
         checked.checks.iter().filter(|check| !check.passes).map(|check| check.name.as_str()).collect();
-    let worst = checked.checks.iter().filter(|check| !check.passes).map(|check| check.p_value).fold(1.0, f64::min);
+    // Heavy tails have names of their own: what goes with something says how sure it is.
+    let of = |covariates: bool| {
+        let own = checked.checks.iter().filter(|check| !check.passes && (!covariates || is_covariate(&check.name)));
+        own.map(|check| check.p_value).reduce(f64::min)
+    };
+    let worst = of(true).or(of(false)).unwrap_or(1.0);
     (!failed.is_empty()).then(|| Finding {
         id: "unlisted".to_owned(),
         names: vec!["unlisted".to_owned()],
@@ -126,8 +132,10 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
 /// What is found beside something that has no name, or a scatter, that stands out as much as a third of it may be a part of that, or an accident of it.
 const DOUBTFUL: f64 = 3.0;
 
-/// Says of names that they may be part of something that has none: where that stands out as well, or where as many effects were found as are sought and there is
-/// still something left.
+/// The same where as many effects were found as are sought, and there is still something left.
+const DOUBTFUL_IF_FULL: f64 = 10.0;
+
+/// Says of names that they may be part of something that has none: where that stands out as well, the more so where as many effects were found as are sought.
 pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
         findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
@@ -138,7 +146,7 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
         if hypothesis(&finding.id).and_then(Hypothesis::into_shapes).is_none() || finding.parameters.is_empty() {
             continue;
         }
-        let part = unlisted > 0.0 && (full || finding.z < DOUBTFUL * unlisted);
+        let part = finding.z < unlisted * if full { DOUBTFUL_IF_FULL } else { DOUBTFUL };
         if part || DOUBTFUL * finding.z < scatter {
             finding.id = "unlisted".to_owned();
             finding.names.insert(0, "unlisted".to_owned());
