@@ -4,7 +4,7 @@ use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
 
 use crate::estimate::CalibError;
-use crate::likelihood::{Evidence, Fit, Gate, Instrument, LEAST_SIGMA, NoiseComponent, Piece, Want, pass};
+use crate::likelihood::{Evidence, Fit, Gate, Instrument, LEAST_SIGMA, Model, NoiseComponent, Piece, Want, pass};
 use crate::methods::joint::JointFit;
 
 /// How far off dead reckoning ends.
@@ -42,6 +42,28 @@ impl JointFit<'_> {
             .collect()
     }
 
+    /// How far displacements that follow each other, taken together, lie from dead reckoning with the lengths found, in standard deviations of a look; `None` where
+    /// there is none.
+    #[must_use]
+    pub fn displaced(&self, chains: std::ops::Range<usize>) -> Option<f64> {
+        let (mut seen, mut reckoned) = (None, Pose::IDENTITY);
+        for chain in self.records.chains.get(chains)?.iter().filter(|chain| chain.is_displacement()) {
+            let (_, _, (_, end)) = chain.ends()?;
+            let Model { m_per_rad, separation_m, .. } = self.fit.model;
+            let mounting = self.fit.model.instrument(chain.run).body_from_sensor;
+            let moved = chain.pieces.iter().fold(Pose::IDENTITY, |pose, piece| {
+                let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                pose * Increment::from_travel(travel_m, separation_m).arc()
+            });
+            seen = Some(seen.unwrap_or(Pose::IDENTITY) * end);
+            reckoned = reckoned * (mounting.inverse() * moved * mounting);
+        }
+        let off = reckoned.to(seen?);
+        let [_, _, xy, theta] = self.fit.noise.variance;
+        let off_rad = wrap_to_pi(off.theta_rad);
+        Some(((off.x_m * off.x_m + off.y_m * off.y_m) / xy + off_rad * off_rad / theta).sqrt())
+    }
+
     /// The fit, with the terms that are in it, with next to no noise of one kind: what the data lose by it says whether they need it.
     ///
     /// # Errors
@@ -63,13 +85,24 @@ impl JointFit<'_> {
 
     /// Dead reckoning of every chain from its first look to its last under a model with terms; chains that are seen without headings are left out.
     #[must_use]
-    pub fn reckoned(&self, model: &crate::likelihood::Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+    pub fn reckoned(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+        self.reckoned_of(model, terms, |_| true)
+    }
+
+    /// The same of some runs: session and run in the order given.
+    #[must_use]
+    pub fn reckoned_of(
+        &self,
+        model: &Model,
+        terms: &mut [Box<dyn ModelTerm>],
+        asked: impl Fn((usize, usize)) -> bool,
+    ) -> Vec<EndError> {
         let parameters: usize = terms.iter().map(|term| term.parameters().len()).sum();
         let mut gradient = vec![Pose::IDENTITY; parameters];
         let mut found = Vec::new();
         // Where the displacements of a run have led, the last piece, and the way of the session.
         let mut trail: Option<(Pose, Option<Piece>, f64)> = None;
-        for chain in &self.records.chains {
+        for chain in self.records.chains.iter().filter(|chain| asked(chain.run)) {
             let Some((start, first, last)) = chain.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
             let (run_from_chain, mut previous, mut session_m) =
@@ -142,6 +175,7 @@ impl JointFit<'_> {
                 off: Pose { theta_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad), ..last.1.to(seen) },
             });
         }
+        found.retain(|end| asked(end.run));
         found
     }
 

@@ -27,6 +27,7 @@ impl Joint {
             records: records.into(),
             noise_settled: NOISE_SETTLED,
             parts: Vec::new(),
+            displacements_follow: false,
         }
     }
 }

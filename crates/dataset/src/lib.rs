@@ -32,6 +32,6 @@ pub use record::{
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
 pub use session::{RunView, Session};
-pub use term::{Interval, Look, ModelTerm, TermParameter};
+pub use term::{CopyTerm, Interval, Look, ModelTerm, TermParameter};
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

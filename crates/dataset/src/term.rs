@@ -96,11 +96,12 @@ pub struct TermParameter {
 /// A mean term, linear in its parameters: what an effect adds to the motion of an interval, or to what the instrument sees.
 ///
 /// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it. Intervals and looks come in the order of time.
-pub trait ModelTerm: Send {
+/// Runs may go to copies of a term, at the same time.
+pub trait ModelTerm: CopyTerm + Send + Sync {
     /// The parameters in the order of the gradients.
     fn parameters(&self) -> &'static [TermParameter];
 
-    /// A run begins.
+    /// A run begins; nothing stays known of the run before.
     fn restart(&mut self, run: &RunInfo) {
         let _ = run;
     }
@@ -114,5 +115,24 @@ pub trait ModelTerm: Send {
     /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each parameter, at zero size. `gradient` is as above.
     fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
         let _ = (look, gradient);
+    }
+}
+
+/// What lets a boxed term be copied; every term that is [`Clone`] has it.
+pub trait CopyTerm {
+    /// The term, with its state.
+    fn copy(&self) -> Box<dyn ModelTerm>;
+}
+
+impl<T: ModelTerm + Clone + 'static> CopyTerm for T {
+    fn copy(&self) -> Box<dyn ModelTerm> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn ModelTerm> {
+    fn clone(&self) -> Self {
+        // Of the term: the box is a `Clone` itself.
+        (**self).copy()
     }
 }

@@ -4,21 +4,15 @@
 
 use crate::candidate::Choice;
 use crate::document::{Blind, Smallest};
-use crate::scan::scan;
-use crate::search::Extended;
+use crate::search::{Extended, Scans};
 
 /// √λ for power 0.9 at a two-sided level of 1e-3.
 pub(crate) const SHOWS: f64 = 4.57;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
-pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice]) -> (Vec<Blind>, Vec<Blind>) {
-    let left: Vec<Choice> = catalogue
-        .iter()
-        .filter(|choice| model.choices.iter().all(|chosen| chosen.id() != choice.id()))
-        .cloned()
-        .collect();
+pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice], scans: &mut Scans) -> (Vec<Blind>, Vec<Blind>) {
     let mut best: Vec<(Blind, f64)> = Vec::new();
-    for scored in scan(&model.fit, &model.choices, &left) {
+    for scored in scans.beside(model, catalogue) {
         let id = scored.choice.id();
         // The parameter that shows soonest, the others at rest, in units of what would be large.
         let smallest = scored

@@ -1,7 +1,7 @@
 //! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
 
 use dataset::{ModelTerm, TermParameter};
-use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
+use effects::{CATALOGUE, Channel, Hypothesis, Sparse, hypothesis};
 
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +70,32 @@ impl Choice {
 /// The terms of choices, in order.
 pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
     choices.iter().filter_map(Choice::term).collect()
+}
+
+/// The terms of candidates, in order; those of one product on every channel of the motion, one after the other, come as one.
+pub(crate) fn terms_together(choices: &[&Choice]) -> Vec<Box<dyn ModelTerm>> {
+    let mut terms = Vec::new();
+    let mut left = choices;
+    while let Some((first, rest)) = left.split_first() {
+        let product = match first {
+            Choice::Sparse(sparse) => sparse,
+            Choice::Effect { .. } => {
+                terms.extend(first.term());
+                left = rest;
+                continue;
+            }
+        };
+        let is_on = |(choice, channel): (&&Choice, Channel)| matches!(choice, Choice::Sparse(sparse) if sparse.channel == channel && sparse.covariates == product.covariates);
+        let channels = Channel::MOTION.len();
+        if left.len() >= channels && left.iter().zip(Channel::MOTION).all(is_on) {
+            terms.push(product.term_on_motion());
+            left = &left[channels..];
+        } else {
+            terms.push(product.term());
+            left = rest;
+        }
+    }
+    terms
 }
 
 fn shapes(id: &str) -> Vec<effects::Shape> {

@@ -4,12 +4,12 @@
 //! every channel, beside what the model has: a regression of innovations would be blurred by the filter.
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
-use calib::likelihood::{Column, Innovation};
-use calib::methods::joint::JointFit;
+use calib::likelihood::{Chain, Column, Innovation};
+use calib::methods::joint::{JointFit, WHITE_BELOW};
 use effects::{Channel, Covariate, Sparse};
 use kinematics::Side;
 
-use crate::candidate::{Choice, terms};
+use crate::candidate::{Choice, terms, terms_together};
 use crate::document::Check;
 use crate::scan::{Projected, Projection, freedom, principal, total};
 use crate::search::Extended;
@@ -25,11 +25,18 @@ const OUTLIER_CHANCE: f64 = 1e-5;
 const BACK_AGAIN: f64 = 0.01;
 /// An innovation this large, in standard deviations, comes from the tail.
 const LARGE: f64 = 3.0;
+/// What follows large errors is told from chance at this many standard errors.
+const FOLLOWS: f64 = 2.6;
+/// Two displacements undo each other when together they are off by less than this share of the one that is far off: that is by five standard deviations or more,
+/// and the sum of two right ones by √2 of them.
+const UNDONE: f64 = 0.5;
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
+    /// Displacements that fail to be white: they resemble each other for longer, and less plainly, than what a filter leaves of looks.
+    pub(crate) resemble: bool,
     pub(crate) checks: Vec<Check>,
-    /// Lag-one correlation of innovations: coefficient and standard errors.
+    /// Correlation of innovations that follow each other: coefficient at lag one, and standard errors.
     pub(crate) correlation: (f64, f64),
     pub(crate) outliers: Outliers,
 }
@@ -37,8 +44,9 @@ pub(crate) struct Checked {
 /// Looks that do not fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Outliers {
+    /// Those after which the robot is seen where it should be: of displacements, pairs that undo each other.
     pub(crate) isolated: usize,
-    /// Those after which the robot is seen where the outlier was.
+    /// Those after which the robot is seen where the outlier was, and displacements that no neighbour undoes.
     pub(crate) staying: usize,
     pub(crate) looks: usize,
     pub(crate) p_value: f64,
@@ -103,7 +111,10 @@ pub(crate) fn check(model: &Extended<'_>) -> Checked {
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
-    Checked { checks, correlation, outliers }
+    let is_displaced = fit.records.chains.iter().all(Chain::is_displacement);
+    let fails_to_be_white = checks.iter().any(|check| check.name.starts_with("white_") && !check.passes);
+    let resemble = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
+    Checked { resemble, checks, correlation, outliers }
 }
 
 /// The innovations of the first phase: phases share their looks' errors.
@@ -144,7 +155,8 @@ fn size(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     }
 }
 
-/// Ljung & Box over the looks of each chain; returns the lag-one correlation that stands out most.
+/// Ljung & Box over the looks of each chain and the displacements of each run; returns the correlation that stands out most: its
+/// coefficient at lag one, and its standard errors.
 fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) -> (f64, f64) {
     let mut strongest = (0.0, 0.0_f64);
     for (component, name) in ["white_along", "white_across", "white_heading"].into_iter().enumerate() {
@@ -155,24 +167,34 @@ fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) -> (f64, 
             continue;
         }
         let variance = series.iter().map(|innovation| innovation.z.powi(2)).sum::<f64>() / n;
-        let (mut statistic, mut lags) = (0.0, 0.0);
+        let (mut statistic, mut lags, mut coefficient) = (0.0, 0.0, 0.0);
+        let (mut resembles, mut weights) = (0.0, 0.0_f64);
         for lag in 1..=LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
-            for pair in series.windows(lag + 1).filter(|pair| pair[0].chain == pair[lag].chain) {
+            let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].chain, pair[lag].chain);
+            for pair in series.windows(lag + 1).filter(follows) {
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
+                #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // five
+                let weight = fit.records.weight_of_pair(pair[0].chain, pair[lag].chain, lag as i32);
+                resembles += weight * pair[0].z * pair[lag].z;
+                weights += weight * weight;
             }
             if pairs < 10.0 {
                 break;
             }
             let z = products / variance / pairs.sqrt();
-            if lag == 1 && z.abs() > f64::abs(strongest.1) {
-                strongest = (products / variance / pairs, z);
+            if lag == 1 {
+                coefficient = products / variance / pairs;
             }
             statistic += z * z;
             lags += 1.0;
         }
         if lags > 0.0 {
+            let z = resembles / variance / weights.sqrt();
+            if z.abs() > f64::abs(strongest.1) {
+                strongest = (coefficient, z);
+            }
             add(name, statistic, p_of_chi_square(statistic, lags));
         }
     }
@@ -208,11 +230,28 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
 
 /// Looks far off, and what follows large innovations: after a jump of the robot the next looks are off the same way, as the filter has followed only in part;
 /// after an error of one look they are off the other way, or not at all where the look was left out.
+///
+/// A displacement starts anew where the instrument stood, and the next is right after a jump of the robot as after an error of its own. But where it is the
+/// difference of two looks, a look that errs spoils the displacement to it and the one from it, and both together are right.
 fn outliers(fit: &JointFit<'_>) -> Outliers {
     let mut found = Outliers { looks: innovations(fit, 0).len(), ..Outliers::default() };
     let far = &fit.fit.pass.outliers;
     let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
+    let mut undone_by = None;
     for (position, &(chain, look)) in far.iter().enumerate() {
+        if fit.records.chains[chain].is_displacement() {
+            if undone_by == Some(chain) {
+                undone_by = None;
+            } else if undo(fit, chain, chain + 1, chain) {
+                undone_by = Some(chain + 1);
+                found.isolated += 1;
+            } else if chain > 0 && undo(fit, chain - 1, chain, chain) {
+                found.isolated += 1;
+            } else {
+                found.staying += 1;
+            }
+            continue;
+        }
         // Thinned looks have gaps between them: the next that was taken is the neighbour.
         let next = phase.partition_point(|innovation| (innovation.chain, innovation.look) <= (chain, look));
         let after = phase[next..].iter().take(3).filter(|innovation| innovation.chain == chain);
@@ -232,16 +271,42 @@ fn outliers(fit: &JointFit<'_>) -> Outliers {
     found
 }
 
-/// What follows large innovations of a component: the mean of the next, in the direction of the large one, in standard errors. Positive after what stays,
-/// negative after errors of single looks.
-pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> f64 {
+/// Do two displacements that follow each other undo what is wrong with one of them? Together they must be nearer to the wheels by half.
+fn undo(fit: &JointFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
+    let of = |chains| fit.displaced(chains).unwrap_or(f64::INFINITY);
+    fit.records.goes_on(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
+}
+
+/// What follows large innovations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Follows {
+    /// The next are off the same way: the robot jumped.
+    TheSame,
+    /// The next are off the other way: one look erred.
+    TheOpposite,
+    /// Neither beyond chance.
+    Nothing,
+}
+
+/// What follows large innovations of a component: the mean of the next in the direction of the large one, in standard errors. After a displacement, which starts
+/// anew, there is nothing to stay: the same says that errors last, and not whose they are.
+pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
     let series = innovations(fit, component);
-    let (mut sum, mut count) = (0.0, 0.0_f64);
-    for pair in series.windows(2).filter(|pair| pair[0].chain == pair[1].chain && pair[0].z.abs() > LARGE) {
-        sum += pair[1].z * pair[0].z.signum();
-        count += 1.0;
+    let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
+    let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
+        let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].chain, pair[1].chain));
+        let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));
+        if count > 0.0 { sum / count.sqrt() } else { 0.0 }
+    };
+    let of_looks = follows(&|chain, next| next == chain);
+    let of_displacements = follows(&|chain, next| next == chain + 1 && fit.records.goes_on(next));
+    if of_looks > FOLLOWS {
+        Follows::TheSame
+    } else if of_looks.min(of_displacements) < -FOLLOWS {
+        Follows::TheOpposite
+    } else {
+        Follows::Nothing
     }
-    if count > 0.0 { sum / count.sqrt() } else { 0.0 }
 }
 
 /// Score tests of every question, all in one pass.
@@ -255,7 +320,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
         .collect();
     let mut all = terms(&model.choices);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-    all.extend(terms(&library));
+    all.extend(terms_together(&library.iter().collect::<Vec<_>>()));
     let pass = model.fit.scan(&mut all);
     let Some(evidence) = total(&pass.runs) else { return };
     let Some(projection) = Projection::of(&model.fit, &evidence) else { return };
@@ -283,7 +348,132 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
 
 #[cfg(test)]
 mod tests {
-    use super::anscombe_glynn;
+    use calib::methods::joint::{Joint, JointFit};
+    use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+    use kinematics::{Increment, Pose, Wheels};
+
+    use super::{anscombe_glynn, outliers, whiteness};
+    use crate::{Options, Verdict, diagnose};
+
+    /// Poses of six runs of forty seconds, turning both ways and back and forth, by the nominal robot.
+    fn driven() -> (Dataset, Vec<Vec<Pose>>) {
+        let mut poses = Vec::new();
+        let run = |number: u32| {
+            let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
+            let mut path = vec![Pose::IDENTITY];
+            for second in 0..40 {
+                let k = f64::from(second + number);
+                let turned = Wheels { left: 2.0 + (0.9 * k).sin(), right: 2.0 + (1.3 * k).cos() };
+                let turned = if (second + number) % 4 == 3 { turned.map(|rad: f64| -rad) } else { turned };
+                let arc = Increment::from_travel(turned.map(|rad| 0.08 * rad), 0.363).arc();
+                path.push(*path.last().expect("a start") * arc);
+                angles.left.push(angles.left.last().expect("a start") + turned.left);
+                angles.right.push(angles.right.last().expect("a start") + turned.right);
+            }
+            poses.push(path);
+            let t_s = (0..=40).map(f64::from).collect();
+            let info = RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() };
+            let odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
+            Run { info, odometry, ..Run::default() }
+        };
+        let runs = (0..6).map(run).collect();
+        let robot = NominalRobot {
+            left_wheel_diameter_m: 0.16,
+            right_wheel_diameter_m: 0.16,
+            wheel_separation_m: 0.363,
+            ticks_per_rev: None,
+            counter_bits: None,
+        };
+        let (provenance, truth_noise, points) = (Provenance::default(), TruthNoise::default(), Vec::new());
+        (Dataset { provenance, robot, truth_noise, points, runs }, poses)
+    }
+
+    /// Errors as good as normal ones: millimetres and milliradians, the sum of twelve uniform ones by `SplitMix64` (Steele, Lea & Flood 2014).
+    fn error(state: &mut u64) -> [f64; 3] {
+        let mut uniform = || {
+            *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = *state;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            f64::from(u32::try_from((z ^ (z >> 31)) >> 32).expect("half of the bits")) / f64::from(u32::MAX)
+        };
+        std::array::from_fn(|_| 1e-3 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0))
+    }
+
+    /// Displacements between the poses, the instrument's errors of each given.
+    fn displacements(path: &[Pose], mut off: impl FnMut(usize) -> [f64; 3]) -> Vec<Displacement> {
+        let of = |(k, pair): (usize, &[Pose])| {
+            let (moved, [x_m, y_m, theta_rad], second) = (pair[0].to(pair[1]), off(k), u32::try_from(k).expect("few"));
+            Displacement {
+                t0_s: f64::from(second),
+                t1_s: f64::from(second + 1),
+                dx_m: moved.x_m + x_m,
+                dy_m: moved.y_m + y_m,
+                dtheta_rad: moved.theta_rad + theta_rad,
+            }
+        };
+        path.windows(2).enumerate().map(of).collect()
+    }
+
+    /// Seen by displacements whose errors keep a share from one to the next (a first-order autoregression).
+    fn lasting(keeps: f64) -> Dataset {
+        let ((mut dataset, paths), mut state) = (driven(), 7);
+        for (run, path) in dataset.runs.iter_mut().zip(&paths) {
+            let mut last = error(&mut state);
+            run.displacements = displacements(path, |_| {
+                let new = error(&mut state);
+                last = std::array::from_fn(|k| keeps * last[k] + (1.0 - keeps * keeps).sqrt() * new[k]);
+                last
+            });
+        }
+        dataset
+    }
+
+    fn fitted(dataset: &Dataset) -> JointFit<'_> {
+        Joint { nuisances: false, thin: false, thin_displacements: false }.fit(&[dataset.session()]).expect("a fit")
+    }
+
+    #[test]
+    fn displacements_that_err_alike_are_not_white_and_the_instrument_is_named() {
+        let is_white = |dataset: &Dataset| {
+            let mut least = 1.0_f64;
+            let (coefficient, _) = whiteness(&fitted(dataset), &mut |_, _, p_value| least = least.min(p_value));
+            (least > 1e-3, coefficient)
+        };
+        let (white, alike) = (lasting(0.0), lasting(0.7));
+        // 234 pairs show a correlation to 0.07.
+        assert!(is_white(&white).0 && !is_white(&alike).0, "{:?} {:?}", is_white(&white), is_white(&alike));
+        assert!((is_white(&alike).1 - 0.7).abs() < 0.2, "{:?}", is_white(&alike));
+        let said = |dataset: Dataset| diagnose(&[dataset], &Options::default()).expect("a diagnosis").document;
+        assert_eq!(said(white).verdict, Verdict::Consistent);
+        let document = said(alike);
+        let names: Vec<&str> = document.findings.iter().map(|finding| finding.id.as_str()).collect();
+        assert_eq!(names, ["truth_correlated_noise"]);
+    }
+
+    /// A look that errs spoils the displacement to it and the one from it; a displacement that errs alone may be the robot's jump as well.
+    #[test]
+    fn only_displacements_that_undo_each_other_are_errors_of_a_look() {
+        let ((mut dataset, paths), mut state) = (driven(), 11);
+        let wrong = Pose::new(0.05, -0.03, 0.04);
+        for (number, (run, path)) in dataset.runs.iter_mut().zip(&paths).enumerate() {
+            let mut path = path.clone();
+            // In the first run a look errs; in the second a displacement does.
+            if number == 0 {
+                path[20] = path[20] * wrong;
+            }
+            run.displacements = displacements(&path, |k| {
+                let [x_m, y_m, theta_rad] = error(&mut state);
+                let Pose { x_m: off_x_m, y_m: off_y_m, theta_rad: off_rad } =
+                    if number == 1 && k == 20 { wrong } else { Pose::IDENTITY };
+                [x_m + off_x_m, y_m + off_y_m, theta_rad + off_rad]
+            });
+        }
+        let fit = fitted(&dataset);
+        assert_eq!(fit.fit.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
+        let found = outliers(&fit);
+        assert_eq!((found.isolated, found.staying), (1, 1));
+    }
 
     #[test]
     fn published_example_of_the_kurtosis_test() {

@@ -19,7 +19,7 @@ use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
-use crate::search::{Extended, Found, MOST_EFFECTS, evidence, examine, reach, search};
+use crate::search::{Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, evidence, examine, reach, search};
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
 /// What to leave out.
@@ -102,8 +102,8 @@ fn looks_a_run(fit: &JointFit<'_>) -> f64 {
     fit.records.looks() as f64 / runs.max(1) as f64
 }
 
-const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false };
-const THINNED: Joint = Joint { nuisances: false, thin: true };
+const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false, thin_displacements: false };
+const THINNED: Joint = Joint { nuisances: false, thin: true, thin_displacements: true };
 
 /// Diagnoses one robot's sessions.
 ///
@@ -144,7 +144,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
 
 fn is_white(checked: &Checked) -> bool {
     let (coefficient, sigmas) = checked.correlation;
-    sigmas.abs() < CORRELATED_SIGMAS || coefficient.abs() < CORRELATED
+    coefficient.abs() < CORRELATED || (sigmas.abs() < CORRELATED_SIGMAS && !checked.resemble)
 }
 
 /// What is left after the search, and how much of it has a name.
@@ -158,12 +158,24 @@ pub(crate) struct Asked<'a> {
     pub(crate) correlated: Option<(f64, f64)>,
     /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
     pub(crate) in_disguise: bool,
+    /// One term that is in no catalogue makes the data about as likely as all the names together, or likelier, though not by enough to stand in their place.
+    pub(crate) rivalled: bool,
 }
 
-fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) -> Asked<'a> {
-    let found = search(&base, catalogue);
+impl Asked<'_> {
+    /// Whether residuals go with something that was recorded.
+    fn goes_with_something(&self) -> bool {
+        self.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name))
+    }
+}
+
+/// Family-wise rate of false alarms of the scan where a check has already found that something is there.
+const SURE_LEVEL: f64 = 0.2;
+
+fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], restored: bool) -> Asked<'a> {
+    let found = search(&base, catalogue, SCAN_LEVEL);
     let checked = check(&found.model);
-    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false };
+    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false, rivalled: false };
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
     let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
     if !asked.found.model.choices.is_empty()
@@ -180,8 +192,10 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
             asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
             return asked;
         }
+        asked.rivalled = unnamed > named - LEAST_REACH;
     }
-    if !is_white(&asked.checked) {
+    // What was lost of the counts and is restored roughly makes looks after it err alike: they are no fault of the instrument's.
+    if !restored && !is_white(&asked.checked) {
         // Looks that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
         // apart they are independent, and what stands out then may be believed.
         let tried =
@@ -195,13 +209,25 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice]) ->
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue);
+            asked.found = search(&thinned, catalogue, SCAN_LEVEL);
+            asked.rivalled = false;
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
         }
     }
-    let goes_with_something = asked.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name));
-    if goes_with_something && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL) {
+    if asked.goes_with_something() {
+        // Something is there: what it is may be asked more boldly.
+        let found = search(&asked.base, catalogue, SURE_LEVEL);
+        if found.model.choices.len() > asked.found.model.choices.len() {
+            asked.checked = check(&found.model);
+            asked.found = found;
+            // What was refused before, or hardly stands out, is one name of what there is.
+            asked.rivalled = true;
+        }
+    }
+    if asked.goes_with_something()
+        && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
+    {
         asked.checked = check(&sparse.model);
         asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
     }
@@ -228,17 +254,20 @@ fn continued(
     // Where the counts do not follow the robot at all, no small effect has a meaning.
     let lost = !follows(&base);
     let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
-    let asked = ask(datasets, base, &catalogue);
+    // Counts that were lost are restored roughly: what lies far off by them has its name already.
+    let restored = fault.is_some_and(|fault| fault.id == "dropped_samples");
+    let asked = ask(datasets, base, &catalogue, restored);
     let mut findings: Vec<Finding> = fault.map(naming::of_fault).into_iter().collect();
     findings.extend(naming::of_search(&asked.found));
+    if asked.rivalled {
+        naming::beside_unlisted(&mut findings);
+    }
     let model = asked.sparse.as_ref().map_or(&asked.found.model, |(model, _, _)| model);
     if let Some((model, p_value, trials)) = &asked.sparse
         && let Some((test, _)) = examine(model, model.choices.len() - 1)
     {
         findings.extend(naming::of_sparse(model, &test, *p_value, *trials));
     }
-    // Counts that were lost are restored roughly: what lies far off by them has its name already.
-    let restored = fault.is_some_and(|fault| fault.id == "dropped_samples");
     if lost {
         findings.extend(naming::of_lost(&asked.base));
     } else if !restored {
@@ -258,7 +287,7 @@ fn continued(
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[usize::from(fault.is_some())..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);
-    let (sensitivity, blind_to) = blind(model, &catalogue);
+    let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.scans.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
     let verdict = verdict(&findings);
     let extended = crate::scenario_of::scenario_of(datasets, model);
@@ -278,7 +307,7 @@ fn continued(
         sensitivity,
         calibration: CalibrationReport {
             dataset: Names::of(names),
-            methods: vec![MethodReport::new("joint", &calibration(datasets, &model.fit), &datasets[0].robot)],
+            methods: vec![MethodReport::new("joint", &calibration(datasets, model), &datasets[0].robot)],
         },
         gain,
         gain_why_null,
@@ -341,7 +370,8 @@ fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> Stri
 }
 
 /// The calibration with what was found in the model.
-fn calibration(datasets: &[Dataset], fit: &JointFit<'_>) -> Result<Calibration, CalibError> {
+fn calibration(datasets: &[Dataset], extended: &Extended<'_>) -> Result<Calibration, CalibError> {
+    let fit = &extended.fit;
     let model = &fit.fit.model;
     let not_physical =
         |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
@@ -349,7 +379,7 @@ fn calibration(datasets: &[Dataset], fit: &JointFit<'_>) -> Result<Calibration, 
         .map_err(not_physical)?;
     let diameter_m = geometry.wheel_diameter_m();
     let sizes = [diameter_m.left, diameter_m.right, model.separation_m];
-    let covariance = fit.covariance();
+    let covariance = fit.covariance(&mut crate::candidate::terms(&extended.choices));
     Ok(Calibration {
         covariance: covariance
             .as_ref()

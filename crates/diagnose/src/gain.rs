@@ -12,17 +12,17 @@ use nalgebra::DVector;
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
 use crate::scan::{free_basis, inverse};
-use crate::search::Extended;
+use crate::search::{Extended, left_out_cost};
 use crate::statistics::student_95;
 
-/// With fewer runs, they are cut into blocks.
-const LEAST_RUNS: usize = 6;
+/// Fewer runs say nothing of how runs differ; to be held out, they are cut into blocks.
+pub(crate) const LEAST_RUNS: usize = 6;
 const FOLDS: usize = 6;
 
 /// What one held-out unit scores.
 struct Unit {
     cost: f64,
-    count: f64,
+    evidence: Evidence,
     run: (usize, usize),
     fold: usize,
 }
@@ -38,14 +38,17 @@ pub(crate) fn gain(base: &Extended<'_>, extended: &Extended<'_>) -> Result<Gain,
     let freedom = before.len() as f64 - 1.0;
     let per_observation = |units: &[Unit]| -> f64 {
         let constant = 0.5 * std::f64::consts::TAU.ln();
-        -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.count).sum::<f64>() - constant
+        -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.evidence.count).sum::<f64>()
+            - constant
     };
     // A look that one model takes for an outlier and the other does not is charged to the first.
-    let charged = |own: &Unit, other: &Unit| own.cost + (other.count - own.count).max(0.0) * 0.5 * 25.9 / 3.0;
+    let charged = |own: &Unit, other: &Unit| own.cost + left_out_cost(&own.evidence, other.evidence.count);
     let pairs: Vec<(f64, f64)> = before
         .iter()
         .zip(&after)
-        .map(|(before, after)| (charged(before, after) - charged(after, before), before.count.max(after.count)))
+        .map(|(before, after)| {
+            (charged(before, after) - charged(after, before), before.evidence.count.max(after.evidence.count))
+        })
         .collect();
     let (mean, error) = ratio(&pairs);
     let reach = student_95(freedom) * error;
@@ -107,6 +110,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     }
     let fold_of = folds(fit, &units, blocks);
     let free = free_basis(fit);
+    let prior = prior(fit, terms);
     let mut scored: Vec<Unit> = Vec::new();
     let mut models: Vec<Model> = Vec::new();
     for fold in 0..FOLDS {
@@ -114,7 +118,12 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: Evidence = first.clone();
         others.for_each(|unit| sum.add(unit, 1.0));
-        let own = sum.of(&fit.columns);
+        let mut own = sum.of(&fit.columns);
+        // What the other runs do not show of an effect is none of it, not any: a payload that only the held-out run carried.
+        for (k, &(size, precision)) in prior.iter().enumerate() {
+            own.matrix[(k, k)] += precision;
+            own.gradient[k] += precision * size;
+        }
         let covariance = inverse(&(free.transpose() * &own.matrix * &free))
             .ok_or("the other runs do not determine the model once some are held out")?;
         let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
@@ -122,20 +131,31 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
         for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
-            scored.push(Unit { cost: unit.cost_after(&fit.columns, &step), count: unit.count, run: unit.run, fold });
+            let cost = unit.cost_after(&fit.columns, &step);
+            scored.push(Unit { cost, evidence: unit.clone(), run: unit.run, fold });
         }
     }
     let mut ends = Vec::new();
     for (fold, model) in models.iter().enumerate() {
-        let all = fit.reckoned(model, terms);
         // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a part of it.
         let held =
             |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
-        ends.extend(all.into_iter().filter(|end| held(end.run)));
+        ends.extend(fit.reckoned_of(model, terms, held));
     }
     ends.sort_by_key(|end| end.run);
     scored.sort_by_key(|unit| unit.run);
     Ok((scored, ends))
+}
+
+/// For each column its size and how precisely it is known before: a term's is normal about nothing, as large as is plausible.
+fn prior(fit: &JointFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
+    let plausible: Vec<f64> =
+        terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.plausible).collect();
+    let of = |column: &Column| match column {
+        Column::Term(k) => (fit.fit.model.sizes[*k], plausible[*k].powi(-2)),
+        _ => (0.0, 0.0),
+    };
+    fit.columns.iter().map(of).collect()
 }
 
 /// The fold of each unit: each protocol's units in turn.

@@ -40,7 +40,7 @@ pub(crate) struct Fault {
     pub(crate) gain: f64,
 }
 
-const PLAIN: Joint = Joint { nuisances: false, thin: false };
+const PLAIN: Joint = Joint { nuisances: false, thin: false, thin_displacements: false };
 
 /// An instrument turned farther than this on the robot is more of a claim than the fault.
 const MOST_TURNED_RAD: f64 = 1.0;

@@ -60,7 +60,10 @@ fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Fin
     let weights: f64 = names.iter().map(|name| ((name.log_odds - top) * LEAST_REACH / reach(top)).exp()).sum();
     let p_value = of_trials(test.p_value, trials);
     let parameters = parameters(choice, &test.sizes);
-    let ids: Vec<String> = names.iter().map(|name| name.choice.id().to_owned()).collect();
+    let mut ids: Vec<String> = names.iter().map(|name| name.choice.id().to_owned()).collect();
+    if names.iter().any(|name| name.outdone) {
+        ids.push("unlisted".to_owned());
+    }
     let sentence = if ids.len() == 1 {
         format!("{}: {}", choice.id(), listed(&parameters))
     } else {
@@ -135,6 +138,21 @@ const DOUBTFUL: f64 = 3.0;
 /// The same where as many effects were found as are sought, and there is still something left.
 const DOUBTFUL_IF_FULL: f64 = 10.0;
 
+/// Says of effects found that what has no name would do as well.
+pub(crate) fn beside_unlisted(findings: &mut [Finding]) {
+    for finding in findings.iter_mut().filter(|finding| is_mean(finding)) {
+        finding.names.retain(|name| name != "unlisted");
+        finding.names.push("unlisted".to_owned());
+        finding.probability *= 0.5;
+        finding.sentence = format!("{}; a term without a name would do as well", finding.sentence);
+    }
+}
+
+/// Whether a finding is a mean effect with sizes.
+fn is_mean(finding: &Finding) -> bool {
+    hypothesis(&finding.id).and_then(Hypothesis::into_shapes).is_some() && !finding.parameters.is_empty()
+}
+
 /// Says of names that they may be part of something that has none: where that stands out as well, the more so where as many effects were found as are sought.
 pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
@@ -143,12 +161,13 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let unlisted = strongest(findings, |finding| finding.id == "unlisted");
     let scatter = strongest(findings, |finding| finding.id == "contact_patch_wheelbase");
     for finding in findings {
-        if hypothesis(&finding.id).and_then(Hypothesis::into_shapes).is_none() || finding.parameters.is_empty() {
+        if !is_mean(finding) {
             continue;
         }
         let part = finding.z < unlisted * if full { DOUBTFUL_IF_FULL } else { DOUBTFUL };
         if part || DOUBTFUL * finding.z < scatter {
             finding.id = "unlisted".to_owned();
+            finding.names.retain(|name| name != "unlisted");
             finding.names.insert(0, "unlisted".to_owned());
             finding.sentence = format!("perhaps part of what has no name, or else {}", finding.sentence);
         }

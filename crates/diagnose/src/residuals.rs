@@ -146,6 +146,7 @@ fn key(run: &RunInfo, t_s: f64) -> (usize, u64) {
 }
 
 /// A term without effect that writes down what it is shown: the likelihood hands every interval and every look to its terms.
+#[derive(Clone)]
 struct Recorder {
     keys: Vec<String>,
     records: Records,

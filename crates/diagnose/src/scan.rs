@@ -5,12 +5,13 @@
 //! directions that even such a size would not show are left out: they cost power and show nothing.
 //! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
 
-use calib::likelihood::{Column, Evidence, Pass};
+use calib::likelihood::{Column, Evidence};
 use calib::methods::joint::JointFit;
 use dataset::TermParameter;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use crate::candidate::{Choice, terms};
+use crate::candidate::{Choice, terms, terms_together};
 use crate::statistics::p_of_score;
 
 /// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
@@ -43,14 +44,18 @@ pub(crate) fn total(runs: &[Evidence]) -> Option<Evidence> {
 
 /// The basis of what a fit holds free: its columns without the directions that stay nominal.
 pub(crate) fn free_basis(fit: &JointFit<'_>) -> DMatrix<f64> {
-    let n = fit.columns.len();
+    basis_of(fit, &fit.columns)
+}
+
+/// The same of some of its columns.
+fn basis_of(fit: &JointFit<'_>, columns: &[Column]) -> DMatrix<f64> {
+    let n = columns.len();
     let identity = DMatrix::identity(n, n);
     if fit.unseen.is_empty() {
         return identity;
     }
-    let held = DMatrix::from_fn(n, fit.unseen.len(), |row, k| {
-        fit.unseen[k].get(fit.columns[row].index()).copied().unwrap_or(0.0)
-    });
+    let held =
+        DMatrix::from_fn(n, fit.unseen.len(), |row, k| fit.unseen[k].get(columns[row].index()).copied().unwrap_or(0.0));
     let eigen = (&held * held.transpose()).symmetric_eigen();
     let free: Vec<_> =
         (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
@@ -74,11 +79,18 @@ pub(crate) struct Projection {
 
 impl Projection {
     pub(crate) fn of(fit: &JointFit<'_>, evidence: &Evidence) -> Option<Self> {
-        let free = free_basis(fit);
-        let own = evidence.of(&fit.columns);
+        Self::beside(fit, evidence, &[])
+    }
+
+    /// With some columns, which are asked for, not counted among the free ones.
+    pub(crate) fn beside(fit: &JointFit<'_>, evidence: &Evidence, asked: &[usize]) -> Option<Self> {
+        let columns: Vec<Column> =
+            fit.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
+        let free = basis_of(fit, &columns);
+        let own = evidence.of(&columns);
         let reduced = free.transpose() * &own.matrix * &free;
         let inverse = inverse(&reduced)?;
-        let indices = fit.columns.iter().map(|column| column.index()).collect();
+        let indices = columns.iter().map(|column| column.index()).collect();
         Some(Self { gradient: free.transpose() * own.gradient, free, indices, inverse })
     }
 
@@ -168,18 +180,19 @@ pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
 
 /// Tests every candidate beside the choices that the fit already has.
 pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
-    // Outer products grow with the square of the columns: many candidates go in groups.
-    candidates.chunks(GROUP).flat_map(|group| scan_group(fit, chosen, group)).collect()
+    // A normal equation grows with the square of the columns: many candidates go in groups.
+    candidates.par_chunks(GROUP).flat_map_iter(|group| scan_group(fit, chosen, group)).collect()
 }
 
-const GROUP: usize = 40;
+/// A whole number of products on three channels.
+const GROUP: usize = 42;
 
 fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
     let mut all = terms(chosen);
     let first: usize = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-    all.extend(terms(candidates));
-    let pass: Pass = fit.scan(&mut all);
-    let Some(evidence) = total(&pass.runs) else { return Vec::new() };
+    let apart_from = all.len();
+    all.extend(terms_together(&candidates.iter().collect::<Vec<_>>()));
+    let Some(evidence) = total(&fit.scan_apart(&mut all, apart_from)) else { return Vec::new() };
     let Some(projection) = Projection::of(fit, &evidence) else { return Vec::new() };
     let freedom = freedom(fit, &evidence);
     // Noise is estimated by likelihood, without its degrees of freedom.
@@ -204,7 +217,8 @@ fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> V
             let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
             let log_odds = 0.5 * statistic + log_weight(&explained);
             let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
-            Scored { choice: choice.clone(), parameters, information, dimensions, statistic, p_value, log_odds }
+            let choice = choice.clone();
+            Scored { choice, parameters, information, dimensions, statistic, p_value, log_odds }
         })
         .collect()
 }

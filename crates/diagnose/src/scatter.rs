@@ -5,13 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::{Column, NoiseComponent};
+use calib::likelihood::{Chain, Column, NoiseComponent};
 use calib::methods::joint::JointFit;
 use effects::Sign;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::candidate::terms;
-use crate::checks::what_follows;
+use crate::checks::{Follows, what_follows};
 use crate::diagnosis::{Asked, Options, is_covariate};
 use crate::document::{Finding, Value};
 use crate::naming;
@@ -28,8 +28,6 @@ pub(crate) const TURNS_LEVEL: f64 = 1e-7;
 const CERTAINLY: f64 = 1e-6;
 /// With more, it is the model that is off, and not the looks.
 const MOST_OUTLIERS: f64 = 0.2;
-/// What follows large errors is told from chance at this many standard errors.
-const FOLLOWS: f64 = 2.6;
 
 /// Scatter that failed checks show.
 pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
@@ -49,8 +47,8 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         asked.checked.checks.iter().filter(|check| check.name.starts_with("kurtosis_") || check.name == "outliers");
     let tails = tails.map(|check| check.p_value).fold(1.0, f64::min);
     let goes_with_something = with_something < tails.max(CERTAINLY);
-    // Of displacements nothing follows that could be back.
-    let followed = asked.base.selections.first().is_some_and(|taken| taken.mean_looks() >= 2.0);
+    // After the end of a run nothing follows that could be back.
+    let followed = asked.base.selections.first().is_some_and(|taken| taken.mean_looks(&asked.base.records) >= 2.0);
     if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
@@ -81,31 +79,25 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         if let Some((p_value, follows, sign)) = jump {
             let ramps = ramps(&asked.found.model.fit);
             let named = |signs: &[Sign]| {
-                let ids: Vec<&str> = signs.iter().flat_map(|sign| naming::with_sign(*sign, &options.without)).collect();
-                ids.into_iter().filter(|id| ramps.allow(id)).collect::<Vec<_>>()
+                let mut ids: Vec<&'static str> = Vec::new();
+                for id in signs.iter().flat_map(|sign| naming::with_sign(*sign, &options.without)) {
+                    if ramps.allow(id) && !ids.contains(&id) {
+                        ids.push(id);
+                    }
+                }
+                ids
             };
             // What jumps ahead may turn as well: a bump costs one wheel its way.
             let jumps: &[Sign] =
                 if sign == Sign::WayJumps { &[Sign::HeadingJumps, Sign::WayJumps] } else { &[Sign::HeadingJumps] };
-            let (mut stays, mut errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
-            for ids in [&mut stays, &mut errs] {
-                let mut seen = Vec::new();
-                ids.retain(|id| {
-                    !seen.contains(id) && {
-                        seen.push(*id);
-                        true
-                    }
-                });
-            }
-            let (ids, what) = if follows > FOLLOWS {
-                (stays, "single large errors that stay: the robot jumped")
-            } else if follows < -FOLLOWS {
-                (errs, "single large errors of the instrument, undone in the next look")
-            } else {
-                (
+            let (stays, errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
+            let (ids, what) = match follows {
+                Follows::TheSame => (stays, "single large errors that stay: the robot jumped"),
+                Follows::TheOpposite => (errs, "single large errors of the instrument, undone in the next look"),
+                Follows::Nothing => (
                     [stays, errs].concat(),
                     "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
-                )
+                ),
             };
             findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
         }
@@ -158,7 +150,7 @@ const RAMPS_LEVEL: f64 = 1e-3;
 /// Where the large errors of a fit lie, by a binomial test against where its looks are.
 fn ramps(fit: &JointFit<'_>) -> Ramps {
     let Some(phase) = fit.fit.pass.innovations.first() else { return Ramps::CannotBeTold };
-    let at_ramp = |chain: usize, look: usize| fit.records.changes_speed(chain, look);
+    let at_ramp: Vec<Vec<bool>> = fit.records.chains.iter().map(Chain::changes_of_speed).collect();
     let mut all: Vec<(usize, usize)> = phase.iter().map(|innovation| (innovation.chain, innovation.look)).collect();
     let large = phase.iter().filter(|innovation| innovation.z.abs() > LARGE);
     let mut large: Vec<(usize, usize)> = large.map(|innovation| (innovation.chain, innovation.look)).collect();
@@ -168,7 +160,7 @@ fn ramps(fit: &JointFit<'_>) -> Ramps {
         looks.sort_unstable();
         looks.dedup();
     }
-    let count = |looks: &[(usize, usize)]| looks.iter().filter(|(chain, look)| at_ramp(*chain, *look)).count();
+    let count = |looks: &[(usize, usize)]| looks.iter().filter(|(chain, look)| at_ramp[*chain][*look]).count();
     #[allow(clippy::cast_precision_loss)]
     let share = count(&all) as f64 / all.len().max(1) as f64;
     let (found, of) = (count(&large) as u64, large.len() as u64);
@@ -189,12 +181,10 @@ fn ramps(fit: &JointFit<'_>) -> Ramps {
 /// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
 /// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
 pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
-    let mut others = model.fit.clone();
-    others.columns.retain(|column| *column != Column::Separation);
     let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let Some(evidence) = total(&model.fit.fit.pass.runs) else { return 1.0 };
-    let Some(projection) = Projection::of(&others, &evidence) else { return 1.0 };
     let own = [Column::Separation.index()];
+    let Some(projection) = Projection::beside(&model.fit, &evidence, &own) else { return 1.0 };
     let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);
     for run in &runs {
         let variance = projection.variance_of(run, &evidence, &own)[(0, 0)];

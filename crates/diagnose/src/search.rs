@@ -1,10 +1,14 @@
 //! Which effects the data show: forward selection over the catalogue with refits, and which other names would do as well.
 
+use std::ops::Range;
+
+use calib::likelihood::{Column, Evidence};
 use calib::methods::joint::JointFit;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use crate::candidate::{Choice, terms};
-use crate::gain::gain;
+use crate::gain::{LEAST_RUNS, gain};
 use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
 use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
 use crate::shape::fit_shape;
@@ -16,6 +20,8 @@ pub(crate) const SCAN_LEVEL: f64 = 0.02;
 pub(crate) const MOST_EFFECTS: usize = 3;
 /// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
 const RIVAL_SHARE: f64 = 0.5;
+/// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
+const MOST_TRIED: usize = 3;
 /// Most rivals that are refitted.
 const MOST_RIVALS: usize = 6;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
@@ -65,7 +71,7 @@ pub(crate) struct Entry {
 }
 
 /// The best shape of every effect.
-pub(crate) fn best_shapes(scored: Vec<Scored>) -> Vec<Entry> {
+pub(crate) fn best_shapes(scored: &[Scored]) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     for scored in scored {
         let id = scored.choice.id();
@@ -77,10 +83,10 @@ pub(crate) fn best_shapes(scored: Vec<Scored>) -> Vec<Entry> {
                 if scored.p_value < entry.scored.p_value
                     || (scored.p_value == entry.scored.p_value && scored.statistic > entry.scored.statistic)
                 {
-                    entry.scored = scored;
+                    entry.scored = scored.clone();
                 }
             }
-            None => entries.push(Entry { p_value: scored.p_value, shapes: shown, scored }),
+            None => entries.push(Entry { p_value: scored.p_value, shapes: shown, scored: scored.clone() }),
         }
     }
     for entry in &mut entries {
@@ -96,6 +102,24 @@ pub(crate) struct Extended<'a> {
     pub(crate) choices: Vec<Choice>,
 }
 
+impl Extended<'_> {
+    /// Which of the fit's sizes are a choice's.
+    pub(crate) fn range(&self, place: usize) -> Range<usize> {
+        let first = self.choices[..place].iter().map(|choice| choice.parameters().len()).sum();
+        first..first + self.choices[place].parameters().len()
+    }
+
+    /// The indices of a choice's columns.
+    fn columns(&self, place: usize) -> Vec<usize> {
+        self.range(place).map(|k| Column::Term(k).index()).collect()
+    }
+
+    /// A choice's sizes.
+    fn sizes(&self, place: usize) -> DVector<f64> {
+        DVector::from_column_slice(&self.fit.fit.model.sizes[self.range(place)])
+    }
+}
+
 /// A name for a finding.
 #[derive(Debug, Clone)]
 pub(crate) struct Name {
@@ -103,6 +127,8 @@ pub(crate) struct Name {
     pub(crate) log_odds: f64,
     /// Log likelihood at its best, less what its freedom gains by chance, half of a χ² for each direction.
     pub(crate) explains: f64,
+    /// Sizes that no effect can have explain more: something is there that looks like this one, and is none of the names.
+    pub(crate) outdone: bool,
 }
 
 /// What the search found.
@@ -115,6 +141,26 @@ pub(crate) struct Found<'a> {
     pub(crate) tests: Vec<Test>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
+    /// What was scanned.
+    pub(crate) scans: Scans,
+}
+
+/// Scans of the catalogue's other effects beside the choices of a model on one base.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Scans(Vec<(Vec<Choice>, Vec<Scored>)>);
+
+impl Scans {
+    /// The scan beside a model: one made before, or a new one.
+    pub(crate) fn beside(&mut self, model: &Extended<'_>, catalogue: &[Choice]) -> &[Scored] {
+        let known = self.0.iter().position(|(choices, _)| *choices == model.choices);
+        let at = known.unwrap_or_else(|| {
+            let is_chosen = |choice: &Choice| model.choices.iter().any(|chosen| chosen.id() == choice.id());
+            let left: Vec<Choice> = catalogue.iter().filter(|choice| !is_chosen(choice)).cloned().collect();
+            self.0.push((model.choices.clone(), scan(&model.fit, &model.choices, &left)));
+            self.0.len() - 1
+        });
+        &self.0[at].1
+    }
 }
 
 /// A test of one choice of a fitted model.
@@ -128,34 +174,27 @@ pub(crate) struct Test {
 
 /// −log likelihood of a fit over as many innovations as the fullest of those compared: a look that one fit takes for an outlier is charged as one.
 pub(crate) fn cost(fit: &JointFit<'_>, count: f64) -> f64 {
-    let Some(sum) = total(&fit.fit.pass.runs) else { return f64::INFINITY };
+    total(&fit.fit.pass.runs).map_or(f64::INFINITY, |sum| sum.cost() + left_out_cost(&sum, count))
+}
+
+/// What the innovations that are missing to a number of them cost: each lies as far off as an outlier does at least, and has a variance as the others have.
+pub(crate) fn left_out_cost(evidence: &Evidence, count: f64) -> f64 {
     // Half of the χ² with three degrees of freedom at which a look is an outlier, a component.
     const OUTLIER: f64 = 0.5 * 25.9 / 3.0;
-    sum.cost() + (count - sum.count).max(0.0) * (OUTLIER + 0.5 * sum.log_det / sum.count.max(1.0))
+    (count - evidence.count).max(0.0) * (OUTLIER + 0.5 * evidence.log_det / evidence.count.max(1.0))
 }
 
 pub(crate) fn count(fit: &JointFit<'_>) -> f64 {
     fit.fit.pass.runs.iter().map(|run| run.count).sum()
 }
 
-/// Log of the chance of the data under a fitted choice over that without it, the others staying: its likelihood times how well its sizes agree with what
-/// is plausible.
-pub(crate) fn log_odds(base_cost: f64, extended: &Extended<'_>, count: f64, choice: usize) -> f64 {
-    let Some((_, directions)) = examine(extended, choice) else { return f64::NEG_INFINITY };
-    base_cost - cost(&extended.fit, count) + weight(&directions)
-}
-
 /// The test of a choice in its fitted model, and along its principal directions in units of the plausible: information and size.
 pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, Vec<(f64, f64)>)> {
     let evidence = total(&extended.fit.fit.pass.runs)?;
     let parameters = extended.choices[choice].parameters();
-    let first: usize = extended.choices[..choice].iter().map(|choice| choice.parameters().len()).sum();
-    let own: Vec<usize> = (0..parameters.len()).map(|k| calib::likelihood::Column::Term(first + k).index()).collect();
-    // The same fit with the choice's columns not counted among the free ones.
-    let mut others = extended.fit.clone();
-    others.columns.retain(|column| !own.contains(&column.index()));
-    let projected = Projection::of(&others, &evidence)?.of_columns(&evidence, &own);
-    let sizes = DVector::from_fn(parameters.len(), |k, _| extended.fit.fit.model.sizes[first + k]);
+    let own = extended.columns(choice);
+    let projected = Projection::beside(&extended.fit, &evidence, &own)?.of_columns(&evidence, &own);
+    let sizes = extended.sizes(choice);
     let gradient = &projected.information * &sizes;
     let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, parameters)
         .into_iter()
@@ -175,8 +214,6 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     Some((test, directions))
 }
 
-/// With fewer runs they do not say how a size differs between them.
-const LEAST_RUNS: usize = 6;
 /// Chance at which a size that is none passes for one over the runs, once it has passed over the looks.
 const RUNS_LEVEL: f64 = 0.05;
 
@@ -186,19 +223,16 @@ const RUNS_LEVEL: f64 = 0.05;
 /// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
 /// Liang & Zeger 1986.
 pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64) -> bool {
+    // Fewer runs do not say how a size differs between them.
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     if runs.len() < LEAST_RUNS {
         return true;
     }
     let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
-    let parameters = extended.choices[choice].parameters().len();
-    let first: usize = extended.choices[..choice].iter().map(|choice| choice.parameters().len()).sum();
-    let own: Vec<usize> = (0..parameters).map(|k| calib::likelihood::Column::Term(first + k).index()).collect();
-    let mut others = extended.fit.clone();
-    others.columns.retain(|column| !own.contains(&column.index()));
-    let Some(projection) = Projection::of(&others, &evidence) else { return false };
+    let own = extended.columns(choice);
+    let Some(projection) = Projection::beside(&extended.fit, &evidence, &own) else { return false };
     let information = projection.of_columns(&evidence, &own).information;
-    let sizes = DVector::from_fn(parameters, |k, _| extended.fit.fit.model.sizes[first + k]);
+    let sizes = extended.sizes(choice);
     let stands = sizes.dot(&(&information * &sizes));
     #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
@@ -214,6 +248,11 @@ pub(crate) fn refit<'a>(base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Ext
     fit.fit.model.sizes.iter().all(|size| size.is_finite()).then_some(Extended { fit, choices })
 }
 
+/// The same, where it is not among those refitted before.
+fn known_or_refit<'a>(known: &[Extended<'a>], base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
+    known.iter().find(|model| model.choices == choices).cloned().or_else(|| refit(base, choices))
+}
+
 /// The rivals of one place in a model whose other choices stay, each refitted: the best shape of each effect that explains enough, most probable first.
 fn rivals<'a>(
     base: &JointFit<'a>,
@@ -221,6 +260,7 @@ fn rivals<'a>(
     place: usize,
     entries: &[Entry],
     best: f64,
+    known: &[Extended<'a>],
 ) -> Vec<(Name, Extended<'a>)> {
     let mut contenders: Vec<&Entry> = entries
         .iter()
@@ -229,12 +269,12 @@ fn rivals<'a>(
     contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
     contenders.truncate(MOST_RIVALS);
     let fits: Vec<(Choice, Extended<'a>)> = contenders
-        .into_iter()
+        .into_par_iter()
         .filter_map(|entry| {
             let mut choices = without.choices.clone();
             choices.insert(place, entry.scored.choice.clone());
-            let extended = refit(base, choices)?;
-            is_physical(&extended, place).then(|| (entry.scored.choice.clone(), extended))
+            let extended = known_or_refit(known, base, choices)?;
+            Some((entry.scored.choice.clone(), extended))
         })
         .collect();
     let most = fits.iter().map(|(_, extended)| count(&extended.fit)).fold(count(&without.fit), f64::max);
@@ -245,73 +285,93 @@ fn rivals<'a>(
             let shapes = entries.iter().find(|entry| entry.scored.choice.id() == choice.id());
             #[allow(clippy::cast_precision_loss)]
             let trials = (shapes.map_or(1, |entry| entry.shapes.max(1)) as f64).ln();
-            let log_odds = log_odds(base_cost, &extended, most, place) - trials;
-            let directions = examine(&extended, place).map_or(0, |(_, directions)| directions.len());
+            let likelier = base_cost - cost(&extended.fit, most);
+            let directions = examine(&extended, place).map(|(_, directions)| directions);
+            // Its likelihood times how well its sizes agree with what is plausible, the others staying.
+            let log_odds =
+                directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + weight(directions)) - trials;
             #[allow(clippy::cast_precision_loss)] // a handful
-            let explains = base_cost - cost(&extended.fit, most) - 0.5 * directions as f64;
-            (Name { choice, log_odds, explains }, extended)
+            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
+            (Name { choice, log_odds, explains, outdone: false }, extended)
         })
         .collect();
     named.sort_by(|a, b| b.0.log_odds.total_cmp(&a.0.log_odds));
+    // What no effect can be is no name; where it explains more than all that can, no name is right alone.
+    let best = named.first().map_or(f64::NEG_INFINITY, |(name, _)| name.log_odds);
+    named.retain(|(_, extended)| is_physical(extended, place));
+    if let Some((name, _)) = named.first_mut() {
+        name.outdone = best > name.log_odds + reach(name.log_odds);
+    }
     named
 }
 
-/// Adds effects while the scan finds some.
-pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a> {
+/// A model with one effect more, and its rivals.
+type Grown<'a> = (Extended<'a>, Vec<Extended<'a>>);
+
+/// The best of a scan, refitted, if that confirms it; else its name.
+fn confirmed<'a>(
+    base: &JointFit<'a>,
+    model: &Extended<'a>,
+    entries: &[Entry],
+    (best, tests): (&Entry, f64),
+    level: f64,
+) -> Result<Grown<'a>, &'static str> {
+    let place = model.choices.len();
+    let mut found = rivals(base, model, place, entries, best.scored.statistic, &[]);
+    if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
+        return Err(best.scored.choice.id());
+    }
+    let (name, extended) = found.swap_remove(0);
+    // A size that the refit does not confirm was an accident of the score.
+    let is_an_accident = examine(&extended, place).is_none_or(|(test, _)| test.p_value * tests > level);
+    // Nor is one of a few runs a size: what differs from run to run is none. Where turns scatter from run to run still, what goes with turns stands out by chance:
+    // it must hold over the runs as if looks said nothing.
+    let scattered = differs_from_run_to_run(&extended) < TURNS_LEVEL;
+    let over_runs = if scattered { level / tests } else { RUNS_LEVEL };
+    if is_an_accident || !holds_over_runs(&extended, place, over_runs) {
+        return Err(name.choice.id());
+    }
+    Ok((extended, found.into_iter().map(|(_, extended)| extended).collect()))
+}
+
+/// The model with one effect more, if the scan finds one.
+fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>, level: f64) -> Option<Grown<'a>> {
+    #[allow(clippy::cast_precision_loss)]
+    let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    for _ in 0..MOST_TRIED {
+        let best = entries
+            .iter()
+            .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))?;
+        if best.p_value * tests > level {
+            return None;
+        }
+        match confirmed(base, model, &entries, (best, tests), level) {
+            Ok(grown) => return Some(grown),
+            // What comes next may be what is there.
+            Err(id) => entries.retain(|entry| entry.scored.choice.id() != id),
+        }
+    }
+    None
+}
+
+/// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
+pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64) -> Found<'a> {
     let mut model = Extended { fit: base.clone(), choices: Vec::new() };
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
-    for round in 0..=MOST_EFFECTS {
-        let left: Vec<Choice> = catalogue
-            .iter()
-            .filter(|choice| model.choices.iter().all(|chosen| chosen.id() != choice.id()))
-            .cloned()
-            .collect();
-        let entries = best_shapes(scan(&model.fit, &model.choices, &left));
-        if round == 0 {
+    let mut scans = Scans::default();
+    // The models on the way, and the rivals of the last: most of them are asked for again below.
+    let (mut models, mut last_rivals): (Vec<Extended<'a>>, Vec<Extended<'a>>) = (Vec::new(), Vec::new());
+    while model.choices.len() < MOST_EFFECTS {
+        let entries = best_shapes(scans.beside(&model, catalogue));
+        if model.choices.is_empty() {
             first_scan.clone_from(&entries);
         }
-        if round == MOST_EFFECTS {
-            break;
-        }
-        #[allow(clippy::cast_precision_loss)]
-        let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
-        let Some(best) = entries
-            .iter()
-            .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))
-        else {
-            break;
-        };
-        if best.p_value * tests > SCAN_LEVEL {
-            break;
-        }
-        let place = model.choices.len();
-        let mut found = rivals(base, &model, place, &entries, best.scored.statistic);
-        if found.is_empty() || found[0].0.log_odds <= 0.0 {
-            break;
-        }
-        let (_, extended) = found.swap_remove(0);
-        // A size that the refit does not confirm was an accident of the score.
-        if examine(&extended, place).is_none_or(|(test, _)| test.p_value * tests > SCAN_LEVEL) {
-            break;
-        }
-        // Nor an accident of a few runs: what differs from run to run is no size.
-        // Where turns scatter from run to run still, what goes with turns stands out by chance: it must hold over the runs as if looks said nothing.
-        let scattered = differs_from_run_to_run(&extended) < TURNS_LEVEL;
-        let level = if scattered { SCAN_LEVEL / tests } else { RUNS_LEVEL };
-        if !holds_over_runs(&extended, place, level) {
-            break;
-        }
-        // Nor is a term that predicts unseen runs worse than none, or with which odometry drifts more for certain.
-        if gain(&model, &extended).is_ok_and(|gain| {
-            let score = gain.log_score_per_observation;
-            score.low + score.high <= 0.0 || gain.drifts_more()
-        }) {
-            break;
-        }
-        model = extended;
+        let Some((extended, rivals)) = grown(base, &model, entries, level) else { break };
+        models.push(extended.clone());
+        (model, last_rivals) = (extended, rivals);
     }
-    names.clear();
+    let known = [models, last_rivals].concat();
     let mut place = 0;
     while place < model.choices.len() {
         let mut others = model.choices.clone();
@@ -319,17 +379,12 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         let without = if others.is_empty() {
             Some(Extended { fit: base.clone(), choices: Vec::new() })
         } else {
-            refit(base, others)
+            known_or_refit(&known, base, others)
         };
         let Some(without) = without else { break };
-        let left: Vec<Choice> = catalogue
-            .iter()
-            .filter(|choice| without.choices.iter().all(|chosen| chosen.id() != choice.id()))
-            .cloned()
-            .collect();
-        let entries = best_shapes(scan(&without.fit, &without.choices, &left));
+        let entries = best_shapes(scans.beside(&without, catalogue));
         let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
-        let mut found = rivals(base, &without, place, &entries, best);
+        let mut found = rivals(base, &without, place, &entries, best, &known);
         if found.is_empty() {
             break;
         }
@@ -344,9 +399,15 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
         let stands = |(name, extended): &(Name, Extended<'_>)| {
             examine(extended, place)
-                .is_some_and(|(test, _)| of_trials(test.p_value, shapes(name.choice.id())) * tests <= SCAN_LEVEL)
+                .is_some_and(|(test, _)| of_trials(test.p_value, shapes(name.choice.id())) * tests <= level)
         };
-        if !found.iter().any(stands) {
+        // A term that predicts unseen runs worse than none, or with which odometry drifts more for certain, is none. It is asked beside the others: alone, a part of
+        // what is there may predict worse.
+        let predicts = gain(&without, &found[0].1).map_or(true, |gain| {
+            let score = gain.log_score_per_observation;
+            score.low + score.high > 0.0 && !gain.drifts_more()
+        });
+        if !predicts || !found.iter().any(stands) {
             // Nor does a name that came in its place.
             model = without;
             continue;
@@ -363,7 +424,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
     #[allow(clippy::cast_precision_loss)]
     let tests = first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
     for place in (0..names.len()).rev() {
-        if examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= SCAN_LEVEL) {
+        if examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= level) {
             continue;
         }
         let mut others = model.choices.clone();
@@ -383,5 +444,5 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice]) -> Found<'a>
         Some(test)
     };
     let tests = wider.iter().enumerate().filter_map(test).collect();
-    Found { model, names, tests, first_scan }
+    Found { model, names, tests, first_scan, scans }
 }

@@ -24,7 +24,7 @@ struct Point<'a> {
 pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place: usize) -> Vec<f64> {
     let choice = model.choices[place].clone();
     let parameters = choice.parameters().len();
-    let first: usize = model.choices[..place].iter().map(|choice| choice.parameters().len()).sum();
+    let first = model.range(place).start;
     let none = vec![0.0; parameters];
     let grid: Vec<f64> = choice.grid().iter().map(|value| value.ln()).collect();
     let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), choice.held().first()) else {

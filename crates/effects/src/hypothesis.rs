@@ -5,7 +5,7 @@
 //! show it ([`Hypothesis::Scatter`]).
 
 use dataset::{Dataset, Interval, ModelTerm, NominalRobot, Run, WheelLog};
-use kinematics::{Pose, Twist, Wheels};
+use kinematics::{Pose, Twist, Wheels, sin_cos};
 
 /// How data would show an effect.
 pub enum Hypothesis {
@@ -92,8 +92,27 @@ pub(crate) fn size(sizes: &[(&str, f64)], name: &str) -> Option<f64> {
 
 /// A motion in the room, metres along its axes, along and across the middle of an interval.
 pub(crate) fn in_room(interval: &Interval<'_>, [x_m, y_m]: [f64; 2]) -> Pose {
-    let (sin, cos) = (interval.world_from_body.theta_rad + 0.5 * interval.increment().turn_rad).sin_cos();
+    let (sin, cos) = sin_cos(interval.world_from_body.theta_rad + 0.5 * interval.increment().turn_rad);
     Pose::new(cos * x_m + sin * y_m, cos * y_m - sin * x_m, 0.0)
+}
+
+/// Sine and cosine of an angle at which an interval ends and the next begins: found once for both.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LastAngle {
+    rad: f64,
+    sin_cos: (f64, f64),
+}
+
+impl LastAngle {
+    pub(crate) const NONE: Self = Self { rad: 0.0, sin_cos: (0.0, 1.0) };
+
+    /// Those of this angle, which is the last one from now on.
+    pub(crate) fn sin_cos(&mut self, rad: f64) -> (f64, f64) {
+        if rad != self.rad {
+            *self = Self { rad, sin_cos: sin_cos(rad) };
+        }
+        self.sin_cos
+    }
 }
 
 /// Every run of a dataset with its wheels' record changed.

@@ -50,6 +50,12 @@ impl Sparse {
         Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false })
     }
 
+    /// The terms of the same product on every channel of the motion in turn, as one: the product is found once for all.
+    #[must_use]
+    pub fn term_on_motion(&self) -> Box<dyn ModelTerm> {
+        Box::new(OnMotion(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false }))
+    }
+
     fn product(&self, at: &Moment<'_>) -> f64 {
         self.covariates.iter().map(|covariate| covariate.value(at)).product()
     }
@@ -281,6 +287,7 @@ fn on_channel(channel: Channel, size: f64) -> Pose {
 }
 
 /// The hypothesis face in a run.
+#[derive(Clone)]
 struct Recorded {
     of: Sparse,
     reversals: Reversals,
@@ -293,24 +300,9 @@ const YAW: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad
 const SEEN: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m", plausible: 0.02 }];
 const SEEN_HEADING: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad", plausible: 0.02 }];
 
-impl ModelTerm for Recorded {
-    fn parameters(&self) -> &'static [TermParameter] {
-        match self.of.channel {
-            Channel::Along | Channel::Across => &ALONG,
-            Channel::Yaw => &YAW,
-            Channel::SeenAlong | Channel::SeenAcross => &SEEN,
-            Channel::SeenHeading => &SEEN_HEADING,
-        }
-    }
-
-    fn restart(&mut self, _run: &RunInfo) {
-        (self.reversals, self.started) = (Reversals::NONE, false);
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s <= 0.0 || self.of.channel.is_seen() {
-            return;
-        }
+impl Recorded {
+    /// What the product gains in an interval that takes time.
+    fn gained(&mut self, interval: &Interval<'_>) -> f64 {
         let Increment { distance_m, turn_rad } = interval.increment();
         let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
         let before = interval.previous_speed_m_s();
@@ -337,13 +329,58 @@ impl ModelTerm for Recorded {
             y_m: interval.world_from_body.y_m,
             of_run: &interval.run.covariates,
         };
-        gradient[0] = on_channel(self.of.channel, self.of.product(&at) * interval.dt_s);
+        self.of.product(&at) * interval.dt_s
+    }
+}
+
+impl ModelTerm for Recorded {
+    fn parameters(&self) -> &'static [TermParameter] {
+        match self.of.channel {
+            Channel::Along | Channel::Across => &ALONG,
+            Channel::Yaw => &YAW,
+            Channel::SeenAlong | Channel::SeenAcross => &SEEN,
+            Channel::SeenHeading => &SEEN_HEADING,
+        }
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        (self.reversals, self.started) = (Reversals::NONE, false);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
+            gradient[0] = on_channel(self.of.channel, self.gained(interval));
+        }
     }
 
     fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
         if self.of.channel.is_seen() {
             let speeds = (look.twist.v_m_s, look.twist.omega_rad_s);
             gradient[0] = on_channel(self.of.channel, self.of.product(&seen(speeds, look.world_from_body)));
+        }
+    }
+}
+
+/// One product on every channel of the motion.
+#[derive(Clone)]
+struct OnMotion(Recorded);
+
+impl ModelTerm for OnMotion {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const ALL: [TermParameter; Channel::MOTION.len()] = [ALONG[0], ALONG[0], YAW[0]];
+        &ALL
+    }
+
+    fn restart(&mut self, run: &RunInfo) {
+        self.0.restart(run);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if interval.dt_s > 0.0 {
+            let gained = self.0.gained(interval);
+            for (gradient, channel) in gradient.iter_mut().zip(Channel::MOTION) {
+                *gradient = on_channel(channel, gained);
+            }
         }
     }
 }

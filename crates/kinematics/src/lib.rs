@@ -32,5 +32,5 @@ pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
 pub use fleet::Fleet;
 pub use instruction_set::InstructionSet;
 pub use pose::{Frame, Point, Pose};
-pub use trig::{atan2, sinc};
+pub use trig::{atan2, sin_cos, sinc};
 pub use wheels::{Side, Wheels};

@@ -209,9 +209,10 @@ pub(crate) fn step_sinc(half_rad: f64) -> f64 {
     if half_rad * half_rad <= LARGEST_SHORT_SQUARE { short_sinc(half_rad).0 } else { sinc(half_rad) }
 }
 
-/// Sine and cosine.
+/// Sine and cosine: [`f64::sin_cos`] without a call.
 #[inline]
-pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
+#[must_use]
+pub fn sin_cos(x: f64) -> (f64, f64) {
     // No quarter: what is left of `reduced`.
     if x.abs() <= FRAC_PI_4 {
         small(x)

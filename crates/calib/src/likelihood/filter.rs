@@ -4,13 +4,13 @@
 //! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
 use dataset::{Interval, Look, ModelTerm};
-use kinematics::{Increment, Pose, Twist, Wheels, sinc, sinc_derivative, wrap_to_pi};
+use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::apart::Instrument;
 use super::model::{Column, Model};
 use super::noise::Noise;
-use super::normal::Sums;
+use super::normal::{Products, Sums};
 use super::records::{Chain, Piece, Start};
 use super::thinning::{Leg, carry};
 
@@ -51,6 +51,8 @@ pub(crate) struct Want {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
     pub(crate) gate: Gate,
+    /// Terms from this one on are tested one by one: their columns have no products with each other's.
+    pub(crate) apart_from: Option<usize>,
 }
 
 /// Score of the cost by the logarithms of the variances, and its information.
@@ -102,7 +104,10 @@ pub(super) struct Filter<'f, 'a> {
     previous: Option<Piece>,
     goes_on: bool,
     gradients: Vec<Pose>,
-    pub(super) sums: Sums,
+    /// Derivatives of the leg in force by the terms' parameters, and of the look's by the same.
+    leg_by_terms: Vec<Vector3<f64>>,
+    sights: Vec<Vector3<f64>>,
+    pub(super) sums: Sums<'f>,
     pub(super) innovations: Vec<Innovation>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
@@ -113,7 +118,6 @@ pub(super) struct Filter<'f, 'a> {
 struct Moved {
     motion: Pose,
     by_lengths: [Vector3<f64>; 3],
-    by_terms: Vec<Vector3<f64>>,
 }
 
 impl<'f, 'a> Filter<'f, 'a> {
@@ -122,10 +126,11 @@ impl<'f, 'a> Filter<'f, 'a> {
         number: usize,
         model: &'f Model,
         noise: &'f Noise,
-        columns: usize,
+        products: &'f Products,
         terms: &'f mut [Box<dyn ModelTerm>],
         want: Want,
     ) -> Self {
+        let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
         // One more for a free heading.
         let all = columns + 1;
         Self {
@@ -147,7 +152,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             previous: None,
             goes_on: false,
             gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
-            sums: Sums::new(columns),
+            leg_by_terms: vec![Vector3::zeros(); columns - Column::BASE.len()],
+            sights: vec![Vector3::zeros(); columns - Column::BASE.len()],
+            sums: Sums::new(columns, products),
             innovations: Vec::new(),
             outliers: Vec::new(),
             noise_score: NoiseScore::zero(),
@@ -225,7 +232,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let theta_rad = seen.theta_rad - ltheta;
-        let (sin, cos) = theta_rad.sin_cos();
+        let (sin, cos) = sin_cos(theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         let moved = Vector3::new(cos * twist.v_m_s, sin * twist.v_m_s, twist.omega_rad_s);
         self.pose = Pose::new(
@@ -238,8 +245,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.by[Column::MountY.index()] = Vector3::new(sin, -cos, 0.0);
         self.by[Column::MountTheta.index()] = Vector3::new(-mounted.y, mounted.x, -1.0);
         self.by[Column::Latency.index()] = moved;
-        let sight = self.sight(t_s, twist);
-        for (number, sight) in sight.iter().enumerate() {
+        self.sight(t_s, twist);
+        for (number, sight) in self.sights.iter().enumerate() {
             self.by[Column::Term(number).index()] = -sight;
             let size = self.model.sizes[number];
             self.pose = Pose::new(
@@ -263,10 +270,10 @@ impl<'f, 'a> Filter<'f, 'a> {
         Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
     }
 
-    /// What the terms add to a look at the pose in force, in the room, for each parameter.
-    fn sight(&mut self, t_s: f64, twist: Twist) -> Vec<Vector3<f64>> {
+    /// Finds what the terms add to a look at the pose in force, in the room, for each parameter.
+    fn sight(&mut self, t_s: f64, twist: Twist) {
         if self.gradients.is_empty() {
-            return Vec::new();
+            return;
         }
         let world_from_body = self.run_from_chain * self.pose;
         let look = Look { t_s, world_from_body, twist, run: self.chain.info };
@@ -277,27 +284,28 @@ impl<'f, 'a> Filter<'f, 'a> {
             term.sight(&look, own);
             rest = others;
         }
-        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |g: &Pose| Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, g.theta_rad);
-        self.gradients.iter().map(room).collect()
+        self.sights.iter_mut().zip(&self.gradients).for_each(|(sight, gradient)| *sight = room(gradient));
     }
 
     /// The motion of a leg by the counts and the terms.
     fn motion(&mut self, leg: &Leg) -> Moved {
         let Model { m_per_rad, separation_m, .. } = *self.model;
-        let parameters = self.gradients.len();
-        let mut moved = Moved {
-            motion: Pose::IDENTITY,
-            by_lengths: [Vector3::zeros(); 3],
-            by_terms: vec![Vector3::zeros(); parameters],
-        };
+        let mut moved = Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3] };
+        self.leg_by_terms.fill(Vector3::zeros());
+        let run_from_start = Frame::from(self.run_from_chain * self.pose);
         for piece in &self.chain.pieces[leg.pieces.clone()] {
             let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
             let before = moved.motion;
             let half_rad = 0.5 * turn_rad;
-            let (sin, cos) = (before.theta_rad + half_rad).sin_cos();
+            let (sin, cos) = sin_cos(before.theta_rad + half_rad);
             let chord = sinc(half_rad);
+            // In the frame of the step's middle; a turn acts on half of the way.
+            let middle = |g: &Pose, by_turn: &Vector3<f64>| {
+                Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
+            };
             let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
             let bend = sinc_derivative(half_rad);
             let by_turn = Vector3::new(
@@ -312,33 +320,31 @@ impl<'f, 'a> Filter<'f, 'a> {
                 along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m),
                 -by_turn * turn_rad,
             ];
-            let mut term_steps = std::mem::take(&mut moved.by_terms);
-            if parameters > 0 {
-                self.term_gradients(piece, travel_m, before);
-                // In the frame of the step's middle; a turn acts on half of the way.
-                let of_term = |g: &Pose| {
-                    Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
-                };
+            if !self.gradients.is_empty() {
+                self.term_gradients(piece, travel_m, run_from_start * before);
                 for (gradient, size) in self.gradients.iter().zip(&self.model.sizes).filter(|(_, size)| **size != 0.0) {
-                    step += *size * of_term(gradient);
-                }
-                for (by, gradient) in term_steps.iter_mut().zip(&self.gradients) {
-                    *by = turned(*by, step) + of_term(gradient);
+                    step += *size * middle(gradient, &by_turn);
                 }
             }
-            moved.by_terms = term_steps;
             for (by, of_step) in moved.by_lengths.iter_mut().zip(steps) {
                 *by = turned(*by, step) + of_step;
             }
             moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
+            // As if the rest of the leg led back to its start: one turn at the end of the leg then does for those of all pieces.
+            let by_turn = by_turn + Vector3::new(moved.motion.y_m, -moved.motion.x_m, 0.0);
+            for (by, gradient) in self.leg_by_terms.iter_mut().zip(&self.gradients) {
+                *by += middle(gradient, &by_turn);
+            }
             self.session_m += distance_m.abs();
             self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
             self.previous = Some(*piece);
         }
+        let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
+        self.leg_by_terms.iter_mut().for_each(|by| *by = turned(*by, end));
         moved
     }
 
-    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, before: Pose) {
+    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, world_from_body: Pose) {
         let m_per_rad = self.model.m_per_rad;
         let previous = self.previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
         let interval = Interval {
@@ -351,7 +357,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             wheel_separation_m: self.model.separation_m,
             wheel_rad: self.wheel_rad,
             turned_rad: piece.wheel_rad,
-            world_from_body: self.run_from_chain * self.pose * before,
+            world_from_body,
             session_m: self.session_m,
             run: self.chain.info,
         };
@@ -365,8 +371,8 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     fn predict(&mut self, leg: &Leg) {
-        let Moved { motion, by_lengths, by_terms } = self.motion(leg);
-        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let Moved { motion, by_lengths } = self.motion(leg);
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
         for by in &mut self.by {
@@ -375,8 +381,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         for (by, of_leg) in self.by.iter_mut().zip(by_lengths) {
             *by += room(of_leg);
         }
-        for (by, of_leg) in self.by[Column::BASE.len()..].iter_mut().zip(by_terms) {
-            *by += room(of_leg);
+        for (by, of_leg) in self.by[Column::BASE.len()..].iter_mut().zip(&self.leg_by_terms) {
+            *by += room(*of_leg);
         }
         self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
         let rotation = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
@@ -401,10 +407,10 @@ impl<'f, 'a> Filter<'f, 'a> {
         let seen = self.chain.looks[leg.look];
         let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
         let twist = self.twist(&piece);
-        let sight = self.sight(seen.t_s, twist);
+        self.sight(seen.t_s, twist);
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
-        let (sin, cos) = self.pose.theta_rad.sin_cos();
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A look is late by the way that the instrument made in the meantime.
         let moved = Vector3::new(
@@ -412,7 +418,8 @@ impl<'f, 'a> Filter<'f, 'a> {
             sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
             twist.omega_rad_s,
         );
-        let from_terms = sight.iter().zip(&self.model.sizes).map(|(sight, size)| *size * sight).sum::<Vector3<f64>>();
+        let from_terms =
+            self.sights.iter().zip(&self.model.sizes).map(|(sight, size)| *size * sight).sum::<Vector3<f64>>();
         let ahead = mounted - late * moved + from_terms;
         let error = Vector3::new(
             seen.x_m - self.pose.x_m - ahead.x,
@@ -428,13 +435,15 @@ impl<'f, 'a> Filter<'f, 'a> {
         if self.want.gate == Gate::Shut && self.distance(&axes, &rows, error, &r, components) > OUTLIER_CHI_SQUARE {
             return false;
         }
-        let direct = |column: usize, axis: &Vector3<f64>| match column {
-            3 => axis.dot(&Vector3::new(cos, sin, 0.0)),
-            4 => axis.dot(&Vector3::new(-sin, cos, 0.0)),
-            5 => axis.z,
-            6 => -axis.dot(&moved),
-            _ => column.checked_sub(Column::BASE.len()).and_then(|k| sight.get(k)).map_or(0.0, |sight| axis.dot(sight)),
-        };
+        let direct = [
+            Vector3::zeros(),
+            Vector3::zeros(),
+            Vector3::zeros(),
+            Vector3::new(cos, sin, 0.0),
+            Vector3::new(-sin, cos, 0.0),
+            Vector3::z(),
+            -moved,
+        ];
         let mut correction = Vector3::zeros();
         for component in 0..components {
             let (axis, row) = (axes[component], rows[component]);
@@ -445,8 +454,10 @@ impl<'f, 'a> Filter<'f, 'a> {
             if self.want.noise_score {
                 self.score_noise(component, &row, &gain, v, s, r[component]);
             }
-            for (column, (j, by)) in self.j.iter_mut().zip(&self.by).enumerate() {
-                *j = -row.dot(by) - direct(column, &axis);
+            // A free heading, the last column, is seen in the pose alone.
+            let direct = direct.iter().chain(&self.sights).map(|direct| axis.dot(direct)).chain([0.0]);
+            for ((j, by), direct) in self.j.iter_mut().zip(&self.by).zip(direct) {
+                *j = -row.dot(by) - direct;
             }
             self.sums.add(&self.j, v, s);
             if self.want.innovations {

@@ -138,7 +138,7 @@ pub(crate) fn fit_from(
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
         for round in 1..=MOST_STARTS {
-            let want = Want { innovations: true, gate: Gate::Open, noise_score: false };
+            let want = Want { innovations: true, gate: Gate::Open, ..Want::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, want);
             let moved = step(&mut model, &mut headings, &found, options, &basis)?;
             let mut squares: Vec<f64> =

@@ -1,9 +1,36 @@
 //! The sums of a chain's innovations, and the elimination of a start heading that nobody saw.
 
+use dataset::ModelTerm;
+
 use super::evidence::Evidence;
+use super::model::Column;
+
+/// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
+/// each other.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Products {
+    /// So many columns come first, which have products with all.
+    common: usize,
+    /// For each further column, the first of those of its term: it has products with these.
+    first: Vec<usize>,
+}
+
+impl Products {
+    /// Those of all columns with each other; where terms stand apart from one on, of its columns and those of the ones after with the others' and their own.
+    pub(crate) fn of(terms: &[Box<dyn ModelTerm>], apart_from: Option<usize>) -> Self {
+        let (own, apart) = terms.split_at(apart_from.unwrap_or(terms.len()).min(terms.len()));
+        let common = Column::BASE.len() + own.iter().map(|term| term.parameters().len()).sum::<usize>();
+        let mut first = Vec::new();
+        for term in apart {
+            first.extend(std::iter::repeat_n(common + first.len(), term.parameters().len()));
+        }
+        Self { common, first }
+    }
+}
 
 /// Normal equation of one chain, its free heading last.
-pub(crate) struct Sums {
+pub(crate) struct Sums<'p> {
+    products: &'p Products,
     columns: usize,
     information: Vec<f64>,
     gradient: Vec<f64>,
@@ -14,12 +41,13 @@ pub(crate) struct Sums {
     pub(crate) free: bool,
 }
 
-impl Sums {
+impl<'p> Sums<'p> {
     /// Of no innovation; the columns are those of the evidence.
-    pub(crate) fn new(columns: usize) -> Self {
+    pub(crate) fn new(columns: usize, products: &'p Products) -> Self {
         // One more for a free heading.
         let columns = columns + 1;
         Self {
+            products,
             columns,
             information: vec![0.0; columns * columns],
             gradient: vec![0.0; columns],
@@ -37,8 +65,15 @@ impl Sums {
             let scaled = a * per_s;
             if scaled != 0.0 {
                 self.gradient[row] += scaled * v;
-                let out = &mut self.information[row * self.columns..row * self.columns + row + 1];
-                out.iter_mut().zip(j).for_each(|(out, b)| *out += scaled * b);
+                let out = &mut self.information[row * self.columns..][..=row];
+                let add = |(out, b): (&mut f64, &f64)| *out += scaled * b;
+                match row.checked_sub(self.products.common).and_then(|further| self.products.first.get(further)) {
+                    Some(&first) => {
+                        out[..self.products.common].iter_mut().zip(j).for_each(add);
+                        out[first..].iter_mut().zip(&j[first..]).for_each(add);
+                    }
+                    None => out.iter_mut().zip(j).for_each(add),
+                }
             }
         }
         self.chi_square += v * v * per_s;

@@ -1,5 +1,7 @@
 //! One pass over all runs: the filter of every chain, and the sums of what they say.
 
+use std::ops::Range;
+
 use dataset::ModelTerm;
 use rayon::prelude::*;
 
@@ -8,11 +10,12 @@ use super::evidence::Evidence;
 use super::filter::{Filter, Innovation, NoiseScore, Trail, Want};
 use super::model::{Column, Model};
 use super::noise::Noise;
-use super::records::{Records, Start};
+use super::normal::Products;
+use super::records::{Chain, Records, Start};
 use super::thinning::{Leg, Selection};
 
-/// From so many legs on, which take a millisecond, chains are filtered on all cores.
-const LEGS_AT_ONCE: usize = 4096;
+/// From so many legs on, which take a millisecond, runs are filtered on all cores; without terms, all chains.
+pub(super) const LEGS_AT_ONCE: usize = 4096;
 
 /// The result of a pass.
 #[derive(Debug, Clone)]
@@ -67,65 +70,75 @@ pub(crate) fn pass(
     want: Want,
 ) -> Pass {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+    let products = Products::of(terms, want.apart_from);
     let mut result = Pass::nothing();
     #[allow(clippy::cast_precision_loss)] // a handful of phases
     let weight = 1.0 / selections.len() as f64;
+    let runs = runs(&records.chains);
+    result.runs = runs.iter().map(|chains| Evidence::new(records.chains[chains.start].run, columns)).collect();
     let of_chain = |number: usize, legs: &[Leg], terms: &mut [Box<dyn ModelTerm>], trail: &mut Option<Trail>| {
         let chain = &records.chains[number];
-        let mut filter = Filter::new(chain, number, model, noise, columns, terms, want);
+        let mut filter = Filter::new(chain, number, model, noise, &products, terms, want);
         if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
             filter.go_on(trail);
         }
         filter.run(legs, free_headings[number]);
         *trail = Some(filter.trail());
         let Filter { sums, outliers, innovations, noise_score, .. } = filter;
-        let (evidence, heading) = sums.eliminated(records.chains[number].run, columns);
-        OfChain { evidence, heading, innovations, outliers, noise_score }
+        let (evidence, heading) = sums.eliminated(chain.run, columns);
+        (evidence, OfChain { number, heading, innovations, outliers, noise_score })
     };
     for (phase, selection) in selections.iter().enumerate() {
         let legs = &selection.legs;
-        // Terms have a state, and go through the chains one after the other. Sums are taken in the order of the chains either way.
-        let at_once = terms.is_empty() && legs.iter().map(Vec::len).sum::<usize>() >= LEGS_AT_ONCE;
-        let mut ready: Vec<Option<OfChain>> = if at_once {
-            let of = |(number, legs): (usize, &Vec<Leg>)| {
-                (!legs.is_empty()).then(|| of_chain(number, legs, &mut [], &mut None))
-            };
-            legs.par_iter().enumerate().map(of).collect()
-        } else {
-            Vec::new()
+        let of_run = |chains: &Range<usize>, evidence: &mut Evidence, terms: &mut [Box<dyn ModelTerm>]| {
+            let mut trail: Option<Trail> = None;
+            let mut found = Vec::with_capacity(chains.len());
+            for number in chains.clone() {
+                let unseen = legs[number].is_empty();
+                // Terms remember what was driven on the way to the next displacement, seen or not.
+                if unseen && (terms.is_empty() || records.chains[number].start == Start::Seen) {
+                    continue;
+                }
+                let (own, of_chain) = of_chain(number, &legs[number], terms, &mut trail);
+                if !unseen {
+                    evidence.add(&own, weight);
+                    found.push(of_chain);
+                }
+            }
+            found
         };
-        let known = ready.iter().flatten().map(|chain| chain.innovations.len()).sum();
+        // Sums are taken in the order of the chains whichever way they go.
+        let at_once = legs.iter().map(Vec::len).sum::<usize>() >= LEGS_AT_ONCE;
+        let found: Vec<Vec<OfChain>> = if at_once && terms.is_empty() {
+            let of =
+                |number: usize| (!legs[number].is_empty()).then(|| of_chain(number, &legs[number], &mut [], &mut None));
+            let mut ready: Vec<_> = (0..legs.len()).into_par_iter().map(of).collect();
+            let in_run = |(chains, evidence): (&Range<usize>, &mut Evidence)| {
+                let ready = ready[chains.clone()].iter_mut().filter_map(Option::take);
+                ready.map(|(own, of_chain)| (evidence.add(&own, weight), of_chain).1).collect()
+            };
+            runs.iter().zip(&mut result.runs).map(in_run).collect()
+        } else if at_once {
+            // Chains of a run follow each other, and terms remember; each run starts anew.
+            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>, (chains, evidence): (&Range<usize>, &mut Evidence)| {
+                of_run(chains, evidence, terms)
+            };
+            runs.par_iter().zip(&mut result.runs).map_init(|| terms.to_vec(), in_run).collect()
+        } else {
+            runs.iter().zip(&mut result.runs).map(|(chains, evidence)| of_run(chains, evidence, terms)).collect()
+        };
+        let known = found.iter().flatten().map(|of| of.innovations.len()).sum();
         let mut innovations = Vec::with_capacity(known);
-        let mut position = 0;
-        let mut trail: Option<Trail> = None;
-        for (number, (chain, legs)) in records.chains.iter().zip(legs).enumerate() {
-            if phase == 0 && result.runs.last().is_none_or(|run| run.run != chain.run) {
-                result.runs.push(Evidence::new(chain.run, columns));
-            }
-            while result.runs[position].run != chain.run {
-                position += 1;
-            }
-            let unseen = legs.is_empty();
-            // Terms remember what was driven on the way to the next displacement, seen or not.
-            if unseen && (terms.is_empty() || chain.start == Start::Seen) {
-                continue;
-            }
-            let found = ready.get_mut(number).and_then(Option::take);
-            let found = found.unwrap_or_else(|| of_chain(number, legs, terms, &mut trail));
-            if unseen {
-                continue;
-            }
-            if want.innovations {
-                innovations.extend(found.innovations);
-            }
+        for of in found.into_iter().flatten() {
+            innovations.extend(of.innovations);
             if phase == 0 {
-                result.outliers.extend(found.outliers.into_iter().map(|look| (number, look)));
+                result.outliers.extend(of.outliers.into_iter().map(|look| (of.number, look)));
             }
-            if let (0, Some((rest, by))) = (phase, found.heading) {
-                result.headings.push(FreeHeading { chain: number, run: chain.run, rest, by });
+            if let (0, Some((rest, by))) = (phase, of.heading) {
+                let run = records.chains[of.number].run;
+                result.headings.push(FreeHeading { chain: of.number, run, rest, by });
             }
-            result.runs[position].add(&found.evidence, weight);
-            result.noise.add(&found.noise_score, weight);
+            result.noise.add(&of.noise_score, weight);
         }
         if want.innovations {
             result.innovations.push(innovations);
@@ -137,9 +150,20 @@ pub(crate) fn pass(
     result
 }
 
-/// What one chain says in one phase.
+/// The chains of each run, which follow each other.
+fn runs(chains: &[Chain<'_>]) -> Vec<Range<usize>> {
+    let mut start = 0;
+    let of = |chains: &[Chain<'_>]| {
+        let run = start..start + chains.len();
+        start = run.end;
+        run
+    };
+    chains.chunk_by(|a, b| a.run == b.run).map(of).collect()
+}
+
+/// What one chain says in one phase, beside its evidence.
 struct OfChain {
-    evidence: Evidence,
+    number: usize,
     heading: Option<(f64, Vec<f64>)>,
     innovations: Vec<Innovation>,
     outliers: Vec<usize>,

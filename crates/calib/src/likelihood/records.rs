@@ -24,6 +24,9 @@ pub(crate) struct Piece {
 /// A motion whose chord is less than this share of its way hardly shows where it went.
 const LEAST_CHORD: f64 = 0.3;
 
+/// Errors of displacements that are worth finding last for about three of them: e^(−1/3) is 0.7.
+const FADES: f64 = 0.7;
+
 /// What the instrument saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Seen {
@@ -63,6 +66,38 @@ pub struct Chain<'a> {
 }
 
 impl Chain<'_> {
+    /// It is a displacement: the instrument says how it moved between two instants, not where it is.
+    #[must_use]
+    pub fn is_displacement(&self) -> bool {
+        self.start == Start::Origin
+    }
+
+    /// Do what this chain and the next hold belong to one series, in which an instrument's errors may last? Displacements of one run do; poses of two chains have
+    /// a gap between them that no counts lead over.
+    pub(crate) fn is_in_series_with(&self, next: &Self) -> bool {
+        self.is_displacement() && next.is_displacement() && self.run == next.run
+    }
+
+    /// For each look, whether a wheel changed its speed in the half second before it, by more than a fifth of the fastest that either went in the chain.
+    #[must_use]
+    pub fn changes_of_speed(&self) -> Vec<bool> {
+        const BEFORE_S: f64 = 0.5;
+        const SHARE: f64 = 0.2;
+        let speed = |piece: &Piece| piece.wheel_rad.map(|rad| if piece.dt_s > 0.0 { rad / piece.dt_s } else { 0.0 });
+        let fastest = self.pieces.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
+        let changes = |look: &Seen| {
+            let near = self.pieces[..look.after].iter().rev().take_while(|piece| piece.t_s > look.t_s - BEFORE_S);
+            let (mut low, mut high) = (Wheels::both(f64::INFINITY), Wheels::both(f64::NEG_INFINITY));
+            for of in near.map(speed) {
+                low = low.zip_with(of, f64::min);
+                high = high.zip_with(of, f64::max);
+            }
+            let change = high.zip_with(low, |high, low| high - low);
+            change.left.max(change.right) > SHARE * fastest
+        };
+        self.looks.iter().map(changes).collect()
+    }
+
     /// The pose of the first look, with its time and the pieces before it, and the time and the pose of the last; `None` where a look has no heading.
     #[allow(clippy::type_complexity)]
     pub(crate) fn ends(&self) -> Option<(Pose, (f64, usize), (f64, Pose))> {
@@ -201,25 +236,6 @@ impl<'a> Records<'a> {
         if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
     }
 
-    /// Whether a wheel changed its speed in the half second before a look, by more than a fifth of the fastest that either went in the chain.
-    #[must_use]
-    pub fn changes_speed(&self, chain: usize, look: usize) -> bool {
-        const BEFORE_S: f64 = 0.5;
-        const SHARE: f64 = 0.2;
-        let Some(chain) = self.chains.get(chain) else { return false };
-        let Some(look) = chain.looks.get(look) else { return false };
-        let speed = |piece: &Piece| piece.wheel_rad.map(|rad| if piece.dt_s > 0.0 { rad / piece.dt_s } else { 0.0 });
-        let fastest = chain.pieces.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
-        let near = chain.pieces[..look.after].iter().rev().take_while(|piece| piece.t_s > look.t_s - BEFORE_S);
-        let (mut low, mut high) = (Wheels::both(f64::INFINITY), Wheels::both(f64::NEG_INFINITY));
-        for of in near.map(speed) {
-            low = low.zip_with(of, f64::min);
-            high = high.zip_with(of, f64::max);
-        }
-        let change = high.zip_with(low, |high, low| high - low);
-        change.left.max(change.right) > SHARE * fastest
-    }
-
     /// How far from where a chain begins the robot was seen at the most, metres; root mean square over the chains.
     #[must_use]
     pub fn extent_m(&self) -> f64 {
@@ -240,9 +256,41 @@ impl<'a> Records<'a> {
         (squares / chains).sqrt()
     }
 
-    /// Times between looks that follow each other, seconds.
+    /// Are the looks of two chains of one series, so that one may resemble the other: looks of one chain, or displacements of one run?
+    #[must_use]
+    pub fn are_in_series(&self, chain: usize, next: usize) -> bool {
+        let both = self.chains.get(chain).zip(self.chains.get(next));
+        chain == next || both.is_some_and(|(chain, next)| chain.is_in_series_with(next))
+    }
+
+    /// What the product of two innovations counts for whether errors last, one being so many looks after the other. What lasts after a look is in the filter's state:
+    /// the next look shows it. Nothing follows displacements, and all that come later resemble the one before, the less the later.
+    #[must_use]
+    pub fn weight_of_pair(&self, chain: usize, next: usize, lag: i32) -> f64 {
+        if chain == next {
+            f64::from(u8::from(lag == 1))
+        } else if self.are_in_series(chain, next) {
+            FADES.powi(lag - 1)
+        } else {
+            0.0
+        }
+    }
+
+    /// Does a chain start where the one before it ended: a displacement after a displacement?
+    #[must_use]
+    pub fn goes_on(&self, chain: usize) -> bool {
+        self.chains.get(chain).is_some_and(|chain| chain.goes_on)
+    }
+
+    /// Times between looks that follow each other, of displacements between their ends, seconds.
     pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
-        self.chains.iter().flat_map(|chain| chain.looks.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))
+        let series = self.chains.chunk_by(Chain::is_in_series_with);
+        series.flat_map(|series| {
+            let ends_s: Vec<f64> = series.iter().flat_map(|chain| &chain.looks).map(|look| look.t_s).collect();
+            // Displacements may end together, or in any order; what is no time is not between.
+            let between_s = ends_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|between_s| *between_s > 0.0);
+            between_s.collect::<Vec<f64>>()
+        })
     }
 }
 

@@ -1,20 +1,26 @@
 //! The pass against what it differentiates.
 
 use dataset::{
-    Dataset, Interval, Look, ModelTerm, NominalRobot, Odometry, Provenance, Run, RunInfo, TermParameter, TruthNoise,
-    TruthSample, WheelLog,
+    Dataset, Displacement, Interval, Look, ModelTerm, NominalRobot, Odometry, Provenance, Run, RunInfo, TermParameter,
+    TruthNoise, TruthSample, WheelLog,
 };
 use kinematics::{Increment, Pose, Wheels};
 
 use super::filter::Want;
-use super::pass::pass;
+use super::pass::{LEGS_AT_ONCE, pass};
 use super::{Column, Model, Noise, Pass, Records, Selection, Thinning};
+use crate::methods::joint::Joint;
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
 const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];
 
 /// Two runs of a dozen rows, seen every two seconds a few millimetres off; headings only where asked for.
 fn dataset(with_headings: bool) -> Dataset {
+    dataset_of(2, with_headings)
+}
+
+/// So many of them.
+fn dataset_of(runs: u32, with_headings: bool) -> Dataset {
     let run = |number: u32| {
         let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
         let mut pose = Pose::new(0.2, -0.1, 0.5 + f64::from(number));
@@ -54,11 +60,12 @@ fn dataset(with_headings: bool) -> Dataset {
         },
         truth_noise: TruthNoise::default(),
         points: Vec::new(),
-        runs: vec![run(0), run(1)],
+        runs: (0..runs).map(run).collect(),
     }
 }
 
 /// Adds way in proportion to the square of the travel, and looks ahead in proportion to the speed.
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {
@@ -77,6 +84,79 @@ impl ModelTerm for Term {
     fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
         gradient[1] = Pose::new(look.twist.v_m_s, 0.1, 0.3);
     }
+}
+
+/// Remembers the way of the run.
+#[derive(Clone)]
+struct Worn {
+    way_m: f64,
+}
+
+impl ModelTerm for Worn {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const WAY: TermParameter = TermParameter { name: "way_per_m2", unit: "1/m²", plausible: 1.0 };
+        const LOOK: TermParameter = TermParameter { name: "ahead", unit: "1", plausible: 1.0 };
+        &[WAY, LOOK]
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        self.way_m = 0.0;
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        self.way_m += interval.increment().distance_m.abs();
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| self.way_m * travel_m));
+    }
+
+    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
+        gradient[1] = Pose::new(self.way_m, 0.0, 0.0);
+    }
+}
+
+#[test]
+fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
+    // Runs of at least four legs each: more than those from which on runs go at once.
+    let dataset = dataset_of(LEGS_AT_ONCE.div_ceil(4) as u32, true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning { every_s: 1.0, phases: 2 }, &MODEL);
+    let headings = vec![0.0; records.chains.len()];
+    let want = Want { noise_score: true, innovations: true, ..Want::default() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
+        let found = pool.install(|| pass(&records, &selections, &model(), &NOISE, &headings, &mut terms, want));
+        (found.runs, found.innovations, found.outliers, found.noise)
+    };
+    let one_by_one = on(1);
+    assert!(one_by_one.1.iter().all(|phase| phase.len() > LEGS_AT_ONCE), "looks were left out");
+    assert_eq!(on(2), one_by_one);
+    assert_eq!(on(3), one_by_one);
+}
+
+#[test]
+fn terms_apart_have_all_products_but_those_with_each_other() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    let model = Model { sizes: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
+    let headings = vec![0.0; records.chains.len()];
+    let of = |apart_from| {
+        let worn = || Box::new(Worn { way_m: 0.0 });
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), worn(), worn()];
+        let want = Want { apart_from, ..Want::default() };
+        super::total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, want).runs).expect("runs")
+    };
+    let (all, apart) = (of(None), of(Some(1)));
+    let common = Column::BASE.len() + 2;
+    for row in 0..common + 4 {
+        for column in 0..common + 4 {
+            let is_cross = row.min(column) >= common && (row - common) / 2 != (column - common) / 2;
+            let expected = if is_cross { 0.0 } else { all.information[(row, column)] };
+            assert_eq!(apart.information[(row, column)], expected, "{row} {column}");
+            assert!(!is_cross || all.information[(row, column)] != 0.0, "{row} {column}: nothing to leave out");
+        }
+    }
+    assert_eq!(apart.gradient, all.gradient);
 }
 
 const MOUNTED: Pose = Pose::new(0.03, -0.02, 0.1);
@@ -202,4 +282,96 @@ fn thinned_looks_are_far_enough_apart_and_end_with_the_last() {
     assert_eq!(looks(1), [3, 6]);
     let first = &selections[1].legs[0][0];
     assert_eq!((first.pieces.clone(), first.from), (0..6, 0));
+}
+
+/// Normal variables by the sum of twelve uniform ones of `SplitMix64` (Steele, Lea & Flood 2014).
+struct Normals(u64);
+
+impl Normals {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        f64::from(u32::try_from((z ^ (z >> 31)) >> 32).expect("half of the bits")) / f64::from(u32::MAX)
+    }
+
+    fn next(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// A second each; runs of so many.
+const DISPLACEMENTS: [u32; 8] = [40; 8];
+
+/// Runs seen by displacements of a second, with errors of which a share `keeps` lasts from one to the next (a first-order autoregression of variance one, in
+/// millimetres and milliradians).
+fn displaced(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
+    let mut normals = Normals(seed);
+    let mut dataset = dataset(true);
+    let base = dataset.runs[0].clone();
+    let run = |(number, displacements): (usize, &u32)| {
+        let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
+        let (mut seen, mut errors) = (Vec::new(), [0.0; 3].map(|_: f64| normals.next()));
+        for second in 0..*displacements {
+            let k = (second as usize + number) % LEFT_RAD.len();
+            let turned = Wheels { left: LEFT_RAD[k], right: RIGHT_RAD[k] };
+            for (side, rad) in [(&mut angles.left, turned.left), (&mut angles.right, turned.right)] {
+                let before = *side.last().expect("a start");
+                side.push(before + rad);
+            }
+            let travel_m = Wheels { left: 0.0811 * turned.left, right: 0.0797 * turned.right };
+            let slid_m = travel_m.map(|travel_m: f64| travel_m + 3e-4 * travel_m.abs().sqrt() * normals.next());
+            let moved = Increment::from_travel(slid_m, 0.366).arc();
+            errors = errors.map(|error| keeps * error + (1.0 - keeps * keeps).sqrt() * normals.next());
+            seen.push(Displacement {
+                t0_s: f64::from(second),
+                t1_s: f64::from(second + 1),
+                dx_m: moved.x_m + 1e-3 * errors[0],
+                dy_m: moved.y_m + 1e-3 * errors[1],
+                dtheta_rad: moved.theta_rad + 1e-3 * errors[2],
+            });
+        }
+        let t_s = (0..=*displacements).map(f64::from).collect();
+        let odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
+        let info = RunInfo { id: format!("run-{number}"), ..base.info.clone() };
+        Run { info, odometry, displacements: seen, ..Run::default() }
+    };
+    dataset.runs = runs.iter().enumerate().map(run).collect();
+    dataset
+}
+
+#[test]
+fn thinned_displacements_are_far_enough_apart_and_every_run_has_one() {
+    let dataset = displaced(&[6, 1], 0.0, 0);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning { every_s: 2.5, phases: 2 }, &MODEL);
+    let taken = |phase: usize| -> Vec<usize> {
+        let legs = selections[phase].legs.iter().enumerate();
+        legs.filter(|(_, legs)| !legs.is_empty()).map(|(chain, _)| chain).collect()
+    };
+    // They end at 1 … 6 s: the first phase takes those at 1 and 4 s, the second, due from 1 + 1.25 s on, those at 3 and 6 s. The run of one gives it to both.
+    assert_eq!(taken(0), [0, 3, 6]);
+    assert_eq!(taken(1), [2, 5, 6]);
+    assert!(records.times_between().all(|between_s| (between_s - 1.0).abs() < 1e-12));
+    // Of the runs, not of the displacements, each of which is a chain of its own.
+    assert!((selections[0].mean_looks(&records) - 1.5).abs() < 1e-12);
+    let all = Selection::of(&records, Thinning::NONE, &MODEL);
+    assert!((all[0].mean_looks(&records) - 3.5).abs() < 1e-12);
+}
+
+/// Of 20 datasets with white errors, four or more would be thinned by chance once in 20 000 times (1 % each). Were displacements not neighbours, none of those
+/// whose errors last would.
+#[test]
+fn displacements_are_thinned_where_their_errors_last_and_only_there() {
+    let thinned = |keeps: f64| {
+        let of = |seed: &u64| {
+            let dataset = displaced(&DISPLACEMENTS, keeps, *seed);
+            let joint = Joint { nuisances: false, thin: true, thin_displacements: true };
+            joint.fit(&[dataset.session()]).expect("a fit").thinning != Thinning::NONE
+        };
+        (1..=20_u64).filter(of).count()
+    };
+    assert!(thinned(0.0) < 4);
+    assert_eq!(thinned(0.7), 20);
 }

@@ -3,6 +3,9 @@
 //! The errors of an instrument that tracks the robot often last for seconds: lens distortion, a marker's own frame, a filter inside. A likelihood that takes such
 //! looks one by one believes each, and fits the wheels to the instrument's errors. Thinned looks are honest. What the looks in between know is not thrown away:
 //! the same is done in several phases, each shifted by a share of the spacing, and the costs are averaged (a composite likelihood; Varin, Reid & Firth 2011).
+//!
+//! Of looks, those in between are passed over, and the way from one taken to the next is whole. A displacement cannot be lengthened, as its instrument would err twice:
+//! displacements in between are left out, way and all. The other phases take those, all of them where each phase takes one in as many as there are phases, or more.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -51,8 +54,11 @@ impl Selection {
             .map(|phase| Self {
                 legs: records
                     .chains
-                    .iter()
-                    .map(|chain| legs(chain, &taken(chain, thinning.every_s, offset(phase)), nominal))
+                    .chunk_by(Chain::is_in_series_with)
+                    .flat_map(|series| {
+                        let taken = taken_of_series(series, thinning.every_s, offset(phase));
+                        series.iter().zip(taken).map(|(chain, taken)| legs(chain, &taken, nominal))
+                    })
                     .collect(),
             })
             .collect()
@@ -78,29 +84,67 @@ impl Selection {
         Self { legs }
     }
 
-    /// How many looks it takes a chain that has any, on average; starts left out.
+    /// How many looks it takes of a series that has any, on average; starts left out. A series is a chain of looks, or the displacements of one run.
     #[must_use]
-    pub fn mean_looks(&self) -> f64 {
-        let (chains, looks) =
-            self.legs.iter().filter(|legs| !legs.is_empty()).fold((0.0, 0.0), |(chains, looks), legs| {
+    pub fn mean_looks(&self, records: &Records<'_>) -> f64 {
+        let (mut series, mut looks) = (0.0, 0.0);
+        let mut first = 0;
+        for chains in records.chains.chunk_by(Chain::is_in_series_with) {
+            let of = first..first + chains.len();
+            first = of.end;
+            let taken = self.legs[of].iter().map(Vec::len).sum::<usize>();
+            if taken > 0 {
+                series += 1.0;
                 #[allow(clippy::cast_precision_loss)]
-                (chains + 1.0, looks + legs.len() as f64)
-            });
-        if chains > 0.0 { looks / chains } else { 0.0 }
+                let taken = taken as f64;
+                looks += taken;
+            }
+        }
+        if series > 0.0 { looks / series } else { 0.0 }
     }
 }
 
-/// The looks after the first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
+/// The looks taken of each chain of a series.
+fn taken_of_series(series: &[Chain<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
+    match series {
+        [first, ..] if first.is_displacement() => displacements_taken(series, every_s, offset),
+        _ => series.iter().map(|chain| taken(chain, every_s, offset)).collect(),
+    }
+}
+
+/// The displacements that are taken: none ends sooner than `every_s` after the end of the one before, the first later than that of the run by a share of
+/// that. A run so short that it has none left gives its last: it is as good as that of any other.
+fn displacements_taken(series: &[Chain<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
+    let end_s = |chain: &Chain<'_>| chain.looks.first().map(|look| look.t_s);
+    let mut due_s = series.first().and_then(end_s).map_or(0.0, |first_s| first_s + every_s * offset);
+    let mut taken: Vec<Vec<usize>> = series
+        .iter()
+        .map(|chain| match end_s(chain) {
+            Some(end_s) if every_s == 0.0 || end_s >= due_s - 1e-9 => {
+                due_s = end_s + every_s;
+                vec![0]
+            }
+            _ => Vec::new(),
+        })
+        .collect();
+    if taken.iter().all(Vec::is_empty)
+        && let Some(last) = taken.last_mut()
+    {
+        last.push(0);
+    }
+    taken
+}
+
+/// The looks of a chain after its first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
 /// place of one that is too near to it.
 fn taken(chain: &Chain<'_>, every_s: f64, offset: f64) -> Vec<usize> {
-    let first = usize::from(chain.start == Start::Seen);
     let (Some(start), Some(last)) = (chain.looks.first(), chain.looks.last()) else { return Vec::new() };
-    if every_s == 0.0 || first == 0 {
-        return (first..chain.looks.len()).collect();
+    if every_s == 0.0 {
+        return (1..chain.looks.len()).collect();
     }
     let mut due_s = start.t_s + every_s * (1.0 + offset);
     let mut taken = Vec::new();
-    for (number, look) in chain.looks.iter().enumerate().skip(first) {
+    for (number, look) in chain.looks.iter().enumerate().skip(1) {
         if look.t_s >= due_s - 1e-9 {
             taken.push(number);
             due_s = look.t_s + every_s;

@@ -80,6 +80,7 @@ impl Forward for State {
 
 /// A gap of the width tried, in its widths: what the wheel does not follow, for each unit of the true gap. Reversals that do not cross it, such as the last
 /// counts before a standstill, cost what they take up.
+#[derive(Clone)]
 struct Term {
     width_m: f64,
     /// How far the counter is ahead of the wheel; half-way where a run begins, as nobody knows.

@@ -5,7 +5,7 @@
 //! Alias: `floor_slope` that goes with the way, exactly. Reference: users' reports, mm/m to cm/m; a rule of thumb.
 
 use dataset::{Interval, ModelTerm, TermParameter};
-use kinematics::{Pose, sinc};
+use kinematics::{Pose, sin_cos, sinc};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
@@ -76,6 +76,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {
@@ -95,8 +96,9 @@ impl ModelTerm for Term {
         let heading_rad = interval.world_from_body.theta_rad + 0.5 * increment.turn_rad;
         gradient[0] = in_room(interval, [way_m, 0.0]);
         gradient[1] = in_room(interval, [0.0, way_m]);
-        gradient[2].theta_rad = way_m * heading_rad.sin();
-        gradient[3].theta_rad = way_m * heading_rad.cos();
+        let (sin, cos) = sin_cos(heading_rad);
+        gradient[2].theta_rad = way_m * sin;
+        gradient[3].theta_rad = way_m * cos;
     }
 }
 

@@ -67,6 +67,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term {
     castor_behind_m: f64,
 }

@@ -102,6 +102,7 @@ impl Forward for State {
 }
 
 /// By the counts: which way the robot went, where it turned round, and to which side it had turned before.
+#[derive(Clone)]
 struct Term {
     decay_m: f64,
     /// Signed way and turn, each held within a band that its reversals must cross.

@@ -53,6 +53,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

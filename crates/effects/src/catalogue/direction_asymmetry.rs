@@ -59,6 +59,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

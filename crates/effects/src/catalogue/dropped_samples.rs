@@ -72,8 +72,8 @@ impl Forward for State {
     }
 }
 
-/// An interval longer than the usual one by this factor may be a gap; jitter makes some so, and the counts tell.
-const GAP: f64 = 1.3;
+/// An interval longer than the usual one by this factor is nearer to two of them: it may be a gap, or a pause of the log, and the counts tell.
+const GAP: f64 = 1.5;
 /// With a smaller share of the counts that the speed around it asks for, a gap has lost some: one row in two leaves a half.
 const KEPT: f64 = 0.8;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
@@ -91,7 +91,7 @@ struct Missing {
 
 /// Carries the counts of every gap on, and says what was missing.
 ///
-/// Over a gap the wheels turn at the mean of the speeds before and after it, exactly so where the acceleration is constant; the row after it shows less.
+/// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the acceleration is constant; the row after it shows less.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // counts are far under 2⁵³
 fn fill(odometry: &mut Odometry) -> Missing {
     let mut missing = Missing::default();
@@ -101,15 +101,18 @@ fn fill(odometry: &mut Odometry) -> Missing {
     let is_gap = |k: usize| lengths_s[k] > GAP * usual_s;
     let shown =
         ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
-    let speed = |side: Side, k: usize| shown[side][k] / lengths_s[k];
-    let is_row = |k: &usize| !is_gap(*k) && lengths_s[*k] > 0.0;
+    // What came by itself, between two rows, is none.
+    let is_row = |k: &usize| !is_gap(*k) && lengths_s[*k] * GAP > usual_s;
     let mut lost = Wheels::both(0.0);
     for (k, &length_s) in lengths_s.iter().enumerate() {
         if is_gap(k) {
             let around = [(0..k).rev().find(is_row), (k + 1..lengths_s.len()).find(is_row)];
             let due = Wheels { left: Side::Left, right: Side::Right }.map(|side| {
-                let speeds: Vec<f64> = around.iter().flatten().map(|near| speed(side, *near)).collect();
-                length_s * speeds.iter().sum::<f64>() / speeds.len().max(1) as f64
+                // Not the mean of two speeds: stamps may jitter, and one over a length that does is too large.
+                let (counts, time_s) = around.iter().flatten().fold((0.0, 0.0), |(counts, time_s), near| {
+                    (counts + shown[side][*near], time_s + lengths_s[*near])
+                });
+                if time_s > 0.0 { length_s * counts / time_s } else { 0.0 }
             });
             let [due_of_both, shown_of_both] =
                 [due.left.abs() + due.right.abs(), shown.left[k].abs() + shown.right[k].abs()];

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
 
 /// Cycles a turn that are tried; one a turn is an eccentric wheel to any data.
 const CYCLES: [f64; 11] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0];
@@ -59,7 +59,7 @@ impl PhysicalEffect for EncoderCycle {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("cycles", &CYCLES, |cycles| Term { cycles }))
+        Hypothesis::Terms(Shape::over("cycles", &CYCLES, |cycles| Term { cycles, last: Wheels::both(LastAngle::NONE) }))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -101,8 +101,10 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term {
     cycles: f64,
+    last: Wheels<LastAngle>,
 }
 
 impl ModelTerm for Term {
@@ -127,8 +129,8 @@ impl ModelTerm for Term {
                 continue;
             }
             let m_per_rad = interval.travel_m[side] / turned_rad;
-            let (sin_before, cos_before) = (self.cycles * interval.wheel_rad[side]).sin_cos();
-            let (sin, cos) = (self.cycles * (interval.wheel_rad[side] + turned_rad)).sin_cos();
+            let (sin_before, cos_before) = self.last[side].sin_cos(self.cycles * interval.wheel_rad[side]);
+            let (sin, cos) = self.last[side].sin_cos(self.cycles * (interval.wheel_rad[side] + turned_rad));
             for (gradient, shown) in gradient.iter_mut().zip([sin - sin_before, cos - cos_before]) {
                 let mut travel_m = Wheels::both(0.0);
                 travel_m[side] = -m_per_rad * shown;

@@ -78,6 +78,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term {
     /// With the way, or else with the time.
     way: bool,

@@ -75,30 +75,38 @@ impl Forward for State {
     }
 }
 
-/// Rows of a beat that no other has shown the length of before there is a line through them.
-const LEAST_ROWS: f64 = 8.0;
+/// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by, a beat.
+const LEAST_ROWS: usize = 24;
 /// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
 const MEMORY_ROWS: f64 = 500.0;
-/// A row that is farther from its beat than this share of it is no jitter: the log has missed its beat, and a new one begins.
+/// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with a row lost in it, hardly one as short.
+const ONE_BEAT: f64 = 1.7;
+/// Nor as short as this: such a row came by itself, at a standstill.
+const NO_BEAT: f64 = 0.3;
+/// A row that is farther from its beat than this share of it has missed it.
 const MISSED: f64 = 0.45;
+/// After so many in a row the log keeps another beat.
+const MOST_MISSED: u32 = 3;
 
-/// The regular beat behind the rows: a line through the rows' times over the numbers of their beats, with one slope for all beats of the log.
-#[derive(Default)]
+/// The regular beat behind a run's rows: a line through their times over the numbers of their beats.
+#[derive(Clone, Default)]
 struct Term {
-    /// Of the rows of this beat: weight, means of number and time, and sums of squares and products about them.
+    /// Times of the rows from which the beat is yet to be found.
+    first_s: Vec<f64>,
+    /// Of the rows of the beat: weight, means of number and time, and sums of squares and products about them.
     rows: f64,
     mean: [f64; 2],
     square: f64,
     product: f64,
-    /// The same sums of the beats before.
-    before: [f64; 2],
-    /// The last row: the number of its beat, and its time.
-    last: Option<(f64, f64)>,
+    /// The number of the last.
+    last: f64,
+    /// Rows since the last that kept to the beat.
+    missed: u32,
     /// How late the last row was by its beat; 0 while there is none.
     late_s: f64,
     /// The logged interval whose parts come in.
     row: Option<Row>,
-    /// Length and travel of the rows before, of a beat that goes on.
+    /// Length and travel of the rows before.
     recent: VecDeque<(f64, Wheels<f64>)>,
 }
 
@@ -121,18 +129,17 @@ const RECENT: usize = 5;
 const CHANGES: f64 = 1.5;
 
 impl Term {
-    /// When beat 0 is and the time between two beats, where rows enough are known.
+    /// When beat 0 is and the time between two beats, where that is known.
     fn line(&self) -> Option<(f64, f64)> {
-        let [square, product] = [self.square + self.before[0], self.product + self.before[1]];
-        let known = self.before[0] > 0.0 || self.rows >= LEAST_ROWS;
-        (known && self.rows > 0.0 && square > 0.0).then(|| {
-            let between_s = product / square;
+        (self.square > 0.0).then(|| {
+            let between_s = self.product / self.square;
             (self.mean[1] - between_s * self.mean[0], between_s)
         })
     }
 
     /// Takes a row of the beat, by Welford's recursion.
     fn add(&mut self, beat: f64, time_s: f64) {
+        self.last = beat;
         let keeps = 1.0 - 1.0 / MEMORY_ROWS;
         self.rows = keeps * self.rows + 1.0;
         let off = [beat - self.mean[0], time_s - self.mean[1]];
@@ -141,41 +148,56 @@ impl Term {
         }
         self.square = keeps * self.square + off[0] * (beat - self.mean[0]);
         self.product = keeps * self.product + off[0] * (time_s - self.mean[1]);
-        self.last = Some((beat, time_s));
     }
 
-    /// A new beat begins; how long one lasts stays known, if enough rows have shown it.
-    fn new_beat(&mut self) {
-        let knows = self.rows >= LEAST_ROWS;
-        let before = if knows { [self.before[0] + self.square, self.before[1] + self.product] } else { self.before };
-        *self = Self { before, ..Self::default() };
+    /// Takes a row before anything is known of the beat. Once there are enough of them, their gaps are so many times the middle one.
+    fn warm_up(&mut self, from_s: f64, row_s: f64) {
+        if self.first_s.is_empty() {
+            self.first_s.push(from_s);
+        }
+        self.first_s.push(row_s);
+        if self.first_s.len() <= LEAST_ROWS {
+            return;
+        }
+        let rows_s = std::mem::take(&mut self.first_s);
+        let mut gaps_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        gaps_s.sort_by(f64::total_cmp);
+        let between_s = gaps_s[gaps_s.len() / 2];
+        let (mut beat, mut last_s) = (0.0, rows_s[0]);
+        self.add(beat, last_s);
+        for &row_s in &rows_s[1..] {
+            let gap = (row_s - last_s) / between_s;
+            if gap > NO_BEAT {
+                beat += if gap < ONE_BEAT { 1.0 } else { gap.round() };
+                last_s = row_s;
+                self.add(beat, row_s);
+            }
+        }
+        self.late_s = self.line().map_or(0.0, |(zero_s, between_s)| last_s - zero_s - beat * between_s);
     }
 
     /// Takes the row that ends an interval: by how much more than at the row before it is late, seconds.
     fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
-        let Some((last, last_s)) = self.last else {
-            self.add(0.0, from_s);
-            self.add(1.0, row_s);
+        let Some((zero_s, between_s)) = self.line() else {
+            self.warm_up(from_s, row_s);
             return 0.0;
         };
-        let line = self.line();
-        let between_s =
-            line.map_or_else(|| (last_s - self.mean[1]) / (last - self.mean[0]), |(_, between_s)| between_s);
-        let beats = ((row_s - last_s) / between_s).round();
-        if beats.is_nan() || beats < 1.0 {
-            return 0.0; // Between two beats: the row of a standstill.
+        let beat = ((row_s - zero_s) / between_s).round();
+        if beat <= self.last {
+            return 0.0; // It came by itself, at a standstill.
         }
-        let late_s = line.map(|(zero_s, between_s)| row_s - zero_s - (last + beats) * between_s);
-        if late_s.is_some_and(|late_s| late_s.abs() > MISSED * between_s) {
-            self.new_beat();
-            self.add(-1.0, row_s - between_s);
-            self.add(0.0, row_s);
+        let late_s = row_s - zero_s - beat * between_s;
+        if late_s.abs() > MISSED * between_s {
+            self.missed += 1;
+            if self.missed >= MOST_MISSED {
+                *self = Self { recent: std::mem::take(&mut self.recent), ..Self::default() };
+            }
             return 0.0;
         }
-        // A beat most often begins where a run or a standstill does: nothing had been late then.
-        let later_s = late_s.map_or(0.0, |late_s| late_s - self.late_s);
-        self.late_s = late_s.unwrap_or(0.0);
-        self.add(last + beats, row_s);
+        self.missed = 0;
+        let later_s = late_s - self.late_s;
+        self.late_s = late_s;
+        self.add(beat, row_s);
         later_s
     }
 
@@ -202,7 +224,7 @@ impl ModelTerm for Term {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.new_beat();
+        *self = Self::default();
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -232,6 +254,30 @@ impl ModelTerm for Term {
 mod tests {
     use super::*;
     use crate::{Address, StreamName};
+
+    #[test]
+    fn a_jitter_of_a_third_of_the_beat_is_late_and_early_alike() {
+        let (between_s, jitter_s, rows) = (0.025, 0.008, 2000_u32);
+        for seed in 0..50 {
+            let mut stream = Address { seed, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test"));
+            let mut stamp_s = |row: u32| between_s * f64::from(row) + stream.uniform_about_zero(jitter_s);
+            let mut term = Term::default();
+            let (mut before_s, mut late_s, mut square) = (stamp_s(0), 0.0_f64, 0.0);
+            for row in 1..rows {
+                let row_s = stamp_s(row).max(before_s + 1e-3);
+                let later_s = term.next_row(before_s, row_s);
+                late_s += later_s;
+                square += later_s * later_s;
+                // Never later by more than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
+                assert!(late_s.abs() < 2.0 * between_s, "seed {seed} row {row}: {late_s}");
+                before_s = row_s;
+            }
+            // The difference of two uniform errors.
+            let expected = 2.0 * jitter_s * jitter_s / 3.0;
+            let seen = square / f64::from(rows);
+            assert!((0.8..1.2).contains(&(seen / expected)), "seed {seed}: {}", seen / expected);
+        }
+    }
 
     #[test]
     fn a_false_share_of_the_stamp_is_not_in_the_reading() {

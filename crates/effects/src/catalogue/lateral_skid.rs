@@ -33,8 +33,10 @@ impl PhysicalEffect for LateralSkid {
         Hypothesis::Terms(Shape::plain(Term))
     }
 
+    /// A robot slides out of its bend: found negative it is something else.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { skid_s: size(sizes, "skid_s")? })
+        let skid_s = size(sizes, "skid_s")?;
+        (skid_s >= 0.0).then_some(Self { skid_s })
     }
 }
 
@@ -61,6 +63,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

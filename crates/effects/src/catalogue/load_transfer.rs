@@ -33,8 +33,10 @@ impl PhysicalEffect for LoadTransfer {
         Hypothesis::Terms(Shape::plain(Term))
     }
 
+    /// The tyre that carries more is pressed flatter: found negative it is something else.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { compression_s2_m: size(sizes, "compression_s2_m")? })
+        let compression_s2_m = size(sizes, "compression_s2_m")?;
+        (compression_s2_m >= 0.0).then_some(Self { compression_s2_m })
     }
 }
 
@@ -60,6 +62,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

@@ -85,6 +85,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term {
     hinge_m_s: f64,
 }

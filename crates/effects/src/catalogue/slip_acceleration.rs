@@ -33,8 +33,10 @@ impl PhysicalEffect for SlipAcceleration {
         Hypothesis::Terms(Shape::plain(Term))
     }
 
+    /// The ground lags behind the wheel, and does not lead: found negative it is something else.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { kappa_s: size(sizes, "kappa_s")? })
+        let kappa_s = size(sizes, "kappa_s")?;
+        (kappa_s >= 0.0).then_some(Self { kappa_s })
     }
 }
 
@@ -57,6 +59,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

@@ -33,8 +33,10 @@ impl PhysicalEffect for SlipSpeed {
         Hypothesis::Terms(Shape::plain(Term))
     }
 
+    /// Contacts slip back, not ahead: found negative it is something else.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { slip_s_m: size(sizes, "slip_s_m")? })
+        let slip_s_m = size(sizes, "slip_s_m")?;
+        (slip_s_m >= 0.0).then_some(Self { slip_s_m })
     }
 }
 
@@ -57,6 +59,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

@@ -75,6 +75,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term {
     tau_s: f64,
 }

@@ -68,6 +68,7 @@ impl PhysicalEffect for TractionLoss {
     }
 }
 
+#[derive(Clone)]
 struct State {
     size: TractionLoss,
     ground_m_s: Wheels<f64>,
@@ -146,6 +147,7 @@ impl TractionLoss {
 }
 
 /// What a usual floor would lose, by the treads' speeds from row to row.
+#[derive(Clone)]
 struct Term {
     floor: State,
     holds_m_s2: f64,

@@ -33,8 +33,10 @@ impl PhysicalEffect for Wear {
         Hypothesis::Terms(Shape::plain(Term))
     }
 
+    /// A tread wears off: found negative it is something else.
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { loss_per_m: size(sizes, "loss_per_m")? })
+        let loss_per_m = size(sizes, "loss_per_m")?;
+        (loss_per_m >= 0.0).then_some(Self { loss_per_m })
     }
 }
 
@@ -62,6 +64,7 @@ impl Forward for State {
     }
 }
 
+#[derive(Clone)]
 struct Term;
 
 impl ModelTerm for Term {

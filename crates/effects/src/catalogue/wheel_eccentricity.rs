@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
 
 /// Eccentricity of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ impl PhysicalEffect for WheelEccentricity {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Shape::plain(Term { last: Wheels::both(LastAngle::NONE) }))
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -87,7 +87,10 @@ impl Forward for State {
     }
 }
 
-struct Term;
+#[derive(Clone)]
+struct Term {
+    last: Wheels<LastAngle>,
+}
 
 impl ModelTerm for Term {
     /// Plausible: 1 %, the upper end of the rule of thumb.
@@ -111,8 +114,8 @@ impl ModelTerm for Term {
                 continue;
             }
             let m_per_rad = interval.travel_m[side] / turned_rad;
-            let (sin_before, cos_before) = interval.wheel_rad[side].sin_cos();
-            let (sin, cos) = (interval.wheel_rad[side] + turned_rad).sin_cos();
+            let (sin_before, cos_before) = self.last[side].sin_cos(interval.wheel_rad[side]);
+            let (sin, cos) = self.last[side].sin_cos(interval.wheel_rad[side] + turned_rad);
             for (gradient, integral) in gradient.iter_mut().zip([cos_before - cos, sin - sin_before]) {
                 let mut travel_m = Wheels::both(0.0);
                 travel_m[side] = m_per_rad * integral;

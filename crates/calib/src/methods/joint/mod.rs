@@ -19,8 +19,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, Mounting, Rejected, drive, nominal, refuse_wrapped_counters,
 };
-use crate::likelihood::{Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning};
-use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, basis, fit_from, pass_with_innovations};
+use crate::likelihood::{
+    Chain, Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning,
+};
+use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, Want, basis, fit_from, pass, pass_with_innovations};
 
 pub use one_step::{LARGE_ROWS, OneStep, OneStepError, is_large};
 pub use profile::RISE_95;
@@ -34,10 +36,18 @@ pub struct Joint {
     pub nuisances: bool,
     /// Take looks farther apart while their errors resemble each other; without, every look counts as independent.
     pub thin: bool,
+    /// Thin displacements too. Looks in between are passed over and their way stays; displacements in between are lost, and with them precision, where their errors
+    /// resemble each other ever so little for long: what tests a model must not believe them, and a calibration is better with them.
+    pub thin_displacements: bool,
 }
 
 /// Innovations are taken for white while no component's correlation with the look before reaches this many standard errors: three components at 1 % together.
-const WHITE_BELOW: f64 = 2.935;
+pub const WHITE_BELOW: f64 = 2.935;
+/// How many before an innovation it may resemble.
+const LAGS: i32 = 5;
+/// Steps of a fit's noise end below this share of a variance where models with terms are compared: with a million innovations that is less than one in the log of the
+/// likelihood, and half of the steps.
+const EXTENDED_NOISE_SETTLED: f64 = 1e-3;
 /// In how many phases thinned looks are taken.
 const PHASES: usize = 4;
 /// Thinned further, a run would be little more than its ends.
@@ -76,11 +86,13 @@ pub struct JointFit<'a> {
     pub(crate) noise_settled: f64,
     /// The evidence of parts, where there are no records to make it of.
     pub(crate) parts: Vec<Evidence>,
+    /// Displacements count as neighbours when it is asked whether looks are white.
+    pub(crate) displacements_follow: bool,
 }
 
 impl Joint {
     /// The method as the table of contents offers it.
-    pub const DEFAULT: Self = Self { nuisances: true, thin: true };
+    pub const DEFAULT: Self = Self { nuisances: true, thin: true, thin_displacements: false };
 
     const NAME: &'static str = "joint";
 
@@ -111,6 +123,7 @@ impl Joint {
             prior,
             noise_settled,
             parts: Vec::new(),
+            displacements_follow: self.thin_displacements,
         };
         found.look_at_the_mounting();
         found.refit(None)?;
@@ -191,7 +204,7 @@ impl JointFit<'_> {
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
         let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
         let selections = Selection::of(&self.records, thinning, &self.nominal);
-        (selections[0].mean_looks() >= LEAST_LOOKS_A_RUN).then_some((thinning, selections))
+        (selections[0].mean_looks(&self.records) >= LEAST_LOOKS_A_RUN).then_some((thinning, selections))
     }
 
     /// Does [`Self::thin`] take looks farther apart than all of them?
@@ -204,43 +217,55 @@ impl JointFit<'_> {
         self.correlation() <= WHITE_BELOW
     }
 
-    /// The largest correlation of an innovation with the one before, over the components, in standard errors.
+    /// The largest correlation of an innovation with the one before, of displacements (where they are to be thinned) with several before, over the components, in standard errors.
     #[must_use]
     pub fn correlation(&self) -> f64 {
+        let times_taken = self.times_taken();
         (0..3)
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
                 for phase in &self.fit.pass.innovations {
-                    let mut of: Option<(usize, f64)> = None;
-                    for innovation in phase.iter().filter(|innovation| innovation.component == component) {
+                    let series: Vec<_> = phase.iter().filter(|innovation| innovation.component == component).collect();
+                    for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
                         count += 1.0;
-                        if let Some((chain, z)) = of
-                            && chain == innovation.chain
-                        {
-                            products += z * innovation.z;
-                            pairs += 1.0;
+                        for (lag, before) in (1..=LAGS).zip(series[..number].iter().rev()) {
+                            let weight = self.records.weight_of_pair(before.chain, innovation.chain, lag);
+                            let counts = self.displacements_follow || before.chain == innovation.chain;
+                            if counts && weight > 0.0 {
+                                products += weight * before.z * innovation.z;
+                                pairs += weight * weight;
+                            }
                         }
-                        of = Some((innovation.chain, innovation.z));
                     }
                 }
-                // Phases share their looks' errors: they count once.
-                #[allow(clippy::cast_precision_loss)]
-                let phases = self.fit.pass.innovations.len() as f64;
-                if pairs == 0.0 { 0.0 } else { products / (squares / count) / (pairs * phases).sqrt() }
+                if pairs == 0.0 { 0.0 } else { products / (squares / count) / (pairs * times_taken).sqrt() }
             })
             .fold(0.0, |largest: f64, z| largest.max(z.abs()))
     }
 
+    /// In how many phases the errors of a look are, on average: those of poses in all, as the legs between them overlap; those of a displacement where it is taken.
+    fn times_taken(&self) -> f64 {
+        let taken = |chain: usize| self.selections.iter().filter(|phase| !phase.legs[chain].is_empty()).count();
+        #[allow(clippy::cast_precision_loss)]
+        if self.records.chains.iter().all(Chain::is_displacement) {
+            let times = (0..self.records.chains.len()).map(taken).filter(|times| *times > 0);
+            let (sum, count) = times.fold((0, 0), |(sum, count), times| (sum + times, count + 1));
+            sum as f64 / f64::max(f64::from(count), 1.0)
+        } else {
+            self.fit.pass.innovations.len() as f64
+        }
+    }
+
     /// The evidence in units that can be held out: runs, or blocks where runs are few.
-    fn units(&self) -> Vec<Evidence> {
+    fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<Evidence> {
         if self.fit.pass.runs.len() >= LEAST_RUNS {
             return self.fit.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(&mut [], LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(terms, LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
     }
 
     /// Names the directions of the lengths that the looks do not determine, and keeps them nominal.
@@ -279,6 +304,17 @@ impl JointFit<'_> {
         pass_with_innovations(&self.records, &self.selections, &model, noise, free_headings, terms)
     }
 
+    /// The evidence of the same pass for terms that are tested one by one, from number `apart_from` on: there is none of two of them together.
+    #[must_use]
+    pub fn scan_apart(&self, terms: &mut [Box<dyn ModelTerm>], apart_from: usize) -> Vec<Evidence> {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
+        let mut model = self.fit.model.clone();
+        model.sizes.resize(parameters, 0.0);
+        let Fit { noise, free_headings, .. } = &self.fit;
+        let want = Want { apart_from: Some(apart_from), ..Want::default() };
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, want).runs
+    }
+
     /// The fit with further terms, their sizes free beside what is free already, on the same looks.
     ///
     /// # Errors
@@ -290,15 +326,16 @@ impl JointFit<'_> {
         columns.extend((0..parameters).map(Column::Term));
         let mut from = self.here();
         from.model.sizes = vec![0.0; parameters];
-        let mut extended = Self { columns, ..self.clone() };
+        let noise_settled = self.noise_settled.max(EXTENDED_NOISE_SETTLED);
+        let mut extended = Self { columns, noise_settled, ..self.clone() };
         extended.refit_with(Some(from), terms)?;
         Ok(extended)
     }
 
     /// Covariance of the free columns: from the observed information where runs are few and innovations white, else corrected for what the model gets wrong by the
-    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account).
+    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account). `terms` are those of the fit.
     #[must_use]
-    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+    pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let information = self.fit.information(&self.columns)?;
         let free = self.free_basis();
         let reduced = crate::likelihood::Information {
@@ -307,7 +344,7 @@ impl JointFit<'_> {
         };
         let (_, inverse) = reduced.solve()?;
         let model_based = &free * &inverse * free.transpose();
-        let units = self.units();
+        let units = self.units(terms);
         let enough = if self.thinning == Thinning::NONE { SCATTER_OF_RUNS } else { free.ncols() + 2 };
         if units.len() < enough {
             return Some(model_based);
@@ -397,7 +434,7 @@ impl JointFit<'_> {
     fn calibration(&self, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
         let Model { m_per_rad, separation_m, .. } = self.fit.model;
         let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
-        let covariance = self.covariance();
+        let covariance = self.covariance(&mut []);
         let diameter_m = geometry.wheel_diameter_m();
         let sizes = [diameter_m.left, diameter_m.right, separation_m];
         let at = |column: Column| self.columns.iter().position(|of| *of == column);

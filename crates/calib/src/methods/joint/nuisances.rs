@@ -185,7 +185,7 @@ impl JointFit<'_> {
         let runs = self.fit.pass.runs.len().max(1);
         let parts = match (apart, gate) {
             (Some(Apart::Run), gate) => self.blocks(&mut [], PARTS_OF_A_RUN, gate),
-            (_, Gate::Shut) => self.units(),
+            (_, Gate::Shut) => self.units(&mut []),
             (_, Gate::Open) => self.blocks(&mut [], LEAST_RUNS.div_ceil(runs), gate),
         };
         // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
