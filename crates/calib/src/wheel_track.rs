@@ -1,7 +1,8 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
 //! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
-//! compares the wheels with such looks integrates the same motion.
+//! compares the wheels with such looks integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
+//! the first row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
@@ -10,6 +11,8 @@ use crate::likelihood::Piece;
 
 /// An instant may miss a row by the rounding of its file.
 pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
+/// How far out of the log an instant may be, as a share of the interval there: farther, another row would have been written.
+const OUTSIDE: f64 = 0.5;
 
 /// Turns of both wheels since a run's first row.
 #[derive(Debug, Clone)]
@@ -67,7 +70,7 @@ impl<'a> WheelTrack<'a> {
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
     /// one of its intervals lies between them.
     pub(crate) fn steps(&self, from_s: f64, to_s: f64) -> Option<Vec<Wheels<f64>>> {
-        let (first, last) = (self.row_before(from_s)?, self.row_before(to_s)?);
+        let (first, last) = (self.row_at(from_s)?, self.row_at(to_s)?);
         let from = self.turn_at(first, from_s)?;
         let to = self.turn_at(last, to_s)?;
         let within = self.t_s.partition_point(|t_s| *t_s <= from_s + SAME_INSTANT_S)
@@ -109,9 +112,24 @@ impl<'a> WheelTrack<'a> {
         Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
     }
 
-    /// The last row at or before an instant.
-    fn row_before(&self, t_s: f64) -> Option<usize> {
-        self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S).checked_sub(1)
+    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of the outer interval where it is close outside of the
+    /// log; `None` farther out.
+    fn row_at(&self, t_s: f64) -> Option<usize> {
+        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S);
+        self.row_of(before, t_s)
+    }
+
+    /// The same where it is known how many rows are at or before it.
+    fn row_of(&self, before: usize, t_s: f64) -> Option<usize> {
+        let rows_s = self.t_s;
+        let last = rows_s.len() - 1;
+        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= SAME_INSTANT_S {
+            return Some(before - 1);
+        }
+        let (row, outside_s) =
+            if before == 0 { (0, rows_s[0] - t_s) } else { (last.checked_sub(1)?, t_s - rows_s[last]) };
+        let next_s = rows_s.get(row + 1).filter(|_| self.continuous)?;
+        (outside_s <= OUTSIDE * (next_s - rows_s[row])).then_some(row)
     }
 
     fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
@@ -129,24 +147,22 @@ impl<'a> WheelTrack<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Cursor<'t, 'a> {
     track: &'t WheelTrack<'a>,
-    /// The last row at or before the last instant asked for.
+    /// The row of the last instant asked for.
     row: usize,
 }
 
 impl Cursor<'_, '_> {
-    /// Goes to the last row at or before an instant; false where the log does not span it.
+    /// Goes to the row of an instant; false where the log does not span it.
     fn seek(&mut self, t_s: f64) -> bool {
         let rows_s = self.track.t_s;
-        if t_s + SAME_INSTANT_S < rows_s[0] {
-            return false;
+        let is_before = |row_s: f64| row_s <= t_s + SAME_INSTANT_S;
+        let mut before = if is_before(rows_s[self.row]) { self.row + 1 } else { 0 };
+        while before < rows_s.len() && is_before(rows_s[before]) {
+            before += 1;
         }
-        if rows_s[self.row] > t_s + SAME_INSTANT_S {
-            self.row = 0;
-        }
-        while self.row + 1 < rows_s.len() && rows_s[self.row + 1] <= t_s + SAME_INSTANT_S {
-            self.row += 1;
-        }
-        self.row + 1 < rows_s.len() || t_s <= rows_s[self.row] + SAME_INSTANT_S
+        let row = self.track.row_of(before, t_s);
+        self.row = row.unwrap_or(self.row);
+        row.is_some()
     }
 
     /// Turns of the wheels at an instant since the first row, radians.
@@ -230,12 +246,30 @@ mod tests {
 
     #[test]
     fn outside_of_the_log_and_across_gaps_nothing_is_said() {
-        for (from_s, to_s) in [(-0.1, 1.0), (1.0, 4.1), (2.0, 1.0)] {
+        for (from_s, to_s) in [(-0.6, 1.0), (1.0, 5.1), (2.0, 1.0)] {
             assert_eq!(steps(ticks(), true, from_s, to_s), None, "{from_s} {to_s}");
         }
+        // Nor is anything said beside the log of what has gaps.
+        assert_eq!(steps(ticks(), false, -0.1, 0.5), None);
         assert_eq!(steps(ticks(), false, 1.0, 2.0), Some(vec![(10.0, -10.0)]));
         assert_eq!(steps(ticks(), false, 1.2, 1.8).map(|steps| steps.len()), Some(1));
         assert_eq!(steps(ticks(), false, 0.0, 2.0), None);
+    }
+
+    #[test]
+    fn beside_the_log_the_outer_speeds_go_on() {
+        assert_eq!(steps(ticks(), true, -0.5, 1.0), Some(vec![(5.0, 0.0), (10.0, 0.0)]));
+        assert_eq!(steps(ticks(), true, 2.0, 4.5), Some(vec![(40.0, 0.0), (10.0, 0.0)]));
+        let dataset = dataset(ticks(), true);
+        let session = dataset.session();
+        let track = WheelTrack::of(&session.runs[0], session.robot).expect("a track");
+        let (mut cursor, mut pieces) = (track.cursor(), Vec::new());
+        assert!(cursor.pieces(-0.25, 2.0, &mut pieces) && cursor.pieces(2.0, 4.5, &mut pieces));
+        let sum = pieces.iter().map(|piece| piece.wheel_rad).reduce(|a, b| a.zip_with(b, |a, b| a + b));
+        // Counted on: 2.5 before the first row, 60 in the log, 10 after its last.
+        assert_eq!(sum, Some(Wheels { left: 72.5, right: -10.0 }));
+        assert!(pieces.windows(2).all(|pair| pair[0].t_s + pair[0].dt_s == pair[1].t_s));
+        assert!(!cursor.pieces(2.0, 5.1, &mut pieces));
     }
 
     #[test]
