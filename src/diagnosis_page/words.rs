@@ -237,6 +237,7 @@ pub(super) fn question(check: &Check) -> String {
     match name {
         "run_to_run" => "Is the noise the same in every run?".to_owned(),
         "outliers" => "Do no looks lie far off? (how many do)".to_owned(),
+        "log_rows" => "Do all rows of the log go on where the rows around them do? (how many do not)".to_owned(),
         "speed" => "Do residuals not go with speed?".to_owned(),
         "yaw_rate" => "… with yaw rate?".to_owned(),
         "speed_times_yaw_rate" => "… with speed times yaw rate?".to_owned(),

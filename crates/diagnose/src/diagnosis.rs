@@ -14,7 +14,8 @@ use crate::candidate::{Choice, mean_terms};
 use crate::checks::{Checked, check};
 use crate::document::{Check, Document, Finding, Gain, Verdict};
 use crate::gain::gain;
-use crate::gross::{Fault, fault, follows, left_out, sessions};
+use crate::gross::{Fault, fault, follows, left_out, sessions, wrong_wheels};
+use crate::log_rows::{self, LOG_ROWS};
 use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
@@ -129,7 +130,14 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
         Some(found) => {
             let rewritten = sessions(&found.records);
             let base = ALL_LOOKS.fit(&rewritten)?;
-            Ok(continued(&found.records, base, Some(&found), options, limits))
+            // One may hide another.
+            let without = [&options.without[..], &[found.id.to_owned()]].concat();
+            let Some(hidden) = fault(&found.records, Some(&base), &without, false) else {
+                return Ok(continued(&found.records, base, &[&found], options, limits));
+            };
+            let rewritten = sessions(&hidden.records);
+            let base = ALL_LOOKS.fit(&rewritten)?;
+            Ok(continued(&hidden.records, base, &[&found, &hidden], options, limits))
         }
         None => {
             let first = first?;
@@ -137,7 +145,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
             if share > MOST_LEFT_OUT {
                 return Err(DiagnoseError::NothingFollows { percent: 100.0 * share });
             }
-            Ok(continued(datasets, first, None, options, limits))
+            Ok(continued(datasets, first, &[], options, limits))
         }
     }
 }
@@ -240,14 +248,13 @@ const BEYOND_SCATTER: f64 = 1e-8;
 /// Whether a check asks what residuals go with, not how they scatter.
 pub(crate) fn is_covariate(name: &str) -> bool {
     !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
-        && name != "outliers"
-        && name != "run_to_run"
+        && !["outliers", "run_to_run", LOG_ROWS].contains(&name)
 }
 
 fn continued(
     datasets: &[Dataset],
     base: JointFit<'_>,
-    fault: Option<&Fault>,
+    faults: &[&Fault],
     options: &Options,
     limits: &Limits,
 ) -> Diagnosis {
@@ -255,9 +262,9 @@ fn continued(
     let lost = !follows(&base);
     let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
     // Counts that were lost are restored roughly: what lies far off by them has its name already.
-    let restored = fault.is_some_and(|fault| fault.id == "dropped_samples");
+    let restored = faults.iter().any(|fault| fault.id == "dropped_samples");
     let asked = ask(datasets, base, &catalogue, restored);
-    let mut findings: Vec<Finding> = fault.map(naming::of_fault).into_iter().collect();
+    let mut findings: Vec<Finding> = faults.iter().map(|fault| naming::of_fault(fault)).collect();
     findings.extend(naming::of_search(&asked.found));
     if asked.rivalled {
         naming::beside_unlisted(&mut findings);
@@ -276,6 +283,14 @@ fn continued(
         let signs: Vec<Finding> = scatter(&asked, options).into_iter().filter(|sign| !told(sign)).collect();
         findings.extend(signs);
     }
+    let log = log_rows::check(datasets);
+    let wrong = naming::of_wrong_records(log.as_ref(), (!lost).then(|| wrong_wheels(&asked.base)).flatten());
+    if !wrong.is_empty() {
+        for finding in &mut findings[faults.len()..] {
+            naming::or_unlisted(finding, "what is wrong with the records may do the same");
+        }
+        findings.extend(wrong);
+    }
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
@@ -285,7 +300,7 @@ fn continued(
     }
     naming::doubt(&mut findings, asked.found.model.choices.len() >= MOST_EFFECTS);
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
-    findings[usize::from(fault.is_some())..].sort_by(|a, b| b.z.total_cmp(&a.z));
+    findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);
     let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.scans.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
@@ -301,7 +316,7 @@ fn continued(
         dataset: Names::of(names.clone()),
         verdict,
         sentence: sentence(verdict, &findings, gain.as_ref()),
-        checks: asked.checked.checks,
+        checks: asked.checked.checks.into_iter().chain(log).collect(),
         findings,
         blind_to,
         sensitivity,

@@ -142,6 +142,16 @@ fn is_drive(fit: &JointFit<'_>) -> bool {
         && fit.fit.converged
 }
 
+/// Wheels that are farther from nominal than by this factor are not what they are believed to be.
+const ANOTHER_ROBOT: f64 = 1.3;
+
+/// By which factor the wheels of a fit are too large or too small for the robot that its description tells of, if they are.
+pub(crate) fn wrong_wheels(fit: &JointFit<'_>) -> Option<f64> {
+    let ratio = fit.fit.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
+    let factor = (ratio.left * ratio.right).sqrt();
+    (factor.ln().abs() > ANOTHER_ROBOT.ln()).then_some(factor)
+}
+
 /// A form of a fault.
 struct Form {
     sizes: Vec<(&'static str, f64)>,

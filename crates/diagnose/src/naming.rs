@@ -9,7 +9,7 @@ use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
 use crate::candidate::Choice;
 use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
-use crate::document::{Finding, UnlistedTerm, Value};
+use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
 use crate::search::{Extended, Found, LEAST_REACH, Name, Test, reach};
 use crate::statistics::{of_trials, z_of_p};
@@ -141,11 +141,16 @@ const DOUBTFUL_IF_FULL: f64 = 10.0;
 /// Says of effects found that what has no name would do as well.
 pub(crate) fn beside_unlisted(findings: &mut [Finding]) {
     for finding in findings.iter_mut().filter(|finding| is_mean(finding)) {
-        finding.names.retain(|name| name != "unlisted");
-        finding.names.push("unlisted".to_owned());
-        finding.probability *= 0.5;
-        finding.sentence = format!("{}; a term without a name would do as well", finding.sentence);
+        or_unlisted(finding, "a term without a name would do as well");
     }
+}
+
+/// Says of a finding that it may be the doing of something that has no name.
+pub(crate) fn or_unlisted(finding: &mut Finding, why: &str) {
+    finding.names.retain(|name| name != "unlisted");
+    finding.names.push("unlisted".to_owned());
+    finding.probability *= 0.5;
+    finding.sentence = format!("{}; {why}", finding.sentence);
 }
 
 /// Whether a finding is a mean effect with sizes.
@@ -185,6 +190,21 @@ pub(crate) fn of_lost(base: &JointFit<'_>) -> Option<Finding> {
         1e3 * sigma(NoiseComponent::LookHeading),
     );
     of_scatter(&[], 0.0, BTreeMap::new(), &what)
+}
+
+/// What is wrong with the log or with the robot's description, where no fault of the catalogue is it: rows astray, wheels that are another robot's.
+pub(crate) fn of_wrong_records(log: Option<&Check>, wheels: Option<f64>) -> Vec<Finding> {
+    let rows = log.filter(|check| !check.passes).and_then(|check| {
+        let what = format!("{:.0} rows of the log are not where the rows around them go on", check.statistic);
+        of_scatter(&[], check.p_value, BTreeMap::new(), &what)
+    });
+    let wheels = wheels.and_then(|factor| {
+        let what = format!(
+            "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
+        );
+        of_scatter(&[], 0.0, BTreeMap::new(), &what)
+    });
+    rows.into_iter().chain(wheels).collect()
 }
 
 /// The finding of a gross fault.

@@ -40,6 +40,9 @@ const INNOCENT: f64 = 0.3;
 /// Shortest way that is compared, metres, and shortest turn, radians: far above what instruments err.
 const COMPARED: [f64; 2] = [0.2, 0.5];
 
+/// A displacement goes on where the one before ended, by the rounding of a file.
+const SAME_INSTANT_S: f64 = 1e-6;
+
 /// Counts of a turn, logged over believed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -105,23 +108,46 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
         Some([0, 1].map(|k| from[k] + share * (to[k] - from[k])))
     };
     let mut found = [Vec::new(), Vec::new()];
-    let mut anchors: [Option<(Pose, [f64; 2])>; 2] = [None; 2];
-    for (t_s, seen) in run.observed_poses() {
-        let Some(counted) = at(t_s) else { continue };
-        for k in 0..2 {
-            let Some((anchor, start)) = anchors[k] else {
-                anchors[k] = Some((seen, counted));
-                continue;
-            };
-            let moved =
-                [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
-            if moved[k] > COMPARED[k] {
-                found[k].push((counted[k] - start[k]).abs() / moved[k]);
-                anchors[k] = Some((seen, counted));
+    for seen in seen(run) {
+        let mut anchors: [Option<(Pose, [f64; 2])>; 2] = [None; 2];
+        for (t_s, seen) in seen {
+            let Some(counted) = at(t_s) else { continue };
+            for k in 0..2 {
+                let Some((anchor, start)) = anchors[k] else {
+                    anchors[k] = Some((seen, counted));
+                    continue;
+                };
+                let moved =
+                    [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
+                if moved[k] > COMPARED[k] {
+                    found[k].push((counted[k] - start[k]).abs() / moved[k]);
+                    anchors[k] = Some((seen, counted));
+                }
             }
         }
     }
     Some(found)
+}
+
+/// What the instrument saw, in stretches that hang together: its poses, or displacements that follow each other, each from the first one's start.
+fn seen(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
+    let displacements = &run.run().displacements;
+    if displacements.is_empty() {
+        return vec![run.observed_poses()];
+    }
+    displacements
+        .chunk_by(|before, after| (after.t0_s - before.t1_s).abs() <= SAME_INSTANT_S)
+        .map(|stretch| {
+            let mut poses: Vec<(f64, Pose)> =
+                stretch.first().map(|first| (first.t0_s, Pose::IDENTITY)).into_iter().collect();
+            let mut at = Pose::IDENTITY;
+            poses.extend(stretch.iter().map(|moved| {
+                at = at * Pose::new(moved.dx_m, moved.dy_m, moved.dtheta_rad);
+                (moved.t1_s, at)
+            }));
+            poses
+        })
+        .collect()
 }
 
 /// Logged over true counts, by the ways; by the turns where no way was long enough. Absent where the middle one of all is no gross fault.

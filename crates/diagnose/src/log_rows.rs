@@ -1,0 +1,134 @@
+//! What the log shows by itself, whatever an instrument saw: rows whose counts are not where the rows around them go on.
+//!
+//! A wheel that turns steadily before and after a row turned as fast in between. Of the speeds of two rows before an increment and two after it (the next one
+//! may give back what was astray) the range R is known; were the increment as uncertain as these four, it would be 20 R off with a chance of 1.6e-5 only: P(R < r) ≈
+//! 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables. What is so far off so often has a cause, whether it has a name or not.
+
+use dataset::{Dataset, Odometry, WheelLog};
+use statrs::distribution::{DiscreteCDF, Poisson};
+
+use crate::document::Check;
+
+/// An increment that is off by so many ranges of the four around it is astray.
+const ASTRAY: f64 = 20.0;
+/// Chance of an increment to be that by the scatter of steady wheels.
+const BY_CHANCE: f64 = 1.6e-5;
+/// Two increments of a steady wheel differ by as many counts, and their range is not less.
+const ROUNDING: f64 = 2.0;
+/// A wheel that does less than this share of what the rows around it do stands: a robot may stop for a row.
+const STANDS: f64 = 0.1;
+/// Chance at which a log shows that something is wrong with it.
+const LOG_LEVEL: f64 = 1e-6;
+
+/// The check's name.
+pub(crate) const LOG_ROWS: &str = "log_rows";
+
+/// How many increments a log has, and how many of them are astray.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Rows {
+    all: usize,
+    astray: usize,
+}
+
+/// Asks the counts of all runs; robots that report no counts are not asked.
+pub(crate) fn check(datasets: &[Dataset]) -> Option<Check> {
+    let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
+        let of = of_run(&run.odometry, run.info.continuous);
+        Rows { all: sum.all + of.all, astray: sum.astray + of.astray }
+    });
+    #[allow(clippy::cast_precision_loss)]
+    let chance = Poisson::new(BY_CHANCE * rows.all as f64).ok()?;
+    let p_value = rows.astray.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
+    #[allow(clippy::cast_precision_loss)]
+    let statistic = rows.astray as f64;
+    Some(Check { name: LOG_ROWS.to_owned(), statistic, p_value, passes: p_value >= LOG_LEVEL })
+}
+
+fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
+    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return Rows::default() };
+    if !continuous {
+        return Rows::default();
+    }
+    let of = ticks.as_ref().map(|column| of_column(t_s, column));
+    Rows { all: of.left.all + of.right.all, astray: of.left.astray + of.right.astray }
+}
+
+#[allow(clippy::cast_precision_loss)] // counts are far under 2⁵³
+fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
+    let mut rows = Rows::default();
+    let rates: Vec<(f64, f64)> = t_s
+        .windows(2)
+        .zip(ticks.windows(2))
+        .map(|(t_s, ticks)| (t_s[1] - t_s[0], (ticks[1] - ticks[0]) as f64))
+        .map(|(dt_s, counts)| (dt_s, counts / dt_s))
+        .collect();
+    for near in rates.windows(6) {
+        let (dt_s, rate) = near[2];
+        let around = [near[0].1, near[1].1, near[4].1, near[5].1];
+        let mean = around.iter().sum::<f64>() / 4.0;
+        let (least, most) =
+            around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), rate| (a.min(*rate), b.max(*rate)));
+        rows.all += 1;
+        let uncertain = ((most - least) * dt_s).max(ROUNDING);
+        let stands = rate.abs() < STANDS * mean.abs() || mean == 0.0;
+        if !stands && ((rate - mean) * dt_s).abs() > ASTRAY * uncertain {
+            rows.astray += 1;
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot that starts, cruises, stops for two rows, goes on, slows down, in rows of 20 ms that jitter.
+    fn column(jitter_s: f64) -> (Vec<f64>, Vec<i64>) {
+        let stamp_s = |row: i32| 0.02 * f64::from(row) + jitter_s * (2.4 * f64::from(row)).sin();
+        let speed = |t_s: f64| {
+            let stopped = (3.0..3.04).contains(&t_s);
+            if stopped { 0.0 } else { 30_000.0 * (t_s - 0.5).clamp(0.0, 1.0).min((7.0 - t_s).clamp(0.0, 1.0)) }
+        };
+        let (mut way, mut last_s) = (0.0, 0.0);
+        let row = |row| {
+            let t_s = stamp_s(row);
+            way += speed(0.5 * (t_s + last_s)) * (t_s - last_s);
+            last_s = t_s;
+            #[allow(clippy::cast_possible_truncation)]
+            let counts = f64::round(way) as i64;
+            (t_s, counts)
+        };
+        (0..400).map(row).unzip()
+    }
+
+    #[test]
+    fn a_sound_log_has_no_rows_astray() {
+        for jitter_s in [0.0, 1e-3, 5e-3] {
+            let (t_s, ticks) = column(jitter_s);
+            assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, astray: 0 }, "{jitter_s}");
+        }
+    }
+
+    #[test]
+    fn rows_that_are_torn_or_lost_with_their_counts_are_astray() {
+        let (t_s, sound) = column(0.0);
+        let mut torn = sound.clone();
+        [100, 130, 200].map(|row| torn[row] += 256);
+        assert_eq!(of_column(&t_s, &torn).astray, 3);
+        let (mut t_s, mut lost) = (t_s, sound);
+        for row in [220, 130, 100] {
+            let counts = lost[row] - lost[row - 1];
+            lost[row..].iter_mut().for_each(|count| *count -= counts);
+            t_s.remove(row);
+            lost.remove(row);
+        }
+        assert_eq!(of_column(&t_s, &lost).astray, 3);
+        // Counters that went on over the gap are where they should be.
+        let (mut t_s, mut sound) = column(0.0);
+        for row in [220, 130, 100] {
+            t_s.remove(row);
+            sound.remove(row);
+        }
+        assert_eq!(of_column(&t_s, &sound).astray, 0);
+    }
+}
