@@ -476,8 +476,7 @@ fn the_scenario_document_has_every_key_and_every_effect() {
             assert!(row.contains(&format!("`{key}`")), "docs/scenario.md: the row of {id} lacks {key}");
         }
     }
-    let channels =
-        effects::Channel::MOTION.into_iter().chain(effects::Channel::SEEN).map(|channel| channel.name().to_owned());
+    let channels = effects::Channel::all().map(|channel| channel.name().to_owned());
     for name in effects::Covariate::NAMED.iter().map(effects::Covariate::name).chain(channels) {
         // A bar would end a table's cell.
         let name = name.replace('|', "\\|");

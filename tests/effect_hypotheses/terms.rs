@@ -21,7 +21,7 @@ fn with(mut scenario: Scenario, term: &SparseTerm) -> Scenario {
 }
 
 /// Channel, covariates, coefficient, and the share of the whole that may remain; [`crate::means`] says of the last whence it comes.
-const CASES: [(Channel, &[&str], f64, f64); 26] = [
+const CASES: [(Channel, &[&str], f64, f64); 31] = [
     (Channel::Along, &["v", "|v|"], 0.1, 0.0),
     (Channel::Along, &["|omega|"], 0.005, 0.0),
     (Channel::Along, &["v", "cos(theta)"], 0.03, 0.0),
@@ -50,6 +50,13 @@ const CASES: [(Channel, &[&str], f64, f64); 26] = [
     (Channel::SeenAlong, &["cos(theta)"], 0.02, 0.0),
     (Channel::SeenHeading, &["sin(theta)"], 0.02, 0.03),
     (Channel::SeenHeading, &["1"], 0.02, 0.0),
+    (Channel::SeenLate, &["time in run"], 0.1, 0.06),
+    (Channel::Wheels, &["wheel v", "|wheel v|"], 0.1, 0.0),
+    // A wheel that starts within a row has its sense for all of it.
+    (Channel::Wheels, &["wheel sense"], 0.003, 0.03),
+    (Channel::LeftWheel, &["wheel acceleration"], 0.03, 0.06),
+    // A row knows the time at its start.
+    (Channel::RightWheel, &["|wheel v|", "time in run"], 0.1, 2e-3),
 ];
 
 /// As for the means of the catalogue: what counts and rows hide.
@@ -83,7 +90,7 @@ fn every_covariate_and_every_channel_is_tried() {
     for name in Covariate::NAMED.iter().map(Covariate::name) {
         assert!(CASES.iter().any(|(_, covariates, ..)| covariates.contains(&name.as_str())), "{name}");
     }
-    for channel in Channel::MOTION.into_iter().chain(Channel::SEEN) {
+    for channel in Channel::all() {
         assert!(CASES.iter().any(|(tried, ..)| *tried == channel), "{channel:?}");
     }
 }

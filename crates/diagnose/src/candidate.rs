@@ -72,7 +72,7 @@ pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
     choices.iter().filter_map(Choice::term).collect()
 }
 
-/// The terms of candidates, in order; those of one product on every channel of the motion, one after the other, come as one.
+/// The terms of candidates, in order; those of one product on all channels of the motion or of the wheels, one after the other, come as one.
 pub(crate) fn terms_together(choices: &[&Choice]) -> Vec<Box<dyn ModelTerm>> {
     let mut terms = Vec::new();
     let mut left = choices;
@@ -86,10 +86,10 @@ pub(crate) fn terms_together(choices: &[&Choice]) -> Vec<Box<dyn ModelTerm>> {
             }
         };
         let is_on = |(choice, channel): (&&Choice, Channel)| matches!(choice, Choice::Sparse(sparse) if sparse.channel == channel && sparse.covariates == product.covariates);
-        let channels = Channel::MOTION.len();
-        if left.len() >= channels && left.iter().zip(Channel::MOTION).all(is_on) {
-            terms.push(product.term_on_motion());
-            left = &left[channels..];
+        let all_on = |channels: &[Channel; 3]| left.len() >= 3 && left.iter().zip(*channels).all(is_on);
+        if let Some(channels) = [Channel::MOTION, Channel::WHEELS].into_iter().find(all_on) {
+            terms.push(product.term_on(channels));
+            left = &left[channels.len()..];
         } else {
             terms.push(product.term());
             left = rest;

@@ -94,8 +94,9 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             let (ids, what) = match follows {
                 Follows::TheSame => (stays, "single large errors that stay: the robot jumped"),
                 Follows::TheOpposite => (errs, "single large errors of the instrument, undone in the next look"),
+                // Tails have many causes.
                 Follows::Nothing => (
-                    [stays, errs].concat(),
+                    [&stays[..], &errs, &["unlisted"]].concat(),
                     "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
                 ),
             };

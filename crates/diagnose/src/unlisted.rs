@@ -69,14 +69,34 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         products.push(vec![CosPhase(side)]);
         products.push(vec![SinPhase(side)]);
     }
+    let wheels = of_wheels(fit).into_iter().flat_map(|covariates| {
+        Channel::WHEELS.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+    });
     let moved = products.into_iter().flat_map(|covariates| {
         Channel::MOTION.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
-    let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading]];
+    let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
     let seen = seen.into_iter().flat_map(|covariates| {
         Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
-    moved.chain(seen).collect()
+    moved.chain(wheels).chain(seen).collect()
+}
+
+/// What wheels may do by themselves. Their way alone is their size, which every fit has.
+fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
+    use Covariate::{
+        AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, SinceReversal, Way, WheelAcceleration, WheelSense, WheelSpeed,
+    };
+    let modulators = [AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, Way, SinceReversal];
+    let modulators: Vec<Covariate> = modulators.into_iter().chain(of_runs(fit)).collect();
+    let mut products = vec![vec![AbsWheelSpeed], vec![WheelSense], vec![WheelAcceleration]];
+    products.push(vec![WheelAcceleration, AbsWheelSpeed]);
+    products.push(vec![WheelSpeed, AbsWheelSpeed, AbsWheelSpeed]);
+    for rate in [WheelSpeed, AbsWheelSpeed, WheelSense] {
+        let own = modulators.iter().filter(|modulator| !(rate == WheelSense && **modulator == AbsWheelSpeed));
+        products.extend(own.map(|modulator| vec![rate.clone(), modulator.clone()]));
+    }
+    products
 }
 
 /// The best sparse term beside a model.

@@ -18,19 +18,34 @@ pub enum Channel {
     Across,
     /// The heading, rad/s.
     Yaw,
+    /// The way of each wheel's contact, by what that wheel does, m/s.
+    Wheels,
+    /// The way of the left wheel's contact, m/s.
+    LeftWheel,
+    /// The way of the right wheel's contact, m/s.
+    RightWheel,
     /// What the instrument sees, ahead of the robot, metres.
     SeenAlong,
     /// What the instrument sees, to the left of the robot, metres.
     SeenAcross,
     /// The heading that the instrument sees, radians.
     SeenHeading,
+    /// How long before its stamp the instrument sees the robot, seconds.
+    SeenLate,
 }
 
 impl Channel {
-    /// Of the motion.
+    /// Of the motion of the drive's centre.
     pub const MOTION: [Self; 3] = [Self::Along, Self::Across, Self::Yaw];
+    /// Of the wheels.
+    pub const WHEELS: [Self; 3] = [Self::Wheels, Self::LeftWheel, Self::RightWheel];
     /// Of the instrument.
-    pub const SEEN: [Self; 3] = [Self::SeenAlong, Self::SeenAcross, Self::SeenHeading];
+    pub const SEEN: [Self; 4] = [Self::SeenAlong, Self::SeenAcross, Self::SeenHeading, Self::SeenLate];
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::MOTION.into_iter().chain(Self::WHEELS).chain(Self::SEEN)
+    }
 
     /// Its name in findings and scenarios.
     #[must_use]
@@ -39,9 +54,13 @@ impl Channel {
             Self::Along => "along",
             Self::Across => "across",
             Self::Yaw => "yaw",
+            Self::Wheels => "wheels",
+            Self::LeftWheel => "left_wheel",
+            Self::RightWheel => "right_wheel",
             Self::SeenAlong => "seen_along",
             Self::SeenAcross => "seen_across",
             Self::SeenHeading => "seen_heading",
+            Self::SeenLate => "seen_late",
         }
     }
 
@@ -49,6 +68,17 @@ impl Channel {
     #[must_use]
     pub fn is_seen(self) -> bool {
         Self::SEEN.contains(&self)
+    }
+
+    /// Is it the way of wheels, each by what it does itself?
+    #[must_use]
+    pub fn is_of_wheels(self) -> bool {
+        Self::WHEELS.contains(&self)
+    }
+
+    /// Is it the way of this wheel, alone or among others?
+    pub(crate) fn is_of(self, side: Side) -> bool {
+        self == Self::Wheels || self == if side == Side::Left { Self::LeftWheel } else { Self::RightWheel }
     }
 }
 
@@ -67,6 +97,14 @@ pub enum Covariate {
     Acceleration,
     /// `yaw_acceleration`: change of ω, over 1 rad/s².
     YawAcceleration,
+    /// `wheel v`: speed of the wheel's own contact over 1 m/s.
+    WheelSpeed,
+    /// `|wheel v|`.
+    AbsWheelSpeed,
+    /// `wheel sense`: 1 where the wheel's contact goes forward, −1 where it goes back, 0 where it stands.
+    WheelSense,
+    /// `wheel acceleration`: change of the contact's speed, over 1 m/s².
+    WheelAcceleration,
     /// `cos(theta)`: of the heading in the room.
     CosHeading,
     /// `sin(theta)`: of the heading in the room.
@@ -100,13 +138,17 @@ pub enum Covariate {
 
 impl Covariate {
     /// Those that have a name of their own: all but [`Self::OfRun`].
-    pub const NAMED: [Self; 18] = [
+    pub const NAMED: [Self; 22] = [
         Self::Speed,
         Self::AbsSpeed,
         Self::YawRate,
         Self::AbsYawRate,
         Self::Acceleration,
         Self::YawAcceleration,
+        Self::WheelSpeed,
+        Self::AbsWheelSpeed,
+        Self::WheelSense,
+        Self::WheelAcceleration,
         Self::CosHeading,
         Self::SinHeading,
         Self::CosPhase(Side::Left),
@@ -131,6 +173,10 @@ impl Covariate {
             Self::AbsYawRate => "|omega|",
             Self::Acceleration => "acceleration",
             Self::YawAcceleration => "yaw_acceleration",
+            Self::WheelSpeed => "wheel v",
+            Self::AbsWheelSpeed => "|wheel v|",
+            Self::WheelSense => "wheel sense",
+            Self::WheelAcceleration => "wheel acceleration",
             Self::CosHeading => "cos(theta)",
             Self::SinHeading => "sin(theta)",
             Self::CosPhase(Side::Left) => "v cos(left wheel)",
@@ -177,13 +223,19 @@ impl Covariate {
                 | Self::YawAcceleration
                 | Self::CosPhase(_)
                 | Self::SinPhase(_)
-        )
+        ) || self.is_of_a_wheel()
     }
 
-    /// Is it known of a look: of the robot's twist and heading then?
+    /// Is it what the wheel does whose way it is about? Channels of wheels have it alone.
+    #[must_use]
+    pub const fn is_of_a_wheel(&self) -> bool {
+        matches!(self, Self::WheelSpeed | Self::AbsWheelSpeed | Self::WheelSense | Self::WheelAcceleration)
+    }
+
+    /// Is it known of a look: of the robot's twist and heading then, and of the time?
     #[must_use]
     pub const fn is_of_a_look(&self) -> bool {
-        matches!(self, Self::CosHeading | Self::SinHeading) || self.is_a_speed()
+        matches!(self, Self::CosHeading | Self::SinHeading | Self::RunTime) || self.is_a_speed()
     }
 
     /// Is it v or ω, with or without its sign?
@@ -200,6 +252,11 @@ impl Covariate {
             Self::AbsYawRate => at.omega_rad_s.abs(),
             Self::Acceleration => at.acceleration_m_s2,
             Self::YawAcceleration => at.yaw_acceleration_rad_s2,
+            Self::WheelSpeed => at.own_m_s,
+            Self::AbsWheelSpeed => at.own_m_s.abs(),
+            Self::WheelSense if at.own_m_s == 0.0 => 0.0,
+            Self::WheelSense => at.own_m_s.signum(),
+            Self::WheelAcceleration => at.own_m_s2,
             Self::CosHeading => at.heading_rad.cos(),
             Self::SinHeading => at.heading_rad.sin(),
             Self::CosPhase(side) => at.wheel_m_s[*side] * at.wheel_rad[*side].cos(),
@@ -216,6 +273,7 @@ impl Covariate {
 }
 
 /// What covariates are made of.
+#[derive(Clone, Copy)]
 pub(crate) struct Moment<'r> {
     pub(crate) v_m_s: f64,
     pub(crate) omega_rad_s: f64,
@@ -223,7 +281,11 @@ pub(crate) struct Moment<'r> {
     pub(crate) yaw_acceleration_rad_s2: f64,
     pub(crate) heading_rad: f64,
     pub(crate) wheel_m_s: Wheels<f64>,
+    pub(crate) wheel_m_s2: Wheels<f64>,
     pub(crate) wheel_rad: Wheels<f64>,
+    /// Of the wheel in question.
+    pub(crate) own_m_s: f64,
+    pub(crate) own_m_s2: f64,
     pub(crate) run_s: f64,
     pub(crate) session_s: f64,
     pub(crate) session_m: f64,
@@ -231,6 +293,13 @@ pub(crate) struct Moment<'r> {
     pub(crate) x_m: f64,
     pub(crate) y_m: f64,
     pub(crate) of_run: &'r BTreeMap<String, f64>,
+}
+
+impl Moment<'_> {
+    /// The same for what a wheel does itself.
+    pub(crate) fn of_wheel(&self, side: Side) -> Self {
+        Self { own_m_s: self.wheel_m_s[side], own_m_s2: self.wheel_m_s2[side], ..*self }
+    }
 }
 
 /// Way back that counts as a reversal, metres: more than the counts of a standstill.
@@ -273,7 +342,7 @@ mod tests {
             assert_eq!(Covariate::named(&covariate.name()), Some(covariate));
         }
         assert_eq!(Covariate::named("speed"), None);
-        for channel in Channel::MOTION.into_iter().chain(Channel::SEEN) {
+        for channel in Channel::all() {
             let read =
                 Channel::deserialize(serde::de::value::StrDeserializer::<serde::de::value::Error>::new(channel.name()))
                     .expect("a channel");
@@ -291,7 +360,10 @@ mod tests {
             yaw_acceleration_rad_s2: 0.9,
             heading_rad: 0.5,
             wheel_m_s: Wheels { left: 0.4, right: -0.6 },
+            wheel_m_s2: Wheels { left: 0.0, right: 0.8 },
             wheel_rad: Wheels { left: 1.1, right: 2.3 },
+            own_m_s: 0.0,
+            own_m_s2: 0.0,
             run_s: 30.0,
             session_s: 900.0,
             session_m: 25.0,
@@ -299,7 +371,8 @@ mod tests {
             x_m: 1.5,
             y_m: -2.5,
             of_run: &load,
-        };
+        }
+        .of_wheel(Side::Right);
         let (cos, sin) = (f64::cos, f64::sin);
         let expected = [
             -0.3,
@@ -308,6 +381,10 @@ mod tests {
             0.7,
             0.2,
             0.9,
+            -0.6,
+            0.6,
+            -1.0,
+            0.8,
             cos(0.5),
             sin(0.5),
             0.4 * cos(1.1),

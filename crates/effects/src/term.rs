@@ -1,6 +1,7 @@
 //! `term`: what no name of the catalogue explains, as a coefficient times a product of at most three covariates on one channel.
 //!
-//! Model: along, across and yaw gain coefficient · Π covariates per second; seen_along, seen_across and seen_heading are off by coefficient · Π covariates.
+//! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the way of wheels, each by covariates of its own; seen_along, seen_across and
+//! seen_heading are off by coefficient · Π covariates, and seen_late is so long ago.
 //! [`Sparse`] is the hypothesis face, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the forward face, as
 //! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes with.
 //!
@@ -50,14 +51,20 @@ impl Sparse {
         Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false })
     }
 
-    /// The terms of the same product on every channel of the motion in turn, as one: the product is found once for all.
+    /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
     #[must_use]
-    pub fn term_on_motion(&self) -> Box<dyn ModelTerm> {
-        Box::new(OnMotion(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false }))
+    pub fn term_on(&self, channels: [Channel; 3]) -> Box<dyn ModelTerm> {
+        let recorded = Recorded { of: self.clone(), reversals: Reversals::NONE, started: false };
+        Box::new(OnThree { recorded, channels })
     }
 
     fn product(&self, at: &Moment<'_>) -> f64 {
         self.covariates.iter().map(|covariate| covariate.value(at)).product()
+    }
+
+    /// The product for each wheel by what it does itself; 0 for one that the channel leaves alone.
+    fn of_wheels(&self, channel: Channel, at: &Moment<'_>) -> Wheels<f64> {
+        Wheels::from_sides(|side| if channel.is_of(side) { self.product(&at.of_wheel(side)) } else { 0.0 })
     }
 }
 
@@ -110,14 +117,20 @@ impl SparseTerm {
         } else {
             self.covariates.iter().map(|name| self.covariate(name)).collect::<Result<_, _>>()?
         };
+        let of_wheels = self.channel.is_of_wheels();
+        if let Some(own) = covariates.iter().find(|covariate| covariate.is_of_a_wheel() && !of_wheels) {
+            let wheels = Channel::WHEELS.map(Channel::name).join(", ");
+            return no_term(format!("\"{}\" goes with {wheels} alone, and not with {channel}", own.name()));
+        }
         let (what, holds) = if self.channel.is_seen() {
             ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
         } else {
             ("must vanish at standstill and needs one of these", covariates.iter().any(Covariate::vanishes_at_rest))
         };
         if !holds {
-            let fits = |covariate: &&Covariate| {
-                if self.channel.is_seen() { covariate.is_of_a_look() } else { covariate.vanishes_at_rest() }
+            let fits = |covariate: &&Covariate| match self.channel.is_seen() {
+                true => covariate.is_of_a_look(),
+                false => covariate.vanishes_at_rest() && (of_wheels || !covariate.is_of_a_wheel()),
             };
             return no_term(format!("{channel} {what}: {}", listed(Covariate::NAMED.iter().filter(fits))));
         }
@@ -219,6 +232,9 @@ impl Forward for State {
             yaw_acceleration_rad_s2: turn(wheel_m_s2),
             heading_rad: step.world_from_body.theta_rad + omega_rad_s * half_s,
             wheel_m_s,
+            wheel_m_s2,
+            own_m_s: 0.0,
+            own_m_s2: 0.0,
             wheel_rad: step.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turned| angle + 0.5 * turned),
             run_s: step.t_s + half_s,
             session_s: self.session_s + step.t_s + half_s,
@@ -229,8 +245,13 @@ impl Forward for State {
             of_run: &self.of_run,
         };
         self.session_m += distance_m.abs();
-        let size = self.size.coefficient * self.sparse.product(&at) * step.dt_s;
+        let scale = self.size.coefficient * step.dt_s;
+        let size = scale * self.sparse.product(&at);
         match self.sparse.channel {
+            channel if channel.is_of_wheels() => {
+                let gained = self.sparse.of_wheels(channel, &at);
+                step.travel_m = step.travel_m.zip_with(gained, |travel_m, gained| travel_m + scale * gained);
+            }
             Channel::Along => step.travel_m = step.travel_m.map(|travel_m| travel_m + size),
             Channel::Across => step.lateral_m += size,
             _ => step.extra_turn_rad += size,
@@ -238,8 +259,9 @@ impl Forward for State {
     }
 
     fn instrument(&mut self, sighting: &mut Sighting) {
-        let size = self.size.coefficient * self.sparse.product(&seen(self.speeds, sighting.world_from_body));
-        sighting.world_from_body = sighting.world_from_body * on_channel(self.sparse.channel, size);
+        let at = seen(self.speeds, sighting.world_from_body, sighting.t_s);
+        let size = self.size.coefficient * self.sparse.product(&at);
+        sighting.world_from_body = sighting.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -257,8 +279,8 @@ impl Forward for State {
     }
 }
 
-/// A moment at which an instrument looks: twist and heading alone are known of it.
-fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose) -> Moment<'static> {
+/// A moment at which an instrument looks: twist, heading and time alone are known of it.
+fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> Moment<'static> {
     static NONE: BTreeMap<String, f64> = BTreeMap::new();
     Moment {
         v_m_s,
@@ -267,8 +289,11 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose) -> Moment<'stat
         yaw_acceleration_rad_s2: 0.0,
         heading_rad: world_from_body.theta_rad,
         wheel_m_s: Wheels::both(0.0),
+        wheel_m_s2: Wheels::both(0.0),
+        own_m_s: 0.0,
+        own_m_s2: 0.0,
         wheel_rad: Wheels::both(0.0),
-        run_s: 0.0,
+        run_s,
         session_s: 0.0,
         session_m: 0.0,
         since_reversal_m: f64::INFINITY,
@@ -278,11 +303,13 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose) -> Moment<'stat
     }
 }
 
-fn on_channel(channel: Channel, size: f64) -> Pose {
+/// A size on a channel that is none of the wheels', by v and ω.
+fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
     match channel {
-        Channel::Along | Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
         Channel::Across | Channel::SeenAcross => Pose::new(0.0, size, 0.0),
         Channel::Yaw | Channel::SeenHeading => Pose::new(0.0, 0.0, size),
+        Channel::SeenLate => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
+        _ => Pose::new(size, 0.0, 0.0),
     }
 }
 
@@ -294,32 +321,40 @@ struct Recorded {
     started: bool,
 }
 
-/// A rate of 1 per cent at unit covariates would be large for a real robot.
-const ALONG: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m/s", plausible: 0.02 }];
-const YAW: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad/s", plausible: 0.02 }];
-const SEEN: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "m", plausible: 0.02 }];
-const SEEN_HEADING: [TermParameter; 1] = [TermParameter { name: "coefficient", unit: "rad", plausible: 0.02 }];
+/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second.
+const fn parameter(channel: Channel) -> TermParameter {
+    let unit = match channel {
+        Channel::Yaw => "rad/s",
+        Channel::SeenAlong | Channel::SeenAcross => "m",
+        Channel::SeenHeading => "rad",
+        Channel::SeenLate => "s",
+        _ => "m/s",
+    };
+    TermParameter { name: "coefficient", unit, plausible: 0.02 }
+}
 
 impl Recorded {
-    /// What the product gains in an interval that takes time.
-    fn gained(&mut self, interval: &Interval<'_>) -> f64 {
+    /// The middle of an interval that takes time.
+    fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
         let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
-        let before = interval.previous_speed_m_s();
+        let (now, before) = (interval.speed_m_s(), interval.previous_speed_m_s());
         let between_s = 0.5 * (interval.dt_s + interval.previous_dt_s);
-        let (mut acceleration_m_s2, mut yaw_acceleration_rad_s2) = (0.0, 0.0);
+        let mut wheel_m_s2 = Wheels::both(0.0);
         if std::mem::replace(&mut self.started, true) {
-            acceleration_m_s2 = (v_m_s - 0.5 * (before.left + before.right)) / between_s;
-            let omega_before = (before.right - before.left) / interval.wheel_separation_m;
-            yaw_acceleration_rad_s2 = (omega_rad_s - omega_before) / between_s;
+            wheel_m_s2 = now.zip_with(before, |now, before| (now - before) / between_s);
         }
-        let at = Moment {
+        let Wheels { left, right } = wheel_m_s2;
+        Moment {
             v_m_s,
             omega_rad_s,
-            acceleration_m_s2,
-            yaw_acceleration_rad_s2,
+            acceleration_m_s2: 0.5 * (left + right),
+            yaw_acceleration_rad_s2: (right - left) / interval.wheel_separation_m,
             heading_rad: interval.world_from_body.theta_rad + 0.5 * turn_rad,
-            wheel_m_s: interval.speed_m_s(),
+            wheel_m_s: now,
+            wheel_m_s2,
+            own_m_s: 0.0,
+            own_m_s2: 0.0,
             wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
             run_s: interval.t_s,
             session_s: interval.session_s(),
@@ -328,19 +363,29 @@ impl Recorded {
             x_m: interval.world_from_body.x_m,
             y_m: interval.world_from_body.y_m,
             of_run: &interval.run.covariates,
-        };
-        self.of.product(&at) * interval.dt_s
+        }
+    }
+
+    /// What an interval's motion gains on a channel.
+    fn gained(&self, channel: Channel, at: &Moment<'_>, interval: &Interval<'_>) -> Pose {
+        if channel.is_of_wheels() {
+            return interval.change(self.of.of_wheels(channel, at).map(|product| product * interval.dt_s));
+        }
+        on_channel(channel, self.of.product(at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
     }
 }
 
 impl ModelTerm for Recorded {
     fn parameters(&self) -> &'static [TermParameter] {
-        match self.of.channel {
-            Channel::Along | Channel::Across => &ALONG,
-            Channel::Yaw => &YAW,
-            Channel::SeenAlong | Channel::SeenAcross => &SEEN,
-            Channel::SeenHeading => &SEEN_HEADING,
-        }
+        const EACH: [[TermParameter; 1]; 5] = [
+            [parameter(Channel::Along)],
+            [parameter(Channel::Yaw)],
+            [parameter(Channel::SeenAlong)],
+            [parameter(Channel::SeenHeading)],
+            [parameter(Channel::SeenLate)],
+        ];
+        let unit = parameter(self.of.channel).unit;
+        EACH.iter().find(|[of]| of.unit == unit).map_or(&EACH[0], |own| own)
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -349,37 +394,44 @@ impl ModelTerm for Recorded {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
-            gradient[0] = on_channel(self.of.channel, self.gained(interval));
+            let at = self.moment(interval);
+            gradient[0] = self.gained(self.of.channel, &at, interval);
         }
     }
 
     fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
         if self.of.channel.is_seen() {
             let speeds = (look.twist.v_m_s, look.twist.omega_rad_s);
-            gradient[0] = on_channel(self.of.channel, self.of.product(&seen(speeds, look.world_from_body)));
+            let product = self.of.product(&seen(speeds, look.world_from_body, look.t_s));
+            gradient[0] = on_channel(self.of.channel, product, speeds);
         }
     }
 }
 
-/// One product on every channel of the motion.
+/// One product on three channels of the motion.
 #[derive(Clone)]
-struct OnMotion(Recorded);
+struct OnThree {
+    recorded: Recorded,
+    channels: [Channel; 3],
+}
 
-impl ModelTerm for OnMotion {
+impl ModelTerm for OnThree {
     fn parameters(&self) -> &'static [TermParameter] {
-        const ALL: [TermParameter; Channel::MOTION.len()] = [ALONG[0], ALONG[0], YAW[0]];
-        &ALL
+        const MOTION: [TermParameter; 3] =
+            [parameter(Channel::Along), parameter(Channel::Across), parameter(Channel::Yaw)];
+        const WHEELS: [TermParameter; 3] = [parameter(Channel::Wheels); 3];
+        if self.channels == Channel::WHEELS { &WHEELS } else { &MOTION }
     }
 
     fn restart(&mut self, run: &RunInfo) {
-        self.0.restart(run);
+        self.recorded.restart(run);
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if interval.dt_s > 0.0 {
-            let gained = self.0.gained(interval);
-            for (gradient, channel) in gradient.iter_mut().zip(Channel::MOTION) {
-                *gradient = on_channel(channel, gained);
+            let at = self.recorded.moment(interval);
+            for (gradient, channel) in gradient.iter_mut().zip(self.channels) {
+                *gradient = self.recorded.gained(channel, &at, interval);
             }
         }
     }
@@ -422,6 +474,27 @@ mod tests {
             is(along, expected[0]);
             is(across, expected[1]);
             is(yaw, expected[2]);
+        }
+    }
+
+    #[test]
+    fn a_wheel_gains_by_what_it_does_itself() {
+        // Contacts at 0.2 m/s and −0.4 m/s: c v|v| for 1 ms.
+        let expected = Wheels { left: 4e-6, right: -1.6e-5 };
+        for (channel, has) in [
+            (Channel::Wheels, Wheels::both(1.0)),
+            (Channel::LeftWheel, Wheels { left: 1.0, right: 0.0 }),
+            (Channel::RightWheel, Wheels { left: 0.0, right: 1.0 }),
+        ] {
+            let mut state = term(channel, &["wheel v", "|wheel v|"]).forward().expect("a term");
+            let mut step = specimen_step();
+            step.rate_rad_s = Wheels { left: 2.5, right: -5.0 };
+            let before_m = step.travel_m;
+            state.floor(&mut step);
+            let gained_m = step.travel_m.zip_with(before_m, |after, before| after - before);
+            let off_m = gained_m.zip_with(expected.zip_with(has, |of, has| of * has), |a, b| (a - b).abs());
+            // Rounding of tenths of millimetres alone.
+            assert!(off_m.left.max(off_m.right) < 1e-18, "{channel:?}: {gained_m:?}");
         }
     }
 
@@ -479,7 +552,9 @@ mod tests {
         assert!(at_rest.contains("along must vanish at standstill") && at_rest.contains("\"v\""), "{at_rest}");
         assert!(problem(&term(Channel::Along, &["1"])).contains("vanish at standstill"));
         assert!(problem(&term(Channel::Along, &["1", "v"])).contains("no covariate \"1\""));
-        let seen = problem(&term(Channel::SeenAlong, &["time in run"]));
+        let of_a_wheel = problem(&term(Channel::Along, &["wheel sense"]));
+        assert!(of_a_wheel.contains("\"wheel sense\" goes with wheels, left_wheel, right_wheel alone"), "{of_a_wheel}");
+        let seen = problem(&term(Channel::SeenAlong, &["session time"]));
         assert!(seen.contains("seen_along goes with these alone") && seen.contains("\"cos(theta)\""), "{seen}");
         let endless = SparseTerm { coefficient: f64::NAN, ..term(Channel::Yaw, &["v"]) };
         assert!(problem(&endless).contains("coefficient is NaN"));
