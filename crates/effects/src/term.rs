@@ -48,13 +48,13 @@ impl Sparse {
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
-        Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, started: false })
+        Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, row: None })
     }
 
     /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
     #[must_use]
     pub fn term_on(&self, channels: [Channel; 3]) -> Box<dyn ModelTerm> {
-        let recorded = Recorded { of: self.clone(), reversals: Reversals::NONE, started: false };
+        let recorded = Recorded { of: self.clone(), reversals: Reversals::NONE, row: None };
         Box::new(OnThree { recorded, channels })
     }
 
@@ -318,7 +318,15 @@ fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> 
 struct Recorded {
     of: Sparse,
     reversals: Reversals,
-    started: bool,
+    row: Option<Row>,
+}
+
+/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains add up to the speeds.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    end_s: f64,
+    wheel_m_s: Wheels<f64>,
+    wheel_m_s2: Wheels<f64>,
 }
 
 /// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second.
@@ -338,12 +346,20 @@ impl Recorded {
     fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
         let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
-        let (now, before) = (interval.speed_m_s(), interval.previous_speed_m_s());
-        let between_s = 0.5 * (interval.dt_s + interval.previous_dt_s);
-        let mut wheel_m_s2 = Wheels::both(0.0);
-        if std::mem::replace(&mut self.started, true) {
-            wheel_m_s2 = now.zip_with(before, |now, before| (now - before) / between_s);
-        }
+        let wheel_m_s = interval.speed_m_s();
+        let [from_s, to_s] = interval.row_s;
+        let row = match self.row {
+            // A look between two rows cuts an interval: its speed changed where its row began, and not at the look.
+            Some(row) if row.end_s == to_s => row,
+            before => {
+                let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
+                let wheel_m_s2 =
+                    before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
+                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
+            }
+        };
+        self.row = Some(row);
+        let wheel_m_s2 = row.wheel_m_s2;
         let Wheels { left, right } = wheel_m_s2;
         Moment {
             v_m_s,
@@ -351,7 +367,7 @@ impl Recorded {
             acceleration_m_s2: 0.5 * (left + right),
             yaw_acceleration_rad_s2: (right - left) / interval.wheel_separation_m,
             heading_rad: interval.world_from_body.theta_rad + 0.5 * turn_rad,
-            wheel_m_s: now,
+            wheel_m_s,
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
@@ -389,7 +405,7 @@ impl ModelTerm for Recorded {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        (self.reversals, self.started) = (Reversals::NONE, false);
+        (self.reversals, self.row) = (Reversals::NONE, None);
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

@@ -102,8 +102,10 @@ struct Term {
     last: f64,
     /// Rows since the last that kept to the beat.
     missed: u32,
-    /// How late the last row was by its beat; 0 while there is none.
+    /// How late the last row was by its beat, or the last before it that had one; 0 before any had.
     late_s: f64,
+    /// What that makes of the wheels' ways at the last row, for a share of one.
+    off_m: Wheels<f64>,
     /// The logged interval whose parts come in.
     row: Option<Row>,
     /// Length and travel of the rows before.
@@ -115,10 +117,8 @@ struct Term {
 struct Row {
     end_s: f64,
     length_s: f64,
-    /// By how much more its end is late than its start, seconds.
-    later_s: f64,
-    /// Of the wheels, by the rows before.
-    speed_m_s: Wheels<f64>,
+    /// What its end being late makes of the wheels' ways beyond what its start does.
+    gained_m: Wheels<f64>,
     /// What came in so far.
     travel_m: Wheels<f64>,
 }
@@ -176,29 +176,28 @@ impl Term {
         self.late_s = self.line().map_or(0.0, |(zero_s, between_s)| last_s - zero_s - beat * between_s);
     }
 
-    /// Takes the row that ends an interval: by how much more than at the row before it is late, seconds.
-    fn next_row(&mut self, from_s: f64, row_s: f64) -> f64 {
+    /// Takes the row that ends an interval: how late it is.
+    fn next_row(&mut self, from_s: f64, row_s: f64) {
         let Some((zero_s, between_s)) = self.line() else {
             self.warm_up(from_s, row_s);
-            return 0.0;
+            return;
         };
         let beat = ((row_s - zero_s) / between_s).round();
         if beat <= self.last {
-            return 0.0; // It came by itself, at a standstill.
+            return; // It came by itself, at a standstill.
         }
         let late_s = row_s - zero_s - beat * between_s;
         if late_s.abs() > MISSED * between_s {
             self.missed += 1;
             if self.missed >= MOST_MISSED {
-                *self = Self { recent: std::mem::take(&mut self.recent), ..Self::default() };
+                let (late_s, off_m) = (self.late_s, self.off_m);
+                *self = Self { recent: std::mem::take(&mut self.recent), late_s, off_m, ..Self::default() };
             }
-            return 0.0;
+            return;
         }
         self.missed = 0;
-        let later_s = late_s - self.late_s;
         self.late_s = late_s;
         self.add(beat, row_s);
-        later_s
     }
 
     /// The speed of the wheels by rows that have nothing to do with when this one and the one before were stamped: the speed of an interval by its own stamps goes
@@ -236,16 +235,17 @@ impl ModelTerm for Term {
                     self.recent.pop_front();
                 }
             }
-            let later_s = self.next_row(from_s, row_s);
-            let speed_m_s = self.speed_m_s(interval.speed_m_s());
-            self.row =
-                Some(Row { end_s: row_s, length_s: row_s - from_s, later_s, speed_m_s, travel_m: Wheels::both(0.0) });
+            self.next_row(from_s, row_s);
+            // What a late stamp makes of a way is gone with the next one: only the speed then and the row count.
+            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.late_s);
+            let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
+            self.row = Some(Row { end_s: row_s, length_s: row_s - from_s, gained_m, travel_m: Wheels::both(0.0) });
         }
         let Some(row) = &mut self.row else { return };
         row.travel_m = row.travel_m.zip_with(interval.travel_m, |sum, travel_m| sum + travel_m);
         if row.length_s > 0.0 {
-            let late_s = row.later_s * interval.dt_s / row.length_s;
-            gradient[0] = interval.change(row.speed_m_s.map(|speed_m_s| speed_m_s * late_s));
+            let share = interval.dt_s / row.length_s;
+            gradient[0] = interval.change(row.gained_m.map(|gained_m| gained_m * share));
         }
     }
 }
@@ -262,18 +262,17 @@ mod tests {
             let mut stream = Address { seed, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test"));
             let mut stamp_s = |row: u32| between_s * f64::from(row) + stream.uniform_about_zero(jitter_s);
             let mut term = Term::default();
-            let (mut before_s, mut late_s, mut square) = (stamp_s(0), 0.0_f64, 0.0);
+            let (mut before_s, mut square) = (stamp_s(0), 0.0);
             for row in 1..rows {
                 let row_s = stamp_s(row).max(before_s + 1e-3);
-                let later_s = term.next_row(before_s, row_s);
-                late_s += later_s;
-                square += later_s * later_s;
-                // Never later by more than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
-                assert!(late_s.abs() < 2.0 * between_s, "seed {seed} row {row}: {late_s}");
+                term.next_row(before_s, row_s);
+                square += term.late_s * term.late_s;
+                // Never later than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
+                assert!(term.late_s.abs() < between_s, "seed {seed} row {row}: {}", term.late_s);
                 before_s = row_s;
             }
-            // The difference of two uniform errors.
-            let expected = 2.0 * jitter_s * jitter_s / 3.0;
+            // A uniform error.
+            let expected = jitter_s * jitter_s / 3.0;
             let seen = square / f64::from(rows);
             assert!((0.8..1.2).contains(&(seen / expected)), "seed {seed}: {}", seen / expected);
         }
