@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use calib::likelihood::{Column, Evidence};
 use calib::methods::joint::JointFit;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::candidate::{Choice, terms};
@@ -241,6 +241,30 @@ pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64
     t.is_nan() || p_of_student(t, n - 1.0) < level
 }
 
+/// Standard deviations of a choice's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
+/// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
+fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
+    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    if runs.len() < LEAST_RUNS {
+        return None;
+    }
+    let evidence = total(&extended.fit.fit.pass.runs)?;
+    let own = extended.columns(choice);
+    let projection = Projection::beside(&extended.fit, &evidence, &own)?;
+    let inverse = inverse(&projection.of_columns(&evidence, &own).information)?;
+    let mut scatter = DMatrix::zeros(own.len(), own.len());
+    for run in &runs {
+        let leverage = projection.variance_of(run, &evidence, &own) * &inverse;
+        let others = (DMatrix::identity(own.len(), own.len()) - leverage).try_inverse()?;
+        let without = others * projection.score_of(run, &evidence, &own);
+        scatter += &without * without.transpose();
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let n = runs.len() as f64;
+    let covariance = &inverse * scatter * &inverse * ((n - 1.0) / n);
+    Some(covariance.diagonal().iter().map(|variance| variance.sqrt()).collect())
+}
+
 /// Refits a model with its choices; `None` when that diverges.
 pub(crate) fn refit<'a>(base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
     let mut all = terms(&choices);
@@ -438,6 +462,10 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64) 
     }
     let test = |(choice, wider): (usize, &Vec<f64>)| {
         let (mut test, _) = examine(&model, choice)?;
+        // Where runs differ more than looks say, a size is known no better than by the runs.
+        if let Some(over_runs) = over_runs(&model, choice) {
+            test.sizes.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
+        }
         for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
             *sigma = sigma.hypot(*wider);
         }
