@@ -27,8 +27,10 @@ const LOST: f64 = 3.0;
 const BLURRED: f64 = 0.3;
 /// A share of looks that do not fit beyond which something is wrong with the records.
 const OUTLIERS: f64 = 0.01;
-/// Share of the looks that did not fit before which may still not fit in records that are rewritten.
+/// Share of the looks that did not fit before which may still not fit in records that are rewritten, and a share of all looks that may: tails are heavy, rows are lost as
+/// well, and each such look is charged.
 const STILL_OFF: f64 = 0.5;
+const MAY_BE_OFF: f64 = 0.1;
 
 /// A fault with the records without it.
 pub(crate) struct Fault {
@@ -57,6 +59,7 @@ pub(crate) fn fault(
     astray: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
+    let lost = base.is_some_and(|base| !follows(base));
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
@@ -72,7 +75,7 @@ pub(crate) fn fault(
             let Ok(fit) = PLAIN.fit(&own) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not
             // restored to the last count: looks may still lie off, but far fewer of them.
-            let most_outliers = base.map_or(OUTLIERS, |base| OUTLIERS.max(STILL_OFF * left_out(base)));
+            let most_outliers = base.map_or(MAY_BE_OFF, |base| MAY_BE_OFF.max(STILL_OFF * left_out(base)));
             let follows = is_drive(&fit)
                 && left_out(&fit) < most_outliers
                 && fit.fit.model.body_from_sensor.theta_rad.abs() <= MOST_TURNED_RAD;
@@ -84,8 +87,12 @@ pub(crate) fn fault(
                 let looks = count(base).max(count(&fit));
                 cost(base, looks) + implausible(base) - cost(&fit, looks) - implausible(&fit)
             });
-            // What the log shows needs no instrument; one must not contradict it.
-            let least = if evident { -GAIN } else { GAIN };
+            // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
+            let least = match evident {
+                true if lost => f64::NEG_INFINITY,
+                true => -GAIN,
+                false => GAIN,
+            };
             let better =
                 |(shown, known): &(bool, Fault)| (evident, gain) > (*shown, known.gain + f64::from(u8::from(*shown)));
             if gain > least && best.as_ref().is_none_or(better) {

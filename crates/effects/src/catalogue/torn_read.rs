@@ -128,8 +128,15 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
     // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after to undo them.
     if mended > 0 {
         let ends = [(0, -jumps[0], !first_used), (last, jumps[last - 1], used < last)];
-        for (row, astray, free) in ends {
-            if free && astray.abs() == 1.0 {
+        // A wheel that starts or stops there is on the line through the two increments beside, and not where a tear of its own puts it.
+        #[allow(clippy::cast_precision_loss)]
+        let rate = |k: usize| (ticks[k + 1] - ticks[k]) as f64 / (t_s[k + 1] - t_s[k]);
+        let off_line = |own: usize, next: usize, further: usize| {
+            (rate(own) - 2.0 * rate(next) + rate(further)) * (t_s[own + 1] - t_s[own])
+        };
+        let off_lines = if last < 3 { [0.0; 2] } else { [-off_line(0, 1, 2), off_line(last - 1, last - 2, last - 3)] };
+        for ((row, astray, free), off_line) in ends.into_iter().zip(off_lines) {
+            if free && astray.abs() == 1.0 && (off_line - astray * step).abs() < step / 4.0 {
                 #[allow(clippy::cast_possible_truncation)] // −1 or 1
                 let off = astray as i64;
                 ticks[row] -= off * jump;
