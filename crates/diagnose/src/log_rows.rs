@@ -113,7 +113,7 @@ mod tests {
     fn rows_that_are_torn_or_lost_with_their_counts_are_astray() {
         let (t_s, sound) = column(0.0);
         let mut torn = sound.clone();
-        [100, 130, 200].map(|row| torn[row] += 256);
+        [100, 130, 200].into_iter().for_each(|row: usize| torn[row] += 256);
         assert_eq!(of_column(&t_s, &torn).astray, 3);
         let (mut t_s, mut lost) = (t_s, sound);
         for row in [220, 130, 100] {

@@ -193,7 +193,7 @@ mod tests {
                 for way in ways {
                     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some hundred steps
                     for _ in 0..(way.abs() * breakaway_m / each_m).round() as usize {
-                        let mut step = step.clone();
+                        let mut step = step;
                         step.travel_m = Wheels::both(each_m * way.signum());
                         state.floor(&mut step);
                         behind_m += each_m * way.signum() - step.travel_m.left;
