@@ -144,7 +144,8 @@ mod tests {
     use super::*;
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
 
-    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second for 20 s; poses every half second, headings wrapped.
+    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second for 20 s; poses every half second, and one
+    /// farther outside of the log on either side than its rows reach, headings wrapped.
     fn dataset(continuous: bool) -> Dataset {
         let rows = 29;
         let (metre, spin) = (1.0, 0.25);
@@ -155,8 +156,8 @@ mod tests {
             angles.left.push(angles.left[row - 1] + travel_m.0 * rad);
             angles.right.push(angles.right[row - 1] + travel_m.1 * rad);
         }
-        let truth = (0..60).map(|k| {
-            let t_s = -0.25 + 0.5 * f64::from(k);
+        let within = (0..56).map(|k| 0.25 + 0.5 * f64::from(k));
+        let truth = [-0.75].into_iter().chain(within).chain([29.0]).map(|t_s: f64| {
             let turned = (t_s - 8.0).clamp(0.0, 20.0);
             TruthSample::new(t_s, 0.25 * t_s.clamp(0.0, 8.0), 0.0, Some(kinematics::wrap_to_pi(turned + 3.0)))
         });

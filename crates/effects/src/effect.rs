@@ -84,6 +84,11 @@ pub trait PhysicalEffect {
         Ok(0.0)
     }
 
+    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where looks scatter far less, it is another effect.
+    fn scatter_of_contact_m(&self) -> f64 {
+        0.0
+    }
+
     /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
     fn forward(&self) -> Option<Box<dyn Forward>> {
         None

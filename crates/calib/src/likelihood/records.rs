@@ -192,6 +192,19 @@ impl<'a> Records<'a> {
         self.chains.iter().map(|chain| chain.looks.len()).sum()
     }
 
+    /// How far a wheel goes from look to look by a model, on average, metres.
+    #[must_use]
+    pub fn way_between_looks_m(&self, model: &Model) -> f64 {
+        let of = |piece: &Piece| {
+            let way_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| (m_per_rad * rad).abs());
+            0.5 * (way_m.left + way_m.right)
+        };
+        let way_m: f64 = self.chains.iter().flat_map(|chain| &chain.pieces).map(of).sum();
+        #[allow(clippy::cast_precision_loss)]
+        let looks = self.looks().max(1) as f64;
+        way_m / looks
+    }
+
     /// When a look of a chain was, seconds from the run's start.
     #[must_use]
     pub fn look_s(&self, chain: usize, look: usize) -> Option<f64> {

@@ -31,6 +31,11 @@ impl PhysicalEffect for StickSlip {
         EffectError::unless_sizes("stick_slip", sizes)
     }
 
+    /// Of the age of a renewal process in its stationary state, E[h³]/(3 E[h]) less the square of its mean.
+    fn scatter_of_contact_m(&self) -> f64 {
+        (2.0_f64 / 9.0).sqrt() * self.breakaway_m
+    }
+
     fn forward(&self) -> Option<Box<dyn Forward>> {
         let none = Wheels::both(0.0);
         Some(Box::new(State { size: *self, stream: None, wound_m: none, holds_m: none }))
