@@ -284,13 +284,15 @@ fn continued(
         findings.extend(signs);
     }
     let log = log_rows::check(datasets);
-    let wrong = naming::of_wrong_records(log.as_ref(), (!lost).then(|| wrong_wheels(&asked.base)).flatten());
-    if !wrong.is_empty() {
+    let wheels = if lost { None } else { wrong_wheels(&asked.base) };
+    let wheels = wheels.and_then(|factor| naming::of_wrong_wheels(factor, &options.without));
+    let wrong: Vec<Finding> = naming::of_rows_astray(log.as_ref()).into_iter().chain(wheels).collect();
+    if wrong.iter().any(|finding| finding.id == "unlisted") {
         for finding in &mut findings[faults.len()..] {
             naming::or_unlisted(finding, "what is wrong with the records may do the same");
         }
-        findings.extend(wrong);
     }
+    findings.extend(wrong);
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);

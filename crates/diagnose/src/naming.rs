@@ -192,19 +192,23 @@ pub(crate) fn of_lost(base: &JointFit<'_>) -> Option<Finding> {
     of_scatter(&[], 0.0, BTreeMap::new(), &what)
 }
 
-/// What is wrong with the log or with the robot's description, where no fault of the catalogue is it: rows astray, wheels that are another robot's.
-pub(crate) fn of_wrong_records(log: Option<&Check>, wheels: Option<f64>) -> Vec<Finding> {
-    let rows = log.filter(|check| !check.passes).and_then(|check| {
-        let what = format!("{:.0} rows of the log are not where the rows around them go on", check.statistic);
-        of_scatter(&[], check.p_value, BTreeMap::new(), &what)
-    });
-    let wheels = wheels.and_then(|factor| {
-        let what = format!(
-            "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
-        );
-        of_scatter(&[], 0.0, BTreeMap::new(), &what)
-    });
-    rows.into_iter().chain(wheels).collect()
+/// Rows astray that no fault of the catalogue explains.
+pub(crate) fn of_rows_astray(log: Option<&Check>) -> Option<Finding> {
+    let check = log.filter(|check| !check.passes)?;
+    let what = format!("{:.0} rows of the log are not where the rows around them go on", check.statistic);
+    of_scatter(&[], check.p_value, BTreeMap::new(), &what)
+}
+
+/// Wheels that are another robot's by a factor: its counts of a turn, unless that is not to be named.
+pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
+    const ID: &str = "wrong_counts_per_turn";
+    let what = format!(
+        "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
+    );
+    let ids: &[&'static str] = if without.iter().any(|out| out == ID) { &[] } else { &[ID] };
+    // Logged over true counts: wheels that count twice as often seem half as large.
+    let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
+    of_scatter(ids, 0.0, BTreeMap::from([("factor".to_owned(), value)]), &what)
 }
 
 /// The finding of a gross fault.

@@ -113,6 +113,11 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
             at += 1;
             continue;
         };
+        // A wheel that speeds up and slows down again is out of line to one side and then to the other, and goes smoothly.
+        if !smooths(ticks, at, &jumps[at..=at + back], jump) {
+            at += 1;
+            continue;
+        }
         first_used |= at == 0;
         let mut astray = 0.0;
         for (count, jumps) in ticks[at + 1..=at + back].iter_mut().zip(&jumps[at..]) {
@@ -156,6 +161,22 @@ struct Mended {
     samples: usize,
     /// Those of columns in which nothing else looks like a jump.
     plainly: usize,
+}
+
+/// Whether counts go more smoothly without jumps from one row on: each end of a tear changes the increments by twice a jump, and half of all that must be gone.
+fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
+    let from = at.saturating_sub(1);
+    let near = &ticks[from..(at + jumps.len() + 2).min(ticks.len())];
+    let roughness = |ticks: &[i64]| -> i64 { ticks.windows(3).map(|of| (of[2] - 2 * of[1] + of[0]).abs()).sum() };
+    let mut mended = near.to_vec();
+    let mut astray = 0.0;
+    for (count, jumps) in mended[at + 1 - from..].iter_mut().zip(jumps) {
+        astray += jumps;
+        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
+        let off = astray as i64;
+        *count -= off * jump;
+    }
+    roughness(near) - roughness(&mended) >= 2 * jump
 }
 
 /// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so, or is not back in time.
