@@ -163,7 +163,8 @@ struct Mended {
     plainly: usize,
 }
 
-/// Whether counts go more smoothly without jumps from one row on: each end of a tear changes the increments by twice a jump, and half of all that must be gone.
+/// Whether counts go more smoothly without jumps from one row on: a tear bends them by four jumps, of which two are gone where another tear is beside it, and what is none is
+/// bent by as many.
 fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
     let from = at.saturating_sub(1);
     let near = &ticks[from..(at + jumps.len() + 2).min(ticks.len())];
@@ -176,7 +177,7 @@ fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
         let off = astray as i64;
         *count -= off * jump;
     }
-    roughness(near) - roughness(&mended) >= 2 * jump
+    roughness(near) - roughness(&mended) >= jump
 }
 
 /// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so, or is not back in time.
