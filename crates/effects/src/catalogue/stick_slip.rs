@@ -31,7 +31,7 @@ impl PhysicalEffect for StickSlip {
         EffectError::unless_sizes("stick_slip", sizes)
     }
 
-    /// Of the age of a renewal process in its stationary state, E[h³]/(3 E[h]) less the square of its mean.
+    /// Of the age of a renewal process in its stationary state, `E[h³]/(3 E[h])` less the square of its mean.
     fn scatter_of_contact_m(&self) -> f64 {
         (2.0_f64 / 9.0).sqrt() * self.breakaway_m
     }
@@ -95,7 +95,7 @@ impl Forward for State {
 
 /// Speeds of a contact below which it sticks that are tried, m/s.
 const STICK_SPEEDS_M_S: [f64; 6] = [0.01, 0.025, 0.05, 0.1, 0.17, 0.3];
-/// Mean wind-up of a contact that creeps on and on, over the mean breakaway: E[h²]/(2 E[h]) of a breakaway h that is uniform from nothing on.
+/// Mean wind-up of a contact that creeps on and on, over the mean breakaway: `E[h²]/(2 E[h])` of a breakaway h that is uniform from nothing on.
 const MEAN_WIND_UP: f64 = 2.0 / 3.0;
 /// Way over which the mean wind-up comes to that, over the mean breakaway: by least squares over ways of up to two breakaways.
 const WINDS_UP_OVER: f64 = 0.5;
