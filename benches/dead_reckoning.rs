@@ -187,6 +187,7 @@ fn main() {
         whole_log(steps, rounds);
     }
     if !quick {
+        whole_log(1_000_000, 15);
         whole_log(10_000_000, 9);
     }
     for robots in [8, 64, 1_000, 10_000] {

@@ -14,6 +14,7 @@
 //! Source: Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial mediante la
 //! corrección de errores sistemáticos".
 
+mod ahead;
 mod angle;
 mod covariance;
 mod dead_reckoning;

@@ -5,6 +5,7 @@
 //! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
 //! turned in a step) goes through it instead.
 
+use crate::ahead::{soon_read, soon_written};
 use crate::dead_reckoning::{GROUP, Place, heading_rad};
 use crate::instruction_set::Kernel;
 use crate::trig::{Direction, short_sinc};
@@ -15,6 +16,10 @@ const GROUPS: usize = 4;
 
 /// Steps of a block.
 pub(crate) const BLOCK: usize = GROUPS * GROUP;
+
+/// Steps ahead of those being written, and of those being read, whose memory is asked for; from two to eight groups cost the same within the noise of a log of 10⁷ steps.
+const WRITTEN_AHEAD: usize = 2 * GROUP;
+const READ_AHEAD: usize = BLOCK;
 
 /// Fewer steps than this are not worth a block.
 pub(crate) const FEWEST_FOR_A_BLOCK: usize = 24;
@@ -50,6 +55,9 @@ impl Sink for Every<'_> {
     #[inline(always)]
     fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         let (now, later) = std::mem::take(&mut self.0).split_first_chunk_mut()?;
+        if let Some(soon) = later.get(WRITTEN_AHEAD..) {
+            soon.first_chunk::<GROUP>().into_iter().for_each(soon_written);
+        }
         self.0 = later;
         Some(now)
     }
@@ -130,8 +138,10 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         columns.start_from(&self.state);
         let ((left, left_rest), (right, right_rest)) = (counts.left.as_chunks(), counts.right.as_chunks());
         let (mut left, mut right) = (left.chunks_exact(GROUPS), right.chunks_exact(GROUPS));
+        let mut soon = counts.map(|counts| counts.get(READ_AHEAD..).unwrap_or(&[]));
         for (left, right) in (&mut left).zip(&mut right) {
-            self.block(&mut columns, Wheels { left, right }, BLOCK);
+            self.block(&mut columns, (Wheels { left, right }, soon), BLOCK);
+            soon = soon.map(|counts| counts.get(BLOCK..).unwrap_or(&[]));
         }
         // The groups that are left, and the last filled up by standing still.
         let mut groups = Wheels { left: left.remainder(), right: right.remainder() }.map(|groups| {
@@ -152,7 +162,8 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         }
         if steps > 0 {
             let used = ..steps.div_ceil(GROUP);
-            self.block(&mut columns, Wheels { left: &groups.left[used], right: &groups.right[used] }, steps);
+            let groups = Wheels { left: &groups.left[used], right: &groups.right[used] };
+            self.block(&mut columns, (groups, Wheels::both(&[])), steps);
         }
         self.place_waiting(&mut columns);
         self.one_by_one(rest);
@@ -373,11 +384,14 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
     }
 
     /// A block of which `used` steps are steps. Its displacements are found while the block before is placed and its poses are written, group by group: the
-    /// memory writes while the processor computes.
+    /// memory writes while the processor computes. `soon` are the counts whose memory is asked for meanwhile.
     #[inline(always)]
-    fn block(&mut self, columns: &mut Columns, counts: Wheels<&[[C; GROUP]]>, used: usize) {
+    fn block(&mut self, columns: &mut Columns, (counts, soon): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
         let (mut before, mut is_within) = (self.state.counts, true);
         for (group, (left, right)) in counts.left.iter().zip(counts.right).enumerate() {
+            for soon in [soon.left, soon.right] {
+                soon.get(group * GROUP..).and_then(<[C]>::first_chunk::<GROUP>).into_iter().for_each(soon_read);
+            }
             is_within &= columns.displace(&self.state, before, Wheels { left, right }, group);
             columns.next_group();
             before = Wheels { left: left[GROUP - 1], right: right[GROUP - 1] };
