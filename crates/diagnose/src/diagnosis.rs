@@ -20,7 +20,7 @@ use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
-use crate::search::{Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, evidence, examine, reach, search};
+use crate::search::{Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, Scans, evidence, examine, reach, search};
 use crate::unlisted::{UNLISTED_LEVEL, sparse};
 
 /// What to leave out.
@@ -181,7 +181,7 @@ impl Asked<'_> {
 const SURE_LEVEL: f64 = 0.2;
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], restored: bool) -> Asked<'a> {
-    let found = search(&base, catalogue, SCAN_LEVEL);
+    let found = search(&base, catalogue, SCAN_LEVEL, Scans::default());
     let checked = check(&found.model);
     let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false, rivalled: false };
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
@@ -217,7 +217,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue, SCAN_LEVEL);
+            asked.found = search(&thinned, catalogue, SCAN_LEVEL, Scans::default());
             asked.rivalled = false;
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
@@ -225,7 +225,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
     }
     if asked.goes_with_something() {
         // Something is there: what it is may be asked more boldly.
-        let found = search(&asked.base, catalogue, SURE_LEVEL);
+        let found = search(&asked.base, catalogue, SURE_LEVEL, asked.found.scans.clone());
         if found.model.choices.len() > asked.found.model.choices.len() {
             asked.checked = check(&found.model);
             asked.found = found;

@@ -398,11 +398,11 @@ fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>,
 }
 
 /// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
-pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64) -> Found<'a> {
+/// `scans` are those made before on the same base.
+pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, mut scans: Scans) -> Found<'a> {
     let mut model = Extended { fit: base.clone(), choices: Vec::new() };
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
-    let mut scans = Scans::default();
     // The models on the way, and the rivals of the last: most of them are asked for again below.
     let (mut models, mut last_rivals): (Vec<Extended<'a>>, Vec<Extended<'a>>) = (Vec::new(), Vec::new());
     while model.choices.len() < MOST_EFFECTS {

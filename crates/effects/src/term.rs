@@ -246,12 +246,14 @@ impl Forward for State {
         };
         self.session_m += distance_m.abs();
         let scale = self.size.coefficient * step.dt_s;
+        let channel = self.sparse.channel;
+        if channel.is_of_wheels() {
+            let gained = self.sparse.of_wheels(channel, &at);
+            step.travel_m = step.travel_m.zip_with(gained, |travel_m, gained| travel_m + scale * gained);
+            return;
+        }
         let size = scale * self.sparse.product(&at);
-        match self.sparse.channel {
-            channel if channel.is_of_wheels() => {
-                let gained = self.sparse.of_wheels(channel, &at);
-                step.travel_m = step.travel_m.zip_with(gained, |travel_m, gained| travel_m + scale * gained);
-            }
+        match channel {
             Channel::Along => step.travel_m = step.travel_m.map(|travel_m| travel_m + size),
             Channel::Across => step.lateral_m += size,
             _ => step.extra_turn_rad += size,
@@ -306,10 +308,12 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> 
 /// A size on a channel that is none of the wheels', by v and ω.
 fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
     match channel {
+        Channel::Along | Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
         Channel::Across | Channel::SeenAcross => Pose::new(0.0, size, 0.0),
         Channel::Yaw | Channel::SeenHeading => Pose::new(0.0, 0.0, size),
         Channel::SeenLate => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
-        _ => Pose::new(size, 0.0, 0.0),
+        // What both wheels or one of them gain needs their separation: `Sparse::of_wheels`.
+        Channel::Wheels | Channel::LeftWheel | Channel::RightWheel => Pose::IDENTITY,
     }
 }
 

@@ -114,19 +114,13 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
             continue;
         };
         // A wheel that speeds up and slows down again is out of line to one side and then to the other, and goes smoothly.
-        if !smooths(ticks, at, &jumps[at..=at + back], jump) {
+        let jumps = &jumps[at..=at + back];
+        if !smooths(ticks, at, jumps, jump) {
             at += 1;
             continue;
         }
         first_used |= at == 0;
-        let mut astray = 0.0;
-        for (count, jumps) in ticks[at + 1..=at + back].iter_mut().zip(&jumps[at..]) {
-            astray += jumps;
-            #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
-            let off = astray as i64;
-            *count -= off * jump;
-            mended += usize::from(off != 0);
-        }
+        mended += put_back(&mut ticks[at + 1..], jumps, jump);
         at += back + 1;
         used = at;
     }
@@ -163,6 +157,19 @@ struct Mended {
     plainly: usize,
 }
 
+/// Takes the sum of the jumps so far off each count, and says how many were astray.
+fn put_back(ticks: &mut [i64], jumps: &[f64], jump: i64) -> usize {
+    let (mut astray, mut mended) = (0.0, 0);
+    for (count, jumps) in ticks.iter_mut().zip(jumps) {
+        astray += jumps;
+        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
+        let off = astray as i64;
+        *count -= off * jump;
+        mended += usize::from(off != 0);
+    }
+    mended
+}
+
 /// Whether counts go more smoothly without jumps from one row on: a tear bends them by four jumps, of which two are gone where another tear is beside it, and what is none is
 /// bent by as many.
 fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
@@ -170,13 +177,7 @@ fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
     let near = &ticks[from..(at + jumps.len() + 2).min(ticks.len())];
     let roughness = |ticks: &[i64]| -> i64 { ticks.windows(3).map(|of| (of[2] - 2 * of[1] + of[0]).abs()).sum() };
     let mut mended = near.to_vec();
-    let mut astray = 0.0;
-    for (count, jumps) in mended[at + 1 - from..].iter_mut().zip(jumps) {
-        astray += jumps;
-        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
-        let off = astray as i64;
-        *count -= off * jump;
-    }
+    put_back(&mut mended[at + 1 - from..], jumps, jump);
     roughness(near) - roughness(&mended) >= jump
 }
 
