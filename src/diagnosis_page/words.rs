@@ -237,6 +237,7 @@ pub(super) fn question(check: &Check) -> String {
     match name {
         "run_to_run" => "Is the noise the same in every run?".to_owned(),
         "outliers" => "Do no looks lie far off? (how many do)".to_owned(),
+        "log_spans" => "Does the log last as long as what was seen of the robot? (how many times as long)".to_owned(),
         "log_rows" => "Do all rows of the log go on where the rows around them do? (how many do not)".to_owned(),
         "speed" => "Do residuals not go with speed?".to_owned(),
         "yaw_rate" => "… with yaw rate?".to_owned(),
@@ -250,6 +251,9 @@ pub(super) fn question(check: &Check) -> String {
         "distance" => "… with the distance driven?".to_owned(),
         "distance_since_reversal" => "… with the distance since a reversal?".to_owned(),
         "position" => "… with the place in the room?".to_owned(),
+        "left_wheel_cycles" => "… with the left wheel's phase, several times a turn?".to_owned(),
+        "right_wheel_cycles" => "… with the right wheel's phase, several times a turn?".to_owned(),
+        "row_length" => "… with how much longer a row is than usual?".to_owned(),
         other => format!("… with {}?", other.trim_start_matches("covariate_")),
     }
 }

@@ -26,7 +26,7 @@ impl JointFit<'_> {
     /// The evidence at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
     #[must_use]
     pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<Evidence> {
-        self.blocks(terms, blocks, Gate::Shut)
+        self.blocks(terms, blocks, self.gate())
     }
 
     pub(crate) fn blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize, gate: Gate) -> Vec<Evidence> {

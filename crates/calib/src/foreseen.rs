@@ -28,6 +28,7 @@ impl Joint {
             noise_settled: NOISE_SETTLED,
             parts: Vec::new(),
             displacements_follow: false,
+            every_look: false,
         }
     }
 }

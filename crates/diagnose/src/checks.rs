@@ -14,6 +14,7 @@ use crate::document::Check;
 use crate::scan::{Projected, Projection, freedom, principal, total};
 use crate::search::Extended;
 use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z};
+use crate::unlisted::of_cycles;
 
 /// Family-wise rate of false alarms of all checks.
 pub(crate) const CHECKS_LEVEL: f64 = 0.01;
@@ -53,10 +54,10 @@ pub(crate) struct Outliers {
 }
 
 /// What residuals may go with: a name and the products that are tested on every channel.
-pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Vec<Covariate>>)> {
+pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Sparse>)> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
-        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RowLength, RunTime, SessionTime, SinHeading,
+        SinPhase, SinceReversal, Speed, Way, WheelSpeed, X, Y, YawAcceleration, YawRate,
     };
     let mut questions: Vec<(String, Vec<Vec<Covariate>>)> = [
         ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
@@ -64,8 +65,8 @@ pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Vec<Covariate>>)
         ("speed_times_yaw_rate", vec![vec![Speed, YawRate], vec![AbsSpeed, YawRate]]),
         ("acceleration", vec![vec![Acceleration], vec![YawAcceleration]]),
         ("heading_in_the_room", vec![vec![AbsSpeed, CosHeading], vec![AbsSpeed, SinHeading]]),
-        ("left_wheel_phase", vec![vec![CosPhase(Side::Left)], vec![SinPhase(Side::Left)]]),
-        ("right_wheel_phase", vec![vec![CosPhase(Side::Right)], vec![SinPhase(Side::Right)]]),
+        ("left_wheel_phase", vec![vec![CosPhase(Side::Left, 1)], vec![SinPhase(Side::Left, 1)]]),
+        ("right_wheel_phase", vec![vec![CosPhase(Side::Right, 1)], vec![SinPhase(Side::Right, 1)]]),
         ("time_in_run", vec![vec![RunTime, Speed], vec![RunTime, YawRate]]),
         ("time_in_session", vec![vec![SessionTime, Speed], vec![SessionTime, YawRate]]),
         ("distance", vec![vec![Way, Speed], vec![Way, YawRate]]),
@@ -78,21 +79,30 @@ pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Vec<Covariate>>)
         let name = format!("covariate_{}", covariate.name());
         questions.push((name, vec![vec![covariate.clone(), Speed], vec![covariate, YawRate]]));
     }
-    questions
+    let on = |channel, covariates: &[Covariate]| Sparse { channel, covariates: covariates.to_vec() };
+    let of_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
+    let of_motion =
+        questions.iter().map(|(name, products)| (name.clone(), products.iter().flat_map(of_motion).collect()));
+    // A row that is longer than usual by its stamps, and not in truth.
+    let of_rows = ("row_length".to_owned(), vec![on(Channel::Wheels, &[WheelSpeed, RowLength])]);
+    let of_cycles = |side, name: &str| (name.to_owned(), of_cycles(side));
+    let of_wheels = [of_cycles(Side::Left, "left_wheel_cycles"), of_cycles(Side::Right, "right_wheel_cycles")];
+    of_motion.chain([of_rows]).chain(of_wheels).collect()
 }
 
 /// The covariates of runs that differ between runs.
 pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
-    let mut keys: Vec<&String> = fit.records.chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
+    let chains = &fit.records.chains;
+    let mut keys: Vec<&String> = chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
     keys.sort();
     keys.dedup();
-    keys.into_iter()
-        .filter_map(|key| {
-            let values: Vec<f64> =
-                fit.records.chains.iter().filter_map(|chain| chain.info.covariates.get(key).copied()).collect();
-            Covariate::of_run(key, &values)
-        })
-        .collect()
+    keys.into_iter().filter_map(|key| Covariate::of_run(key, &values_of_runs(fit, key))).collect()
+}
+
+/// What each run says of a covariate, 0 where it says nothing.
+pub(crate) fn values_of_runs(fit: &JointFit<'_>, key: &str) -> Vec<f64> {
+    let runs = fit.records.chains.chunk_by(|a, b| a.run == b.run);
+    runs.map(|chains| chains[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
 }
 
 /// Asks the residuals of a model.
@@ -312,12 +322,8 @@ pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
 /// Score tests of every question, all in one pass.
 fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let questions = questions(&model.fit);
-    let library: Vec<Choice> = questions
-        .iter()
-        .flat_map(|(_, products)| products)
-        .flat_map(|product| Channel::MOTION.map(|channel| Sparse { channel, covariates: product.clone() }))
-        .map(Choice::Sparse)
-        .collect();
+    let library: Vec<Choice> =
+        questions.iter().flat_map(|(_, products)| products.iter().cloned().map(Choice::Sparse)).collect();
     let mut all = terms(&model.choices);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
     all.extend(terms_together(&library.iter().collect::<Vec<_>>()));
@@ -327,7 +333,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let freedom = freedom(&model.fit, &evidence);
     let mut at = first;
     for (name, products) in &questions {
-        let own = products.len() * Channel::MOTION.len();
+        let own = products.len();
         let columns: Vec<usize> = (at..at + own).collect();
         let parameters: Vec<_> =
             library[at - first..at - first + own].iter().map(|choice| choice.parameters()[0]).collect();

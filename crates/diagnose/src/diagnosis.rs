@@ -15,13 +15,15 @@ use crate::checks::{Checked, check};
 use crate::document::{Check, Document, Finding, Gain, Verdict};
 use crate::gain::gain;
 use crate::gross::{Fault, fault, follows, left_out, sessions, wrong_wheels};
-use crate::log_rows::{self, LOG_ROWS};
+use crate::log_rows::{self, LOG_ROWS, LOG_SPANS};
 use crate::naming;
 use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
-use crate::search::{Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, Scans, evidence, examine, reach, search};
-use crate::unlisted::{UNLISTED_LEVEL, sparse};
+use crate::search::{
+    Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, Scans, evidence, examine, reach, search, search_every_look,
+};
+use crate::unlisted::{SparseFound, UNLISTED_LEVEL, Unlisted, sparse};
 
 /// What to leave out.
 #[derive(Debug, Clone, Default)]
@@ -160,8 +162,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) base: JointFit<'a>,
     pub(crate) found: Found<'a>,
     pub(crate) checked: Checked,
-    /// A model with a sparse term at its end, its chance, and how many were tried.
-    pub(crate) sparse: Option<(Extended<'a>, f64, usize)>,
+    /// What is there without a name.
+    pub(crate) unlisted: Option<Unlisted<'a>>,
     /// Correlation of looks that follow each other, where they had to be thinned.
     pub(crate) correlated: Option<(f64, f64)>,
     /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
@@ -170,7 +172,24 @@ pub(crate) struct Asked<'a> {
     pub(crate) rivalled: bool,
 }
 
-impl Asked<'_> {
+impl<'a> Asked<'a> {
+    /// The model with all that was found.
+    pub(crate) fn model(&self) -> &Extended<'a> {
+        self.unlisted.as_ref().map_or(&self.found.model, |unlisted| &unlisted.model)
+    }
+
+    /// A term without a name is there, and perhaps more of them.
+    fn keep(&mut self, sparse: SparseFound<'a>) {
+        let unlisted = Unlisted::from(&self.base, sparse);
+        self.checked = check(&unlisted.model);
+        self.unlisted = Some(unlisted);
+    }
+
+    /// Whether more looks lie far off than chance makes.
+    fn lie_far_off(&self) -> bool {
+        self.checked.checks.iter().any(|check| check.name == "outliers" && !check.passes)
+    }
+
     /// Whether residuals go with something that was recorded.
     fn goes_with_something(&self) -> bool {
         self.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name))
@@ -183,7 +202,14 @@ const SURE_LEVEL: f64 = 0.2;
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], restored: bool) -> Asked<'a> {
     let found = search(&base, catalogue, SCAN_LEVEL, Scans::default());
     let checked = check(&found.model);
-    let mut asked = Asked { base, found, checked, sparse: None, correlated: None, in_disguise: false, rivalled: false };
+    let mut asked =
+        Asked { base, found, checked, unlisted: None, correlated: None, in_disguise: false, rivalled: false };
+    if asked.lie_far_off()
+        && let Some(found) = search_every_look(&asked.base, &asked.found, catalogue)
+    {
+        asked.checked = check(&found.model);
+        asked.found = found;
+    }
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
     let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
     if !asked.found.model.choices.is_empty()
@@ -196,8 +222,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
             asked.found.model = alone;
             asked.found.names.clear();
             asked.found.tests.clear();
-            asked.checked = check(&sparse.model);
-            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+            asked.keep(sparse);
             return asked;
         }
         asked.rivalled = unnamed > named - LEAST_REACH;
@@ -210,9 +235,8 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
             sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL).map(|sparse| (check(&sparse.model), sparse));
         asked.in_disguise = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
         let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
-        if let Some((checked, sparse)) = explains {
-            asked.checked = checked;
-            asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+        if let Some((_, sparse)) = explains {
+            asked.keep(sparse);
             return asked;
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
@@ -236,8 +260,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
     if asked.goes_with_something()
         && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
     {
-        asked.checked = check(&sparse.model);
-        asked.sparse = Some((sparse.model, sparse.p_value, sparse.trials));
+        asked.keep(sparse);
     }
     asked
 }
@@ -248,7 +271,7 @@ const BEYOND_SCATTER: f64 = 1e-8;
 /// Whether a check asks what residuals go with, not how they scatter.
 pub(crate) fn is_covariate(name: &str) -> bool {
     !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
-        && !["outliers", "run_to_run", LOG_ROWS].contains(&name)
+        && !["outliers", "run_to_run", LOG_ROWS, LOG_SPANS].contains(&name)
 }
 
 fn continued(
@@ -269,11 +292,10 @@ fn continued(
     if asked.rivalled {
         naming::beside_unlisted(&mut findings);
     }
-    let model = asked.sparse.as_ref().map_or(&asked.found.model, |(model, _, _)| model);
-    if let Some((model, p_value, trials)) = &asked.sparse
-        && let Some((test, _)) = examine(model, model.choices.len() - 1)
-    {
-        findings.extend(naming::of_sparse(model, &test, *p_value, *trials));
+    let model = asked.model();
+    for (place, p_value, trials) in asked.unlisted.iter().flat_map(Unlisted::terms) {
+        let test = examine(model, place).map(|(test, _)| test);
+        findings.extend(test.and_then(|test| naming::of_sparse(&model.choices[place], &test, p_value, trials)));
     }
     if lost {
         findings.extend(naming::of_lost(&asked.base));
@@ -283,12 +305,18 @@ fn continued(
         let signs: Vec<Finding> = scatter(&asked, options).into_iter().filter(|sign| !told(sign)).collect();
         findings.extend(signs);
     }
-    let log = log_rows::check(datasets);
+    let (log, spans) = (log_rows::check(datasets), log_rows::check_spans(datasets));
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| naming::of_wrong_wheels(factor, &options.without));
-    let wrong: Vec<Finding> = naming::of_rows_astray(log.as_ref()).into_iter().chain(wheels).collect();
+    let wrong: Vec<Finding> = naming::of_rows_astray(log.as_ref())
+        .into_iter()
+        .chain(naming::of_spans(spans.as_ref()))
+        .chain(wheels)
+        .collect();
     if wrong.iter().any(|finding| finding.id == "unlisted") {
-        for finding in &mut findings[faults.len()..] {
+        // With times in other units even a gross fault may be an accident.
+        let sound = spans.as_ref().is_none_or(|check| check.passes);
+        for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
             naming::or_unlisted(finding, "what is wrong with the records may do the same");
         }
     }
@@ -296,7 +324,7 @@ fn continued(
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
-    let told = asked.sparse.is_some() || findings.iter().any(|finding| finding.id == "unlisted");
+    let told = asked.unlisted.is_some() || findings.iter().any(|finding| finding.id == "unlisted");
     if !(restored || scatters || told) {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
@@ -318,7 +346,7 @@ fn continued(
         dataset: Names::of(names.clone()),
         verdict,
         sentence: sentence(verdict, &findings, gain.as_ref()),
-        checks: asked.checked.checks.into_iter().chain(log).collect(),
+        checks: asked.checked.checks.iter().cloned().chain(log).chain(spans).collect(),
         findings,
         blind_to,
         sensitivity,

@@ -1,10 +1,10 @@
-//! What the log shows by itself, whatever an instrument saw: rows whose counts are not where the rows around them go on.
+//! What the records show by themselves, before any model: rows whose counts are not where the rows around them go on, and clocks that do not count the same time.
 //!
 //! A wheel that turns steadily before and after a row turned as fast in between. Of the speeds of two rows before an increment and two after it (the next one
 //! may give back what was astray) the range R is known; were the increment as uncertain as these four, it would be 20 R off with a chance of 1.6e-5 only: P(R < r) ≈
 //! 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables. What is so far off so often has a cause, whether it has a name or not.
 
-use dataset::{Dataset, Odometry, WheelLog};
+use dataset::{Dataset, Odometry, Run, WheelLog};
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::document::Check;
@@ -22,6 +22,29 @@ const LOG_LEVEL: f64 = 1e-6;
 
 /// The check's name.
 pub(crate) const LOG_ROWS: &str = "log_rows";
+
+/// A log that lasts so many times as long as what was seen of the robot, or so many times less, is of another clock.
+const OTHER_CLOCK: f64 = 30.0;
+
+/// The check's name.
+pub(crate) const LOG_SPANS: &str = "log_spans";
+
+/// Whether the log lasts about as long as what was seen: the middle run's ratio. Looks need not begin and end with the log.
+pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<Check> {
+    let ratio = |run: &Run| {
+        let ends = run.displacements.iter().flat_map(|seen| [seen.t0_s, seen.t1_s]);
+        let seen_s = run.truth.iter().map(|look| look.t_s).chain(ends);
+        let (first_s, last_s) = seen_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t_s| (a.min(t_s), b.max(t_s)));
+        let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
+        (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
+    };
+    let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let statistic = *ratios.get(ratios.len() / 2)?;
+    let passes = (OTHER_CLOCK.recip()..OTHER_CLOCK).contains(&statistic);
+    // No chance makes a clock thirty times as fast.
+    Some(Check { name: LOG_SPANS.to_owned(), statistic, p_value: f64::from(u8::from(passes)), passes })
+}
 
 /// How many increments a log has, and how many of them are astray.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

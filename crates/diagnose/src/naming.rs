@@ -11,7 +11,7 @@ use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{Extended, Found, LEAST_REACH, Name, Test, reach};
+use crate::search::{Found, LEAST_REACH, Name, Test, reach};
 use crate::statistics::{of_trials, z_of_p};
 
 /// The parameters of a choice as found.
@@ -87,8 +87,8 @@ fn z(test: &Test, p_value: f64) -> f64 {
 }
 
 /// The finding of a sparse term at the end of a model's choices.
-pub(crate) fn of_sparse(model: &Extended<'_>, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
-    let Choice::Sparse(sparse) = model.choices.last()? else { return None };
+pub(crate) fn of_sparse(choice: &Choice, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
+    let Choice::Sparse(sparse) = choice else { return None };
     let (coefficient, sigma) = *test.sizes.first()?;
     let (channel, covariates) = (sparse.channel.name(), sparse.names());
     let sentence = format!(
@@ -196,6 +196,16 @@ pub(crate) fn of_lost(base: &JointFit<'_>) -> Option<Finding> {
 pub(crate) fn of_rows_astray(log: Option<&Check>) -> Option<Finding> {
     let check = log.filter(|check| !check.passes)?;
     let what = format!("{:.0} rows of the log are not where the rows around them go on", check.statistic);
+    of_scatter(&[], check.p_value, BTreeMap::new(), &what)
+}
+
+/// A log and looks of two clocks.
+pub(crate) fn of_spans(spans: Option<&Check>) -> Option<Finding> {
+    let check = spans.filter(|check| !check.passes)?;
+    let what = format!(
+        "the log lasts {:.3e} times as long as what was seen of the robot: their times are not in one unit",
+        check.statistic
+    );
     of_scatter(&[], check.p_value, BTreeMap::new(), &what)
 }
 

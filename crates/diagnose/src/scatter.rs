@@ -201,7 +201,7 @@ pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
 
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
 fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
-    let model = asked.sparse.as_ref().map_or(&asked.found.model, |(model, _, _)| model);
+    let model = asked.model();
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));

@@ -101,13 +101,11 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
 
 /// What the runs had of the covariates of a product that are their own.
 fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec<f64>> {
-    let chains = &model.fit.records.chains;
     let own = sparse.covariates.iter().filter_map(|covariate| match covariate {
         Covariate::OfRun { key, .. } => Some(key),
         _ => None,
     });
-    own.map(|key| (key.clone(), chains.iter().filter_map(|chain| chain.info.covariates.get(key).copied()).collect()))
-        .collect()
+    own.map(|key| (key.clone(), crate::checks::values_of_runs(&model.fit, key))).collect()
 }
 
 /// The calibrated lengths as effects on the nominal ones.

@@ -158,6 +158,8 @@ pub(crate) struct Found<'a> {
     pub(crate) names: Vec<Vec<Name>>,
     /// For each choice, its test at the end, in the presence of the others.
     pub(crate) tests: Vec<Test>,
+    /// By how much a choice's shape, not being known for certain, widens each of its sizes.
+    wider: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
     /// What was scanned.
@@ -479,10 +481,15 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
             wider.remove(place);
         }
     }
+    Found { tests: tests_of(&model, &wider), model, names, wider, first_scan, scans }
+}
+
+/// Each choice's test beside the others.
+fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
     let test = |(choice, wider): (usize, &Vec<f64>)| {
-        let (mut test, _) = examine(&model, choice)?;
+        let (mut test, _) = examine(model, choice)?;
         // Where runs differ more than looks say, a size is known no better than by the runs.
-        if let Some(over_runs) = over_runs(&model, choice) {
+        if let Some(over_runs) = over_runs(model, choice) {
             test.sizes.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
         }
         for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
@@ -490,6 +497,27 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         }
         Some(test)
     };
-    let tests = wider.iter().enumerate().filter_map(test).collect();
-    Found { model, names, tests, first_scan, scans }
+    wider.iter().enumerate().filter_map(test).collect()
+}
+
+/// What a search among all looks finds, those too that lie far off by the model that was found: a large effect that shows in few looks makes them lie far off, and among
+/// the others it is not seen. It holds if by it they do not lie far off any more, and what is left out as much as what is not is likelier by it.
+pub(crate) fn search_every_look<'a>(base: &JointFit<'a>, found: &Found<'a>, catalogue: &[Choice]) -> Option<Found<'a>> {
+    let open = base.with_every_look().ok()?;
+    let bold = search(&open, catalogue, SCAN_LEVEL, Scans::default());
+    if bold.model.choices.is_empty() {
+        return None;
+    }
+    let fit = bold.model.fit.without_outliers(&mut terms(&bold.model.choices)).ok()?;
+    let model = Extended { fit, choices: bold.model.choices };
+    let outliers = |model: &Extended<'_>| model.fit.fit.pass.outliers.len();
+    let (before, after) = (evidence(base, &found.model), evidence(base, &model));
+    let tests = tests_of(&model, &bold.wider);
+    #[allow(clippy::cast_precision_loss)]
+    let trials = bold.first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
+    let alone = Extended { fit: base.clone(), choices: Vec::new() };
+    let predicts = gain(&alone, &model).map_or(true, |gain| !gain.drifts_more());
+    let holds = outliers(&model) < outliers(&found.model) && after > before + reach(before) && stands && predicts;
+    holds.then(|| Found { model, tests, first_scan: found.first_scan.clone(), scans: found.scans.clone(), ..bold })
 }

@@ -1,9 +1,10 @@
 //! Shape parameters that may be anything between the values that the scan tries: a hinge speed, a time constant. They are fitted by their profile, and what is not
 //! known of them widens the sizes.
 //!
-//! Near its minimum the cost is a parabola of the parameter's logarithm; its curvature is what is known of it, beside that it lies in the range that is tried. A size
-//! that goes with the shape by dθ/dx is known by as much less: σ² = σ²(θ | x) + (dθ/dx)² σ²(x).
-//! Reference: Cox & Hinkley 1974 (profile likelihood); the delta method.
+//! Near its minimum the cost is a parabola of the parameter's logarithm; its curvature is what is known of it, beside that it lies in the range that is tried.
+//! A size that goes with the shape is known by as much less: σ² = σ²(θ | x) + w², w being how far the size goes, either way, over the shapes that 95 % of chance
+//! leaves, over 1.96. Where little is known of the shape, a size is far from going with it in a line.
+//! Reference: Cox & Hinkley 1974 (profile likelihood).
 
 use calib::methods::joint::JointFit;
 
@@ -11,6 +12,8 @@ use crate::search::{Extended, cost, count, refit};
 
 /// Times that the parabola is drawn anew, each time closer.
 const ROUNDS: usize = 2;
+/// Standard deviations either way that hold 95 % of chance.
+const WITHIN_95: f64 = 1.96;
 /// How much closer, at the most.
 const CLOSER: f64 = 0.25;
 
@@ -41,33 +44,36 @@ pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place
         Some(Point { x, model: refit(base, choices)? })
     };
     let mut best = Point { x: held.ln(), model: model.clone() };
-    let mut wider = none.clone();
+    let mut sigma = 0.0;
     for _ in 0..ROUNDS {
         let middle = best.x.clamp(low_end + 0.5 * reach, high_end - 0.5 * reach);
         if middle != best.x {
-            let Some(point) = at(middle) else { return wider };
+            let Some(point) = at(middle) else { return none };
             best = point;
         }
         reach = reach.min(high_end - best.x).min(best.x - low_end);
-        let (Some(below), Some(above)) = (at(best.x - reach), at(best.x + reach)) else { return wider };
+        let (Some(below), Some(above)) = (at(best.x - reach), at(best.x + reach)) else { return none };
         let most = [&below, &best, &above].map(|point| count(&point.model.fit)).into_iter().fold(0.0, f64::max);
         let costs = [&below, &best, &above].map(|point| cost(&point.model.fit, most));
         let (slope, bend) =
             ((costs[2] - costs[0]) / (2.0 * reach), (costs[2] - 2.0 * costs[1] + costs[0]) / (reach * reach));
-        // It lies in the range that is tried, anywhere: a twelfth of its square.
-        let variance = 1.0 / (bend.max(0.0) + 12.0 / (high - low).powi(2));
-        let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.sizes[first + k];
-        wider = (0..parameters)
-            .map(|k| (size(&above, k) - size(&below, k)).abs() / (2.0 * reach) * variance.sqrt())
-            .collect();
+        // Where nothing is known of it, it lies anywhere in the range that is tried.
+        sigma = bend.max(0.0).sqrt().recip().min(high_end - low_end);
         let vertex = if bend > 0.0 { best.x + (-slope / bend).clamp(-reach, reach) } else { best.x };
         let points = [Some(below), at(vertex), Some(above)].into_iter().flatten();
         best = points.fold(best, |best, point| {
             let most = count(&best.model.fit).max(count(&point.model.fit));
             if cost(&point.model.fit, most) < cost(&best.model.fit, most) { point } else { best }
         });
-        reach = (1.5 * variance.sqrt()).clamp(CLOSER * reach, reach);
+        reach = (1.5 * sigma).clamp(CLOSER * reach, reach);
     }
+    let ends = [best.x - WITHIN_95 * sigma, best.x + WITHIN_95 * sigma].map(at);
+    let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.sizes[first + k];
+    let wider = |k: usize| {
+        let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
+        moved.fold(0.0, f64::max) / WITHIN_95
+    };
+    let wider = (0..parameters).map(wider).collect();
     *model = best.model;
     wider
 }

@@ -1,4 +1,4 @@
-//! Structure that no name of the catalogue explains: one sparse term, if it earns its place on runs that it was not fitted to.
+//! Structure that no name of the catalogue explains: sparse terms, each if it earns its place on runs that it was not fitted to.
 
 use calib::methods::joint::JointFit;
 use effects::{Channel, Covariate, Sparse};
@@ -26,6 +26,36 @@ pub(crate) struct SparseFound<'a> {
     pub(crate) certain: bool,
     /// Looks are likelier with it, but odometry drifts more: it stands for something else.
     pub(crate) drifts_more: bool,
+}
+
+/// Sparse terms of one thing at the most: a wheel's phase has a sine and a cosine, and there are two wheels.
+const MOST_SPARSE: usize = 4;
+
+/// What is there without a name: a model, the last of whose choices are sparse terms.
+pub(crate) struct Unlisted<'a> {
+    pub(crate) model: Extended<'a>,
+    /// Of each sparse term, its chance and how many were tried.
+    pub(crate) tried: Vec<(f64, usize)>,
+}
+
+impl<'a> Unlisted<'a> {
+    /// A term that was found, and what is left beside it.
+    pub(crate) fn from(base: &JointFit<'a>, first: SparseFound<'a>) -> Self {
+        let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
+        while all.tried.len() < MOST_SPARSE
+            && let Some(next) = sparse(base, &all.model, UNLISTED_LEVEL).filter(|next| !next.drifts_more)
+        {
+            all.model = next.model;
+            all.tried.push((next.p_value, next.trials));
+        }
+        all
+    }
+
+    /// The places of its sparse terms among the model's choices, each with its chance and how many were tried.
+    pub(crate) fn terms(&self) -> impl Iterator<Item = (usize, f64, usize)> {
+        let first = self.model.choices.len() - self.tried.len();
+        self.tried.iter().enumerate().map(move |(k, &(p_value, trials))| (first + k, p_value, trials))
+    }
 }
 
 /// Products of at most three covariates that vanish at standstill.
@@ -66,8 +96,8 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         products.push(vec![alone, AbsYawRate]);
     }
     for side in Side::BOTH {
-        products.push(vec![CosPhase(side)]);
-        products.push(vec![SinPhase(side)]);
+        products.push(vec![CosPhase(side, 1)]);
+        products.push(vec![SinPhase(side, 1)]);
     }
     let wheels = of_wheels(fit).into_iter().flat_map(|covariates| {
         Channel::WHEELS.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
@@ -79,18 +109,32 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
     let seen = seen.into_iter().flat_map(|covariates| {
         Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
-    moved.chain(wheels).chain(seen).collect()
+    let stamps = Sparse { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] };
+    let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Choice::Sparse);
+    moved.chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(stamps)]).collect()
+}
+
+/// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.
+const CYCLES: [u8; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24];
+
+/// What a wheel may do several times in each turn.
+pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
+    let channel = if side == Side::Left { Channel::LeftWheel } else { Channel::RightWheel };
+    let phases = |cycles| [Covariate::CosPhase(side, cycles), Covariate::SinPhase(side, cycles)];
+    CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
 }
 
 /// What wheels may do by themselves. Their way alone is their size, which every fit has.
 fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
     use Covariate::{
-        AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, SinceReversal, Way, WheelAcceleration, WheelSense, WheelSpeed,
+        AbsWheelSpeed, AbsYawRate, CosPhase, RunTime, SessionTime, SinPhase, SinceReversal, Way, WheelAcceleration,
+        WheelSense, WheelSpeed,
     };
     let modulators = [AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, Way, SinceReversal];
     let modulators: Vec<Covariate> = modulators.into_iter().chain(of_runs(fit)).collect();
     let mut products = vec![vec![AbsWheelSpeed], vec![WheelSense], vec![WheelAcceleration]];
     products.push(vec![WheelAcceleration, AbsWheelSpeed]);
+    products.extend(Side::BOTH.into_iter().flat_map(|side| [vec![CosPhase(side, 1)], vec![SinPhase(side, 1)]]));
     products.push(vec![WheelSpeed, AbsWheelSpeed, AbsWheelSpeed]);
     for rate in [WheelSpeed, AbsWheelSpeed, WheelSense] {
         let own = modulators.iter().filter(|modulator| !(rate == WheelSense && **modulator == AbsWheelSpeed));

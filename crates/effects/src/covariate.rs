@@ -5,8 +5,10 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::{Side, Wheels};
+use kinematics::{Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
+
+use crate::beat::Beat;
 
 /// Which increment a term adds to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -105,14 +107,16 @@ pub enum Covariate {
     WheelSense,
     /// `wheel acceleration`: change of the contact's speed, over 1 m/s².
     WheelAcceleration,
+    /// `row length`: how much longer the logged interval is by its stamps than by the beat of its run's rows, over 2 % of itself.
+    RowLength,
     /// `cos(theta)`: of the heading in the room.
     CosHeading,
     /// `sin(theta)`: of the heading in the room.
     SinHeading,
-    /// `v cos(left wheel)`, `v cos(right wheel)`: cosine of a wheel's angle times its contact's speed.
-    CosPhase(Side),
-    /// `v sin(left wheel)`, `v sin(right wheel)`: sine of a wheel's angle times its contact's speed.
-    SinPhase(Side),
+    /// `v cos(left wheel)`, `v cos(5 right wheel)`: cosine of so many times a wheel's angle, on average over the interval, times its contact's speed.
+    CosPhase(Side, u8),
+    /// `v sin(left wheel)`, `v sin(5 right wheel)`: the same of the sine.
+    SinPhase(Side, u8),
     /// `time in run`, over a minute.
     RunTime,
     /// `session time`: on the session's clock, over ten minutes.
@@ -125,7 +129,7 @@ pub enum Covariate {
     X,
     /// `y`: place in the room, over 1 m.
     Y,
-    /// A covariate of the run, by its own name, less its mean and over its standard deviation; 0 in a run that has none.
+    /// A covariate of the run, by its own name, less its mean and over its standard deviation. A run that does not say it has none of it: no payload is a payload of 0.
     OfRun {
         /// Its name in the run's record.
         key: String,
@@ -136,9 +140,18 @@ pub enum Covariate {
     },
 }
 
+/// Most cycles of a wheel's phase in one turn.
+const MOST_CYCLES: u8 = 24;
+
+/// How often a wheel's angle is taken, in words.
+fn turned(side: Side, cycles: u8) -> String {
+    let wheel = if side == Side::Left { "left wheel" } else { "right wheel" };
+    if cycles == 1 { wheel.to_owned() } else { format!("{cycles} {wheel}") }
+}
+
 impl Covariate {
-    /// Those that have a name of their own: all but [`Self::OfRun`].
-    pub const NAMED: [Self; 22] = [
+    /// Those that have a name of their own: all but [`Self::OfRun`] and phases of several cycles.
+    pub const NAMED: [Self; 23] = [
         Self::Speed,
         Self::AbsSpeed,
         Self::YawRate,
@@ -149,12 +162,13 @@ impl Covariate {
         Self::AbsWheelSpeed,
         Self::WheelSense,
         Self::WheelAcceleration,
+        Self::RowLength,
         Self::CosHeading,
         Self::SinHeading,
-        Self::CosPhase(Side::Left),
-        Self::CosPhase(Side::Right),
-        Self::SinPhase(Side::Left),
-        Self::SinPhase(Side::Right),
+        Self::CosPhase(Side::Left, 1),
+        Self::CosPhase(Side::Right, 1),
+        Self::SinPhase(Side::Left, 1),
+        Self::SinPhase(Side::Right, 1),
         Self::RunTime,
         Self::SessionTime,
         Self::Way,
@@ -177,12 +191,11 @@ impl Covariate {
             Self::AbsWheelSpeed => "|wheel v|",
             Self::WheelSense => "wheel sense",
             Self::WheelAcceleration => "wheel acceleration",
+            Self::RowLength => "row length",
             Self::CosHeading => "cos(theta)",
             Self::SinHeading => "sin(theta)",
-            Self::CosPhase(Side::Left) => "v cos(left wheel)",
-            Self::CosPhase(Side::Right) => "v cos(right wheel)",
-            Self::SinPhase(Side::Left) => "v sin(left wheel)",
-            Self::SinPhase(Side::Right) => "v sin(right wheel)",
+            Self::CosPhase(side, cycles) => return format!("v cos({})", turned(*side, *cycles)),
+            Self::SinPhase(side, cycles) => return format!("v sin({})", turned(*side, *cycles)),
             Self::RunTime => "time in run",
             Self::SessionTime => "session time",
             Self::Way => "distance driven",
@@ -194,13 +207,16 @@ impl Covariate {
         .to_owned()
     }
 
-    /// The covariate of a name; `None` where it is none of [`Self::NAMED`].
+    /// The covariate of a name; `None` where it is none of [`Self::NAMED`], nor a wheel's phase with up to 24 cycles a turn.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        Self::NAMED.into_iter().find(|covariate| covariate.name() == name)
+        let of = |cycles| {
+            Side::BOTH.into_iter().flat_map(move |side| [Self::CosPhase(side, cycles), Self::SinPhase(side, cycles)])
+        };
+        Self::NAMED.into_iter().chain((2..=MOST_CYCLES).flat_map(of)).find(|covariate| covariate.name() == name)
     }
 
-    /// The covariate of a run whose values over the runs are these; `None` where they do not differ.
+    /// The covariate of a run whose values over the runs are these, 0 for one that does not say it; `None` where they do not differ.
     #[must_use]
     pub fn of_run(key: &str, values: &[f64]) -> Option<Self> {
         #[allow(clippy::cast_precision_loss)]
@@ -221,8 +237,8 @@ impl Covariate {
                 | Self::AbsYawRate
                 | Self::Acceleration
                 | Self::YawAcceleration
-                | Self::CosPhase(_)
-                | Self::SinPhase(_)
+                | Self::CosPhase(..)
+                | Self::SinPhase(..)
         ) || self.is_of_a_wheel()
     }
 
@@ -230,6 +246,12 @@ impl Covariate {
     #[must_use]
     pub const fn is_of_a_wheel(&self) -> bool {
         matches!(self, Self::WheelSpeed | Self::AbsWheelSpeed | Self::WheelSense | Self::WheelAcceleration)
+    }
+
+    /// Is it of the log's rows, and not of the robot? It goes with the speed of both wheels alone: a stamp that is off.
+    #[must_use]
+    pub const fn is_of_rows(&self) -> bool {
+        matches!(self, Self::RowLength)
     }
 
     /// Is it known of a look: of the robot's twist and heading then, and of the time?
@@ -257,17 +279,18 @@ impl Covariate {
             Self::WheelSense if at.own_m_s == 0.0 => 0.0,
             Self::WheelSense => at.own_m_s.signum(),
             Self::WheelAcceleration => at.own_m_s2,
+            Self::RowLength => at.row_length,
             Self::CosHeading => at.heading_rad.cos(),
             Self::SinHeading => at.heading_rad.sin(),
-            Self::CosPhase(side) => at.wheel_m_s[*side] * at.wheel_rad[*side].cos(),
-            Self::SinPhase(side) => at.wheel_m_s[*side] * at.wheel_rad[*side].sin(),
+            Self::CosPhase(side, cycles) => at.of_cycle(*side, *cycles, f64::cos),
+            Self::SinPhase(side, cycles) => at.of_cycle(*side, *cycles, f64::sin),
             Self::RunTime => at.run_s / 60.0,
             Self::SessionTime => at.session_s / 600.0,
             Self::Way => at.session_m / 100.0,
             Self::SinceReversal => (-at.since_reversal_m / 0.1).exp(),
             Self::X => at.x_m,
             Self::Y => at.y_m,
-            Self::OfRun { key, mean, sd } => at.of_run.get(key).map_or(0.0, |value| (value - mean) / sd),
+            Self::OfRun { key, mean, sd } => (at.of_run.get(key).copied().unwrap_or(0.0) - mean) / sd,
         }
     }
 }
@@ -282,10 +305,15 @@ pub(crate) struct Moment<'r> {
     pub(crate) heading_rad: f64,
     pub(crate) wheel_m_s: Wheels<f64>,
     pub(crate) wheel_m_s2: Wheels<f64>,
+    /// In the middle of the interval.
     pub(crate) wheel_rad: Wheels<f64>,
+    /// Turned in all of it.
+    pub(crate) turned_rad: Wheels<f64>,
     /// Of the wheel in question.
     pub(crate) own_m_s: f64,
     pub(crate) own_m_s2: f64,
+    /// How much longer the logged interval is than by the beat of the rows, over 2 % of itself.
+    pub(crate) row_length: f64,
     pub(crate) run_s: f64,
     pub(crate) session_s: f64,
     pub(crate) session_m: f64,
@@ -296,9 +324,36 @@ pub(crate) struct Moment<'r> {
 }
 
 impl Moment<'_> {
+    /// A wheel's speed times the mean over the interval of a sine or cosine that comes back so many times a turn.
+    fn of_cycle(&self, side: Side, cycles: u8, of: fn(f64) -> f64) -> f64 {
+        let cycles = f64::from(cycles);
+        self.wheel_m_s[side] * of(cycles * self.wheel_rad[side]) * sinc(0.5 * cycles * self.turned_rad[side])
+    }
+
     /// The same for what a wheel does itself.
     pub(crate) fn of_wheel(&self, side: Side) -> Self {
         Self { own_m_s: self.wheel_m_s[side], own_m_s2: self.wheel_m_s2[side], ..*self }
+    }
+}
+
+/// Unit of how much longer a row is.
+const ROW_SHARE: f64 = 0.02;
+
+/// How much longer a run's rows are by their stamps than by the beat behind them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RowLengths(Beat);
+
+impl RowLengths {
+    /// How much longer a row is, over 2 % of itself; 0 while there is no beat yet.
+    pub(crate) fn next(&mut self, [from_s, row_s]: [f64; 2]) -> f64 {
+        let before_s = self.0.late_s;
+        self.0.next_row(from_s, row_s);
+        if row_s > from_s { (self.0.late_s - before_s) / (ROW_SHARE * (row_s - from_s)) } else { 0.0 }
+    }
+
+    /// The share of the irregularity of stamps that is false, for a coefficient.
+    pub(crate) fn false_share(coefficient: f64) -> f64 {
+        coefficient / ROW_SHARE
     }
 }
 
@@ -341,6 +396,12 @@ mod tests {
         for covariate in Covariate::NAMED {
             assert_eq!(Covariate::named(&covariate.name()), Some(covariate));
         }
+        let of_five = Covariate::SinPhase(Side::Right, 5);
+        assert_eq!(
+            (of_five.name().as_str(), Covariate::named("v sin(5 right wheel)")),
+            ("v sin(5 right wheel)", Some(of_five.clone()))
+        );
+        assert_eq!(Covariate::named("v sin(25 right wheel)"), None);
         assert_eq!(Covariate::named("speed"), None);
         for channel in Channel::all() {
             let read =
@@ -362,8 +423,10 @@ mod tests {
             wheel_m_s: Wheels { left: 0.4, right: -0.6 },
             wheel_m_s2: Wheels { left: 0.0, right: 0.8 },
             wheel_rad: Wheels { left: 1.1, right: 2.3 },
+            turned_rad: Wheels { left: 0.4, right: 0.6 },
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            row_length: -4.0,
             run_s: 30.0,
             session_s: 900.0,
             session_m: 25.0,
@@ -385,12 +448,13 @@ mod tests {
             0.6,
             -1.0,
             0.8,
+            -4.0,
             cos(0.5),
             sin(0.5),
-            0.4 * cos(1.1),
-            -0.6 * cos(2.3),
-            0.4 * sin(1.1),
-            -0.6 * sin(2.3),
+            0.4 * cos(1.1) * sin(0.2) / 0.2,
+            -0.6 * cos(2.3) * sin(0.3) / 0.3,
+            0.4 * sin(1.1) * sin(0.2) / 0.2,
+            -0.6 * sin(2.3) * sin(0.3) / 0.3,
             0.5,
             1.5,
             0.25,
@@ -403,7 +467,7 @@ mod tests {
             assert!((covariate.value(&at) - expected).abs() < 1e-15, "{covariate:?}: {}", covariate.value(&at));
         }
         let of_run = |key: &str| Covariate::OfRun { key: key.to_owned(), mean: 3.0, sd: 2.0 }.value(&at);
-        assert_eq!((of_run("load"), of_run("battery_v")), (2.0, 0.0));
+        assert_eq!((of_run("load"), of_run("payload_kg")), (2.0, -1.5));
     }
 
     #[test]

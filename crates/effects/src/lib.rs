@@ -7,6 +7,7 @@
 //! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow. What has no name there
 //! is simulated as a [`SparseTerm`].
 
+mod beat;
 mod covariate;
 mod effect;
 mod forward;

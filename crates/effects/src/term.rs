@@ -14,7 +14,8 @@ use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::covariate::{Channel, Covariate, Moment, Reversals};
+use crate::IntervalError;
+use crate::covariate::{Channel, Covariate, Moment, Reversals, RowLengths};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
@@ -48,14 +49,13 @@ impl Sparse {
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
-        Box::new(Recorded { of: self.clone(), reversals: Reversals::NONE, row: None })
+        Box::new(Recorded::new(self))
     }
 
     /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
     #[must_use]
     pub fn term_on(&self, channels: [Channel; 3]) -> Box<dyn ModelTerm> {
-        let recorded = Recorded { of: self.clone(), reversals: Reversals::NONE, row: None };
-        Box::new(OnThree { recorded, channels })
+        Box::new(OnThree { recorded: Recorded::new(self), channels })
     }
 
     fn product(&self, at: &Moment<'_>) -> f64 {
@@ -122,6 +122,14 @@ impl SparseTerm {
             let wheels = Channel::WHEELS.map(Channel::name).join(", ");
             return no_term(format!("\"{}\" goes with {wheels} alone, and not with {channel}", own.name()));
         }
+        let rows = [Covariate::WheelSpeed, Covariate::RowLength];
+        if covariates.iter().any(Covariate::is_of_rows) && (self.channel != Channel::Wheels || covariates != rows) {
+            return no_term(format!(
+                "\"{}\" goes with the channel wheels and \"{}\" alone",
+                rows[1].name(),
+                rows[0].name()
+            ));
+        }
         let (what, holds) = if self.channel.is_seen() {
             ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
         } else {
@@ -166,6 +174,11 @@ impl PhysicalEffect for SparseTerm {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         let sparse = self.sparse().ok()?;
+        if sparse.covariates.iter().any(Covariate::is_of_rows) {
+            // Rows are of unlike length where stamps are irregular, and it shows in no others.
+            let share = RowLengths::false_share(self.coefficient);
+            return IntervalError { share, jitter_s: IntervalError::USUAL_JITTER_S }.forward();
+        }
         Some(Box::new(State {
             size: self.clone(),
             sparse,
@@ -235,7 +248,9 @@ impl Forward for State {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            row_length: 0.0,
             wheel_rad: step.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turned| angle + 0.5 * turned),
+            turned_rad: step.wheel_rad,
             run_s: step.t_s + half_s,
             session_s: self.session_s + step.t_s + half_s,
             session_m: self.session_m,
@@ -294,7 +309,9 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> 
         wheel_m_s2: Wheels::both(0.0),
         own_m_s: 0.0,
         own_m_s2: 0.0,
+        row_length: 0.0,
         wheel_rad: Wheels::both(0.0),
+        turned_rad: Wheels::both(0.0),
         run_s,
         session_s: 0.0,
         session_m: 0.0,
@@ -322,6 +339,7 @@ fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> 
 struct Recorded {
     of: Sparse,
     reversals: Reversals,
+    rows: RowLengths,
     row: Option<Row>,
 }
 
@@ -331,6 +349,8 @@ struct Row {
     end_s: f64,
     wheel_m_s: Wheels<f64>,
     wheel_m_s2: Wheels<f64>,
+    /// How much longer it is than by the beat.
+    longer: f64,
 }
 
 /// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second.
@@ -346,6 +366,10 @@ const fn parameter(channel: Channel) -> TermParameter {
 }
 
 impl Recorded {
+    fn new(of: &Sparse) -> Self {
+        Self { of: of.clone(), reversals: Reversals::NONE, rows: RowLengths::default(), row: None }
+    }
+
     /// The middle of an interval that takes time.
     fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
@@ -359,7 +383,7 @@ impl Recorded {
                 let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
                 let wheel_m_s2 =
                     before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
-                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
+                Row { end_s: to_s, wheel_m_s, wheel_m_s2, longer: self.rows.next(interval.row_s) }
             }
         };
         self.row = Some(row);
@@ -375,7 +399,9 @@ impl Recorded {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            row_length: row.longer,
             wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
+            turned_rad: interval.turned_rad,
             run_s: interval.t_s,
             session_s: interval.session_s(),
             session_m: interval.session_m,
@@ -409,7 +435,7 @@ impl ModelTerm for Recorded {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        (self.reversals, self.row) = (Reversals::NONE, None);
+        *self = Self::new(&self.of);
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -458,135 +484,4 @@ impl ModelTerm for OnThree {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::catalogue::specimen_step;
-
-    fn term(channel: Channel, covariates: &[&str]) -> SparseTerm {
-        let covariates = covariates.iter().map(ToString::to_string).collect();
-        SparseTerm { channel, covariates, coefficient: 0.1, of_runs: BTreeMap::new() }
-    }
-
-    fn problem(term: &SparseTerm) -> String {
-        term.check().expect_err("no term").to_string()
-    }
-
-    #[test]
-    fn a_step_gains_the_product_on_its_channel() {
-        let gained = |channel| {
-            let mut state = term(channel, &["v", "|omega|", "sin(theta)"]).forward().expect("a term");
-            let mut step = specimen_step();
-            step.rate_rad_s = Wheels { left: -1.0, right: -3.0 };
-            step.world_from_body.theta_rad = 0.7;
-            step.travel_m = Wheels { left: -8e-5, right: -2.4e-4 };
-            state.floor(&mut step);
-            (0.5 * (step.travel_m.left + step.travel_m.right) + 1.6e-4, step.lateral_m, step.extra_turn_rad)
-        };
-        // v = −0.16 m/s and ω = −0.16/0.363 rad/s; the middle of the step is half of its turn on.
-        let omega_rad_s = -0.16 / 0.363;
-        let size = 0.1 * -0.16 * 0.16 / 0.363 * f64::sin(0.7 + 5e-4 * omega_rad_s) * 1e-3;
-        // Rounding of millimetres alone.
-        let is = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-18, "{found:e} {expected:e}");
-        for (channel, expected) in
-            [(Channel::Along, [size, 0.0, 0.0]), (Channel::Across, [0.0, size, 0.0]), (Channel::Yaw, [0.0, 0.0, size])]
-        {
-            let (along, across, yaw) = gained(channel);
-            is(along, expected[0]);
-            is(across, expected[1]);
-            is(yaw, expected[2]);
-        }
-    }
-
-    #[test]
-    fn a_wheel_gains_by_what_it_does_itself() {
-        // Contacts at 0.2 m/s and −0.4 m/s: c v|v| for 1 ms.
-        let expected = Wheels { left: 4e-6, right: -1.6e-5 };
-        for (channel, has) in [
-            (Channel::Wheels, Wheels::both(1.0)),
-            (Channel::LeftWheel, Wheels { left: 1.0, right: 0.0 }),
-            (Channel::RightWheel, Wheels { left: 0.0, right: 1.0 }),
-        ] {
-            let mut state = term(channel, &["wheel v", "|wheel v|"]).forward().expect("a term");
-            let mut step = specimen_step();
-            step.rate_rad_s = Wheels { left: 2.5, right: -5.0 };
-            let before_m = step.travel_m;
-            state.floor(&mut step);
-            let gained_m = step.travel_m.zip_with(before_m, |after, before| after - before);
-            let off_m = gained_m.zip_with(expected.zip_with(has, |of, has| of * has), |a, b| (a - b).abs());
-            // Rounding of tenths of millimetres alone.
-            assert!(off_m.left.max(off_m.right) < 1e-18, "{channel:?}: {gained_m:?}");
-        }
-    }
-
-    #[test]
-    fn an_instrument_is_off_in_the_frame_of_the_robot() {
-        let mut state = term(Channel::SeenAcross, &["v"]).forward().expect("a term");
-        let mut sighting = Sighting { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, std::f64::consts::FRAC_PI_2) };
-        let before = sighting;
-        state.instrument(&mut sighting);
-        assert_eq!(sighting, before, "nothing has moved yet");
-        let mut step = specimen_step();
-        step.rate_rad_s = Wheels::both(2.5);
-        let untouched = step;
-        state.floor(&mut step);
-        assert_eq!(step, untouched, "it is seen, and not driven");
-        state.instrument(&mut sighting);
-        // Left of a robot that looks along y is −x: 0.1 × 0.2 m/s.
-        assert!((sighting.world_from_body.x_m - 0.98).abs() < 1e-15, "{sighting:?}");
-        assert!((sighting.world_from_body.y_m - 2.0).abs() < 1e-15, "{sighting:?}");
-    }
-
-    #[test]
-    fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
-        let mut of_load = term(Channel::Along, &["v", "load"]);
-        of_load.of_runs.insert("load".to_owned(), vec![1.0, 5.0]);
-        let mut state = of_load.forward().expect("a term");
-        let gained_m = |state: &mut dyn Forward, number, said: Option<f64>| {
-            let mut info = RunInfo::default();
-            info.covariates.extend(said.map(|said| ("load".to_owned(), said)));
-            state.begin_run(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
-            let mut step = specimen_step();
-            step.rate_rad_s = Wheels::both(2.5);
-            state.floor(&mut step);
-            (info.covariates["load"], step.travel_m.left)
-        };
-        // (value − 3)/2 × 0.2 m/s × 0.1 × 1 ms.
-        for (number, said, load, expected) in
-            [(0, None, 1.0, -2e-5), (1, None, 5.0, 2e-5), (2, None, 1.0, -2e-5), (3, Some(3.5), 3.5, 5e-6)]
-        {
-            let (found, gained_m) = gained_m(&mut *state, number, said);
-            assert_eq!(found, load);
-            assert!((gained_m - expected).abs() < 1e-18, "{number}: {gained_m:e}");
-        }
-    }
-
-    #[test]
-    fn what_makes_no_term_says_why() {
-        assert_eq!(term(Channel::Yaw, &["|v|", "sin(theta)"]).check(), Ok(()));
-        assert_eq!(term(Channel::SeenHeading, &["1"]).check(), Ok(()));
-        let unknown = problem(&term(Channel::Yaw, &["v", "speed"]));
-        assert!(unknown.contains("no covariate \"speed\"") && unknown.contains("\"|omega|\""), "{unknown}");
-        assert!(problem(&term(Channel::Yaw, &[])).contains("0 covariates"));
-        assert!(problem(&term(Channel::Yaw, &["v", "v", "v", "v"])).contains("4 covariates"));
-        let at_rest = problem(&term(Channel::Along, &["cos(theta)", "x"]));
-        assert!(at_rest.contains("along must vanish at standstill") && at_rest.contains("\"v\""), "{at_rest}");
-        assert!(problem(&term(Channel::Along, &["1"])).contains("vanish at standstill"));
-        assert!(problem(&term(Channel::Along, &["1", "v"])).contains("no covariate \"1\""));
-        let of_a_wheel = problem(&term(Channel::Along, &["wheel sense"]));
-        assert!(of_a_wheel.contains("\"wheel sense\" goes with wheels, left_wheel, right_wheel alone"), "{of_a_wheel}");
-        let seen = problem(&term(Channel::SeenAlong, &["session time"]));
-        assert!(seen.contains("seen_along goes with these alone") && seen.contains("\"cos(theta)\""), "{seen}");
-        let endless = SparseTerm { coefficient: f64::NAN, ..term(Channel::Yaw, &["v"]) };
-        assert!(problem(&endless).contains("coefficient is NaN"));
-        let of_runs = |key: &str, values: &[f64]| {
-            let mut term = term(Channel::Yaw, &["v", "load"]);
-            term.of_runs.insert(key.to_owned(), values.to_vec());
-            problem(&term)
-        };
-        assert!(of_runs("load", &[2.0, 2.0]).contains("of_runs.load must be finite values that differ"));
-        assert!(of_runs("load", &[]).contains("must be finite"));
-        assert!(of_runs("load", &[2.0, f64::INFINITY]).contains("must be finite"));
-        assert!(of_runs("mass", &[1.0, 2.0]).contains("of_runs.mass is not among the covariates"));
-        assert!(of_runs("v", &[1.0, 2.0]).contains("the name is taken"));
-    }
-}
+mod tests;

@@ -82,6 +82,8 @@ pub(crate) struct Case {
     pub(crate) datasets: Vec<Dataset>,
     /// The held-out log, without noise, and the same without the effects.
     pub(crate) held_out: Option<(Dataset, Dataset)>,
+    /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its place among the hidden ones, and the log.
+    pub(crate) held_out_by_chance: Vec<(usize, Dataset)>,
     /// What a calibration without the effects would find, without noise.
     pub(crate) best_drive: Option<calib::likelihood::Model>,
     pub(crate) noise: TrueNoise,
@@ -264,14 +266,26 @@ impl Case {
         let best = both.as_ref().or(shown.first().and_then(Option::as_ref));
         let best_drive = best.map(Shown::best_drive);
         let datasets = drive(&robot.sessions, &sight, &all, true, 0)?;
-        let held_out = if weak {
-            let log =
-                |hidden: &[&Hidden]| drive(std::slice::from_ref(&robot.held_out), &sight, hidden, false, HELD_OUT);
-            log(&all)?.pop().zip(log(&[])?.pop())
-        } else {
-            None
+        let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, BenchError> {
+            Ok(drive(std::slice::from_ref(&robot.held_out), &sight, hidden, false, HELD_OUT)?.pop())
         };
-        Ok(Some(Self { round, watching, hidden, oracle, datasets, held_out, best_drive, noise, robot }))
+        let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
+        let mut held_out_by_chance = Vec::new();
+        for (place, effect) in hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && by_chance(effect)) {
+            held_out_by_chance.extend(log(&[effect])?.map(|log| (place, log)));
+        }
+        Ok(Some(Self {
+            round,
+            watching,
+            hidden,
+            oracle,
+            datasets,
+            held_out,
+            held_out_by_chance,
+            best_drive,
+            noise,
+            robot,
+        }))
     }
 
     /// The drive that a calibration should find.
@@ -286,10 +300,14 @@ enum Chosen {
     Unseen,
 }
 
-/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it (where in its gap a
-/// wheel was left, which fraction of a count was lost).
+/// Whether chance has a part in an effect's signature: where in its gap a wheel was left, which fraction of a count was lost.
+fn by_chance(effect: &Hidden) -> bool {
+    ["backlash", "low_speed_truncation"].contains(&effect.id)
+}
+
+/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it.
 fn by_form(effect: &Hidden) -> bool {
-    effect.other_form || ["backlash", "low_speed_truncation"].contains(&effect.id)
+    effect.other_form || by_chance(effect)
 }
 
 /// Noncentrality of the test that knows the effect.

@@ -1,6 +1,10 @@
 //! A diagnosis held against what was hidden.
 
+use calib::likelihood::Model;
+use dataset::Dataset;
 use diagnose::{Diagnosis, Document, Options, Verdict, diagnose};
+use effects::{Hypothesis, hypothesis};
+use kinematics::DriveGeometry;
 
 use super::case::{Case, OracleView, Round};
 use super::hidden::{EffectKind, kind_of};
@@ -148,8 +152,8 @@ fn said(document: &Document, case: &Case) -> Vec<Said> {
         .collect()
 }
 
-/// What the tool's model gains on the held-out log over the best calibration without the effect, and what the true term gains there. Looks without error: on
-/// average over their errors the log score differs by these. Only means gain. A tool that says nothing gains nothing: its own base is not held against it.
+/// What the tool's model gains on the held-out log over the best calibration without the effect, and what the true terms gain there: all of it but what chance makes of
+/// an effect, which nobody can know before. Looks without error: on average over their errors the log score differs by these. Only means gain. A tool that says nothing gains nothing: its own base is not held against it.
 fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, BenchError> {
     let mean = case.oracle.iter().all(|hidden| kind_of(&hidden.id) == Some(EffectKind::Mean));
     let (Some((held_out, plain)), Some(best), Some(truth)) = (&case.held_out, &case.best_drive, case.truth()) else {
@@ -159,12 +163,27 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
         return Ok(None);
     }
     let held_out = std::slice::from_ref(held_out);
-    let floor = misfit(std::slice::from_ref(plain), &calib::likelihood::Model::of(&truth, 0), case.noise, &mut []);
+    let floor = misfit(std::slice::from_ref(plain), &Model::of(&truth, 0), case.noise, &mut []);
     let base = misfit(held_out, best, case.noise, &mut []);
-    let possible = base - floor;
+    let possible = base - floor - left_to_chance(case, &truth, floor);
     let extended = diagnosis.filter(|diagnosis| !diagnosis.found.terms().is_empty());
     let found = extended.map_or(0.0, |diagnosis| {
         base - misfit(held_out, &diagnosis.found.model, case.noise, &mut diagnosis.found.terms())
     });
     Ok(Some([found, possible]))
+}
+
+/// What is left of the effects in which chance has a part, each alone, with its own term at its true sizes.
+fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
+    let left = |(place, log): &(usize, Dataset)| {
+        let hidden = &case.hidden[*place];
+        let sizes = hidden.sizes();
+        let of = |name: &str| sizes.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
+        let shapes = hypothesis(hidden.id).and_then(Hypothesis::into_shapes)?;
+        let own = shapes.into_iter().find(|shape| shape.held.iter().all(|(name, value)| of(name) == *value))?;
+        let mut model = Model::of(truth, 0);
+        model.sizes = own.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
+        Some((misfit(std::slice::from_ref(log), &model, case.noise, &mut [own.term]) - floor).max(0.0))
+    };
+    case.held_out_by_chance.iter().filter_map(left).sum()
 }

@@ -38,6 +38,8 @@ pub struct FitOptions {
     pub noise_settled: f64,
     /// Most steps.
     pub max_steps: usize,
+    /// Looks that lie far off are taken like the others.
+    pub every_look: bool,
 }
 
 impl FitOptions {
@@ -50,7 +52,12 @@ impl FitOptions {
             noise_held: false,
             noise_settled: NOISE_SETTLED,
             max_steps: 60,
+            every_look: false,
         }
+    }
+
+    fn gate(&self) -> Gate {
+        if self.every_look { Gate::Open } else { Gate::Shut }
     }
 }
 
@@ -155,7 +162,7 @@ pub(crate) fn fit_from(
             }
         }
     }
-    let want = Want { noise_score: !options.noise_held, ..Want::default() };
+    let want = Want { noise_score: !options.noise_held, gate: options.gate(), ..Want::default() };
     let (mut converged, mut pace) = (false, Pace::default());
     for _ in 0..options.max_steps {
         let found = pass(records, selections, &model, &noise, &headings, terms, want);
@@ -166,7 +173,8 @@ pub(crate) fn fit_from(
             break;
         }
     }
-    let pass = pass_with_innovations(records, selections, &model, &noise, &headings, terms);
+    let want = Want { innovations: true, gate: options.gate(), ..Want::default() };
+    let pass = pass(records, selections, &model, &noise, &headings, terms, want);
     Ok(Fit { model, noise, free_headings: headings, pass, converged })
 }
 

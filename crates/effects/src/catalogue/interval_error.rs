@@ -11,6 +11,7 @@ use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::beat::Beat;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Shape, size};
@@ -26,8 +27,10 @@ pub struct IntervalError {
     pub jitter_s: f64,
 }
 
-/// The irregularity of a fitted effect, seconds: data show the share that is false, and their own irregularity.
-const USUAL_JITTER_S: f64 = 0.005;
+impl IntervalError {
+    /// The irregularity of a fitted effect, seconds: data show the share that is false, and their own irregularity.
+    pub(crate) const USUAL_JITTER_S: f64 = 0.005;
+}
 
 impl PhysicalEffect for IntervalError {
     fn check(&self) -> Result<(), EffectError> {
@@ -48,7 +51,7 @@ impl PhysicalEffect for IntervalError {
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
             share: size(sizes, "share")?.min(1.0),
-            jitter_s: size(sizes, "jitter_s").unwrap_or(USUAL_JITTER_S),
+            jitter_s: size(sizes, "jitter_s").unwrap_or(Self::USUAL_JITTER_S),
         })
     }
 }
@@ -75,36 +78,11 @@ impl Forward for State {
     }
 }
 
-/// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by, a beat.
-const LEAST_ROWS: usize = 24;
-/// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
-const MEMORY_ROWS: f64 = 500.0;
-/// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with a row lost in it, hardly one as short.
-const ONE_BEAT: f64 = 1.7;
-/// Nor as short as this: such a row came by itself, at a standstill.
-const NO_BEAT: f64 = 0.3;
-/// A row that is farther from its beat than this share of it has missed it.
-const MISSED: f64 = 0.45;
-/// After so many in a row the log keeps another beat.
-const MOST_MISSED: u32 = 3;
-
-/// The regular beat behind a run's rows: a line through their times over the numbers of their beats.
+/// What irregular stamps make of a run's rows.
 #[derive(Clone, Default)]
 struct Term {
-    /// Times of the rows from which the beat is yet to be found.
-    first_s: Vec<f64>,
-    /// Of the rows of the beat: weight, means of number and time, and sums of squares and products about them.
-    rows: f64,
-    mean: [f64; 2],
-    square: f64,
-    product: f64,
-    /// The number of the last.
-    last: f64,
-    /// Rows since the last that kept to the beat.
-    missed: u32,
-    /// How late the last row was by its beat, or the last before it that had one; 0 before any had.
-    late_s: f64,
-    /// What that makes of the wheels' ways at the last row, for a share of one.
+    beat: Beat,
+    /// What its lateness makes of the wheels' ways at the last row, for a share of one.
     off_m: Wheels<f64>,
     /// The logged interval whose parts come in.
     row: Option<Row>,
@@ -129,77 +107,6 @@ const RECENT: usize = 5;
 const CHANGES: f64 = 1.5;
 
 impl Term {
-    /// When beat 0 is and the time between two beats, where that is known.
-    fn line(&self) -> Option<(f64, f64)> {
-        (self.square > 0.0).then(|| {
-            let between_s = self.product / self.square;
-            (self.mean[1] - between_s * self.mean[0], between_s)
-        })
-    }
-
-    /// Takes a row of the beat, by Welford's recursion.
-    fn add(&mut self, beat: f64, time_s: f64) {
-        self.last = beat;
-        let keeps = 1.0 - 1.0 / MEMORY_ROWS;
-        self.rows = keeps * self.rows + 1.0;
-        let off = [beat - self.mean[0], time_s - self.mean[1]];
-        for (mean, off) in self.mean.iter_mut().zip(off) {
-            *mean += off / self.rows;
-        }
-        self.square = keeps * self.square + off[0] * (beat - self.mean[0]);
-        self.product = keeps * self.product + off[0] * (time_s - self.mean[1]);
-    }
-
-    /// Takes a row before anything is known of the beat. Once there are enough of them, their gaps are so many times the middle one.
-    fn warm_up(&mut self, from_s: f64, row_s: f64) {
-        if self.first_s.is_empty() {
-            self.first_s.push(from_s);
-        }
-        self.first_s.push(row_s);
-        if self.first_s.len() <= LEAST_ROWS {
-            return;
-        }
-        let rows_s = std::mem::take(&mut self.first_s);
-        let mut gaps_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        gaps_s.sort_by(f64::total_cmp);
-        let between_s = gaps_s[gaps_s.len() / 2];
-        let (mut beat, mut last_s) = (0.0, rows_s[0]);
-        self.add(beat, last_s);
-        for &row_s in &rows_s[1..] {
-            let gap = (row_s - last_s) / between_s;
-            if gap > NO_BEAT {
-                beat += if gap < ONE_BEAT { 1.0 } else { gap.round() };
-                last_s = row_s;
-                self.add(beat, row_s);
-            }
-        }
-        self.late_s = self.line().map_or(0.0, |(zero_s, between_s)| last_s - zero_s - beat * between_s);
-    }
-
-    /// Takes the row that ends an interval: how late it is.
-    fn next_row(&mut self, from_s: f64, row_s: f64) {
-        let Some((zero_s, between_s)) = self.line() else {
-            self.warm_up(from_s, row_s);
-            return;
-        };
-        let beat = ((row_s - zero_s) / between_s).round();
-        if beat <= self.last {
-            return; // It came by itself, at a standstill.
-        }
-        let late_s = row_s - zero_s - beat * between_s;
-        if late_s.abs() > MISSED * between_s {
-            self.missed += 1;
-            if self.missed >= MOST_MISSED {
-                let (late_s, off_m) = (self.late_s, self.off_m);
-                *self = Self { recent: std::mem::take(&mut self.recent), late_s, off_m, ..Self::default() };
-            }
-            return;
-        }
-        self.missed = 0;
-        self.late_s = late_s;
-        self.add(beat, row_s);
-    }
-
     /// The speed of the wheels by rows that have nothing to do with when this one and the one before were stamped: the speed of an interval by its own stamps goes
     /// with their errors, and would lengthen or shorten all ways.
     fn speed_m_s(&self, now_m_s: Wheels<f64>) -> Wheels<f64> {
@@ -235,9 +142,9 @@ impl ModelTerm for Term {
                     self.recent.pop_front();
                 }
             }
-            self.next_row(from_s, row_s);
+            self.beat.next_row(from_s, row_s);
             // What a late stamp makes of a way is gone with the next one: only the speed then and the row count.
-            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.late_s);
+            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.beat.late_s);
             let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
             self.row = Some(Row { end_s: row_s, length_s: row_s - from_s, gained_m, travel_m: Wheels::both(0.0) });
         }
@@ -254,29 +161,6 @@ impl ModelTerm for Term {
 mod tests {
     use super::*;
     use crate::{Address, StreamName};
-
-    #[test]
-    fn a_jitter_of_a_third_of_the_beat_is_late_and_early_alike() {
-        let (between_s, jitter_s, rows) = (0.025, 0.008, 2000_u32);
-        for seed in 0..50 {
-            let mut stream = Address { seed, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test"));
-            let mut stamp_s = |row: u32| between_s * f64::from(row) + stream.uniform_about_zero(jitter_s);
-            let mut term = Term::default();
-            let (mut before_s, mut square) = (stamp_s(0), 0.0);
-            for row in 1..rows {
-                let row_s = stamp_s(row).max(before_s + 1e-3);
-                term.next_row(before_s, row_s);
-                square += term.late_s * term.late_s;
-                // Never later than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
-                assert!(term.late_s.abs() < between_s, "seed {seed} row {row}: {}", term.late_s);
-                before_s = row_s;
-            }
-            // A uniform error.
-            let expected = jitter_s * jitter_s / 3.0;
-            let seen = square / f64::from(rows);
-            assert!((0.8..1.2).contains(&(seen / expected)), "seed {seed}: {}", seen / expected);
-        }
-    }
 
     #[test]
     fn a_false_share_of_the_stamp_is_not_in_the_reading() {

@@ -22,7 +22,7 @@ use crate::estimate::{
 use crate::likelihood::{
     Chain, Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning,
 };
-use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, Want, basis, fit_from, pass, pass_with_innovations};
+use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, Want, basis, fit_from, pass};
 
 pub use one_step::{LARGE_ROWS, OneStep, OneStepError, is_large};
 pub use profile::RISE_95;
@@ -88,6 +88,8 @@ pub struct JointFit<'a> {
     pub(crate) parts: Vec<Evidence>,
     /// Displacements count as neighbours when it is asked whether looks are white.
     pub(crate) displacements_follow: bool,
+    /// Looks that lie far off are taken like the others.
+    pub(crate) every_look: bool,
 }
 
 impl Joint {
@@ -124,6 +126,7 @@ impl Joint {
             noise_settled,
             parts: Vec::new(),
             displacements_follow: self.thin_displacements,
+            every_look: false,
         };
         found.look_at_the_mounting();
         found.refit(None)?;
@@ -168,7 +171,8 @@ impl JointFit<'_> {
     ) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let noise_settled = self.noise_settled;
-        let options = FitOptions { held: self.held(), noise_settled, ..FitOptions::of(&self.columns) };
+        let every_look = self.every_look;
+        let options = FitOptions { held: self.held(), noise_settled, every_look, ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
         Ok(())
     }
@@ -301,7 +305,33 @@ impl JointFit<'_> {
         let mut model = self.fit.model.clone();
         model.sizes.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        pass_with_innovations(&self.records, &self.selections, &model, noise, free_headings, terms)
+        let want = Want { innovations: true, gate: self.gate(), ..Want::default() };
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, want)
+    }
+
+    pub(crate) fn gate(&self) -> Gate {
+        if self.every_look { Gate::Open } else { Gate::Shut }
+    }
+
+    /// The fit to every look, those that lie far off too: a large effect that shows in few looks makes them lie far off, and without them it is not seen. Where some
+    /// err by themselves, it is a worse fit.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn with_every_look(&self) -> Result<Self, CalibError> {
+        let mut open = Self { every_look: true, ..self.clone() };
+        open.refit(None)?;
+        Ok(open)
+    }
+
+    /// The same fit, looks that lie far off by it left out. `terms` are those of the fit.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn without_outliers(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, CalibError> {
+        let mut shut = Self { every_look: false, ..self.clone() };
+        shut.refit_with(Some(self.here()), terms)?;
+        Ok(shut)
     }
 
     /// The evidence of the same pass for terms that are tested one by one, from number `apart_from` on: there is none of two of them together.
@@ -311,7 +341,7 @@ impl JointFit<'_> {
         let mut model = self.fit.model.clone();
         model.sizes.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        let want = Want { apart_from: Some(apart_from), ..Want::default() };
+        let want = Want { apart_from: Some(apart_from), gate: self.gate(), ..Want::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, want).runs
     }
 
