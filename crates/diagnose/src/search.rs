@@ -12,7 +12,7 @@ use crate::gain::{LEAST_RUNS, gain};
 use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
 use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
 use crate::shape::fit_shape;
-use crate::statistics::{of_trials, p_of_statistic, p_of_student};
+use crate::statistics::{of_trials, p_of_statistic, p_of_student, student_95};
 
 /// Family-wise rate of false alarms of the scan over the catalogue.
 pub(crate) const SCAN_LEVEL: f64 = 0.02;
@@ -283,7 +283,9 @@ fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
     #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
     let covariance = &inverse * scatter * &inverse * ((n - 1.0) / n);
-    Some(covariance.diagonal().iter().map(|variance| variance.sqrt()).collect())
+    // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
+    let widening = student_95(n - 1.0) / 1.96;
+    Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
 /// Refits a model with its choices; `None` when that diverges.

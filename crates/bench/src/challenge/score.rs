@@ -3,7 +3,7 @@
 use calib::likelihood::Model;
 use dataset::Dataset;
 use diagnose::{Diagnosis, Document, Options, Verdict, diagnose};
-use effects::{Hypothesis, hypothesis};
+use effects::{Hypothesis, Shape, hypothesis};
 use kinematics::DriveGeometry;
 
 use super::case::{Case, OracleView, Round};
@@ -173,17 +173,19 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
     Ok(Some([found, possible]))
 }
 
-/// What is left of the effects in which chance has a part, each alone, with its own term at its true sizes.
+/// What is left of the effects in which chance has a part, each alone, with its own term at its true sizes, of the shape that leaves least.
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];
         let sizes = hidden.sizes();
         let of = |name: &str| sizes.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
+        let of_shape = |shape: Shape| {
+            let mut model = Model::of(truth, 0);
+            model.sizes = shape.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
+            misfit(std::slice::from_ref(log), &model, case.noise, &mut [shape.term])
+        };
         let shapes = hypothesis(hidden.id).and_then(Hypothesis::into_shapes)?;
-        let own = shapes.into_iter().find(|shape| shape.held.iter().all(|(name, value)| of(name) == *value))?;
-        let mut model = Model::of(truth, 0);
-        model.sizes = own.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
-        Some((misfit(std::slice::from_ref(log), &model, case.noise, &mut [own.term]) - floor).max(0.0))
+        Some((shapes.into_iter().map(of_shape).fold(f64::INFINITY, f64::min) - floor).max(0.0))
     };
     case.held_out_by_chance.iter().filter_map(left).sum()
 }
