@@ -98,6 +98,44 @@ fn nulls_are_consistent() {
     assert!(alarms <= bound, "{alarms} alarms in {nulls}; at 5 % more than {bound} have a chance below 1e-3");
 }
 
+/// With the ends of runs alone a large effect makes a fifth of the looks lie far off by any model without it, and what is left shows nothing: without a search among all
+/// looks this one is `unlisted`.
+#[test]
+fn a_large_effect_that_shows_in_few_looks_is_not_taken_for_outliers() {
+    let (yaw_rad, seed) = (0.02, 71);
+    let mut dataset = simulated(&case("truth_yaw", &format!("yaw_rad = {yaw_rad}")), seed);
+    for run in &mut dataset.runs {
+        run.truth.drain(1..run.truth.len() - 1);
+    }
+    let document = diagnosed(&dataset, &[]);
+    println!("truth_yaw at the ends (seed {seed}): {:?}", shown(&document));
+    let found = document.findings.iter().find(|finding| finding.names[0] == "truth_yaw").expect("its name");
+    let size = &found.parameters["yaw_rad"];
+    // Four of its standard deviations: 6e-5 by chance.
+    let sigma = size.sigma.expect("a standard deviation");
+    assert!((size.value - yaw_rad).abs() < 4.0 * sigma && sigma < 0.1 * yaw_rad, "{size:?}");
+}
+
+/// A wheel's phase has a sine and a cosine: left out of the catalogue, an eccentric wheel is two terms without a name, of that wheel, at the sizes that it has.
+#[test]
+fn a_wheel_out_of_round_is_two_terms_of_that_wheel_where_it_has_no_name() {
+    let (id, sizes, _) = HIDDEN[1];
+    let document = diagnosed(&simulated(&case(id, sizes), 9_001), &[id]);
+    let found: Vec<&UnlistedTerm> = document.findings.iter().filter_map(|of| of.unlisted_term.as_ref()).collect();
+    println!("{id} taken out: {found:?}");
+    // 0.004 sin(φ + 1).
+    for (covariate, expected) in
+        [("v cos(right wheel)", 0.004 * 1.0_f64.sin()), ("v sin(right wheel)", 0.004 * 1.0_f64.cos())]
+    {
+        let own = found
+            .iter()
+            .find(|term| term.channel == "right_wheel" && term.covariates == [covariate])
+            .expect("its term");
+        // Four standard deviations, and a hundredth of it for a form of first order.
+        assert!((own.coefficient - expected).abs() < 4.0 * own.sigma + 0.01 * expected, "{own:?} for {expected}");
+    }
+}
+
 /// Taken out of the catalogue, an effect may show as `unlisted`, or stay unseen, or among several names; a single other name would be a lie.
 #[test]
 fn what_is_not_in_the_catalogue_gets_no_other_name() {

@@ -21,7 +21,7 @@ fn with(mut scenario: Scenario, term: &SparseTerm) -> Scenario {
 }
 
 /// Channel, covariates, coefficient, and the share of the whole that may remain; [`crate::means`] says of the last whence it comes.
-const CASES: [(Channel, &[&str], f64, f64); 31] = [
+const CASES: [(Channel, &[&str], f64, f64); 33] = [
     (Channel::Along, &["v", "|v|"], 0.1, 0.0),
     (Channel::Along, &["|omega|"], 0.005, 0.0),
     (Channel::Along, &["v", "cos(theta)"], 0.03, 0.0),
@@ -55,6 +55,9 @@ const CASES: [(Channel, &[&str], f64, f64); 31] = [
     // A wheel that starts within a row has its sense for all of it.
     (Channel::Wheels, &["wheel sense"], 0.003, 0.03),
     (Channel::LeftWheel, &["wheel acceleration"], 0.03, 0.06),
+    (Channel::RightWheel, &["v cos(5 right wheel)"], 0.1, 0.0),
+    // The speed of a row by its own stamps goes with their errors, and the first rows have no beat yet.
+    (Channel::Wheels, &["wheel v", "row length"], 0.01, 0.3),
     // A row knows the time at its start.
     (Channel::RightWheel, &["|wheel v|", "time in run"], 0.1, 2e-3),
 ];
@@ -169,6 +172,7 @@ fn both_engines_mean_the_same_by_a_term_or_the_closed_form_refuses_it() {
         "cos(theta)",
         "sin(theta)",
         "1",
+        "wheel v row length",
     ];
     assert_eq!(exact, expected);
 }

@@ -8,8 +8,6 @@ use std::collections::BTreeMap;
 use kinematics::{Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
-use crate::beat::Beat;
-
 /// Which increment a term adds to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -279,7 +277,8 @@ impl Covariate {
             Self::WheelSense if at.own_m_s == 0.0 => 0.0,
             Self::WheelSense => at.own_m_s.signum(),
             Self::WheelAcceleration => at.own_m_s2,
-            Self::RowLength => at.row_length,
+            // Of the log's rows, which no moment knows: a term of it is [`crate::IntervalError`]'s.
+            Self::RowLength => 0.0,
             Self::CosHeading => at.heading_rad.cos(),
             Self::SinHeading => at.heading_rad.sin(),
             Self::CosPhase(side, cycles) => at.of_cycle(*side, *cycles, f64::cos),
@@ -312,8 +311,6 @@ pub(crate) struct Moment<'r> {
     /// Of the wheel in question.
     pub(crate) own_m_s: f64,
     pub(crate) own_m_s2: f64,
-    /// How much longer the logged interval is than by the beat of the rows, over 2 % of itself.
-    pub(crate) row_length: f64,
     pub(crate) run_s: f64,
     pub(crate) session_s: f64,
     pub(crate) session_m: f64,
@@ -333,27 +330,6 @@ impl Moment<'_> {
     /// The same for what a wheel does itself.
     pub(crate) fn of_wheel(&self, side: Side) -> Self {
         Self { own_m_s: self.wheel_m_s[side], own_m_s2: self.wheel_m_s2[side], ..*self }
-    }
-}
-
-/// Unit of how much longer a row is.
-const ROW_SHARE: f64 = 0.02;
-
-/// How much longer a run's rows are by their stamps than by the beat behind them.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct RowLengths(Beat);
-
-impl RowLengths {
-    /// How much longer a row is, over 2 % of itself; 0 while there is no beat yet.
-    pub(crate) fn next(&mut self, [from_s, row_s]: [f64; 2]) -> f64 {
-        let before_s = self.0.late_s;
-        self.0.next_row(from_s, row_s);
-        if row_s > from_s { (self.0.late_s - before_s) / (ROW_SHARE * (row_s - from_s)) } else { 0.0 }
-    }
-
-    /// The share of the irregularity of stamps that is false, for a coefficient.
-    pub(crate) fn false_share(coefficient: f64) -> f64 {
-        coefficient / ROW_SHARE
     }
 }
 
@@ -426,7 +402,6 @@ mod tests {
             turned_rad: Wheels { left: 0.4, right: 0.6 },
             own_m_s: 0.0,
             own_m_s2: 0.0,
-            row_length: -4.0,
             run_s: 30.0,
             session_s: 900.0,
             session_m: 25.0,
@@ -448,7 +423,7 @@ mod tests {
             0.6,
             -1.0,
             0.8,
-            -4.0,
+            0.0,
             cos(0.5),
             sin(0.5),
             0.4 * cos(1.1) * sin(0.2) / 0.2,

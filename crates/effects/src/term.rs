@@ -15,7 +15,7 @@ use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, Moment, Reversals, RowLengths};
+use crate::covariate::{Channel, Covariate, Moment, Reversals};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
@@ -49,7 +49,10 @@ impl Sparse {
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
-        Box::new(Recorded::new(self))
+        match IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop()) {
+            Some(shape) if self.covariates.iter().any(Covariate::is_of_rows) => Box::new(OfRows(shape.term)),
+            _ => Box::new(Recorded::new(self)),
+        }
     }
 
     /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
@@ -176,8 +179,9 @@ impl PhysicalEffect for SparseTerm {
         let sparse = self.sparse().ok()?;
         if sparse.covariates.iter().any(Covariate::is_of_rows) {
             // Rows are of unlike length where stamps are irregular, and it shows in no others.
-            let share = RowLengths::false_share(self.coefficient);
-            return IntervalError { share, jitter_s: IntervalError::USUAL_JITTER_S }.forward();
+            let irregular =
+                IntervalError { share: self.coefficient / ROW_SHARE, jitter_s: IntervalError::USUAL_JITTER_S };
+            return if self.coefficient == 0.0 { None } else { irregular.forward() };
         }
         Some(Box::new(State {
             size: self.clone(),
@@ -248,7 +252,6 @@ impl Forward for State {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
-            row_length: 0.0,
             wheel_rad: step.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turned| angle + 0.5 * turned),
             turned_rad: step.wheel_rad,
             run_s: step.t_s + half_s,
@@ -309,7 +312,6 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> 
         wheel_m_s2: Wheels::both(0.0),
         own_m_s: 0.0,
         own_m_s2: 0.0,
-        row_length: 0.0,
         wheel_rad: Wheels::both(0.0),
         turned_rad: Wheels::both(0.0),
         run_s,
@@ -339,7 +341,6 @@ fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> 
 struct Recorded {
     of: Sparse,
     reversals: Reversals,
-    rows: RowLengths,
     row: Option<Row>,
 }
 
@@ -349,8 +350,6 @@ struct Row {
     end_s: f64,
     wheel_m_s: Wheels<f64>,
     wheel_m_s2: Wheels<f64>,
-    /// How much longer it is than by the beat.
-    longer: f64,
 }
 
 /// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second.
@@ -367,7 +366,7 @@ const fn parameter(channel: Channel) -> TermParameter {
 
 impl Recorded {
     fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), reversals: Reversals::NONE, rows: RowLengths::default(), row: None }
+        Self { of: of.clone(), reversals: Reversals::NONE, row: None }
     }
 
     /// The middle of an interval that takes time.
@@ -383,7 +382,7 @@ impl Recorded {
                 let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
                 let wheel_m_s2 =
                     before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
-                Row { end_s: to_s, wheel_m_s, wheel_m_s2, longer: self.rows.next(interval.row_s) }
+                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
             }
         };
         self.row = Some(row);
@@ -399,7 +398,6 @@ impl Recorded {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
-            row_length: row.longer,
             wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
             turned_rad: interval.turned_rad,
             run_s: interval.t_s,
@@ -451,6 +449,30 @@ impl ModelTerm for Recorded {
             let product = self.of.product(&seen(speeds, look.world_from_body, look.t_s));
             gradient[0] = on_channel(self.of.channel, product, speeds);
         }
+    }
+}
+
+/// Unit of how much longer a row is than by the beat, as a share of itself.
+const ROW_SHARE: f64 = 0.02;
+
+/// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is false. Which speed it goes with is not that by the same stamps.
+#[derive(Clone)]
+struct OfRows(Box<dyn ModelTerm>);
+
+impl ModelTerm for OfRows {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const OWN: [TermParameter; 1] = [parameter(Channel::Wheels)];
+        &OWN
+    }
+
+    fn restart(&mut self, run: &RunInfo) {
+        self.0.restart(run);
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        self.0.motion(interval, gradient);
+        let Pose { x_m, y_m, theta_rad } = gradient[0];
+        gradient[0] = Pose::new(x_m / ROW_SHARE, y_m / ROW_SHARE, theta_rad / ROW_SHARE);
     }
 }
 
