@@ -13,7 +13,7 @@ use crate::candidate::{Choice, terms, terms_together};
 use crate::document::Check;
 use crate::scan::{Projected, Projection, freedom, principal, total};
 use crate::search::Extended;
-use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z};
+use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
 use crate::unlisted::of_cycles;
 
 /// Family-wise rate of false alarms of all checks.
@@ -53,8 +53,14 @@ pub(crate) struct Outliers {
     pub(crate) p_value: f64,
 }
 
-/// What residuals may go with: a name and the products that are tested on every channel.
-pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Sparse>)> {
+/// What residuals may go with.
+struct Question {
+    name: String,
+    /// In groups, each of which is tested as a whole: the best of them answers, and pays for all.
+    groups: Vec<Vec<Sparse>>,
+}
+
+fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     use Covariate::{
         AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RowLength, RunTime, SessionTime, SinHeading,
         SinPhase, SinceReversal, Speed, Way, WheelSpeed, X, Y, YawAcceleration, YawRate,
@@ -80,13 +86,19 @@ pub(crate) fn questions(fit: &JointFit<'_>) -> Vec<(String, Vec<Sparse>)> {
         questions.push((name, vec![vec![covariate.clone(), Speed], vec![covariate, YawRate]]));
     }
     let on = |channel, covariates: &[Covariate]| Sparse { channel, covariates: covariates.to_vec() };
-    let of_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
-    let of_motion =
-        questions.iter().map(|(name, products)| (name.clone(), products.iter().flat_map(of_motion).collect()));
+    let on_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
+    let of_motion = questions
+        .into_iter()
+        .map(|(name, products)| Question { name, groups: vec![products.iter().flat_map(on_motion).collect()] });
     // A row that is longer than usual by its stamps, and not in truth.
-    let of_rows = ("row_length".to_owned(), vec![on(Channel::Wheels, &[WheelSpeed, RowLength])]);
-    let of_cycles = |side, name: &str| (name.to_owned(), of_cycles(side));
-    let of_wheels = [of_cycles(Side::Left, "left_wheel_cycles"), of_cycles(Side::Right, "right_wheel_cycles")];
+    let row_length = vec![on(Channel::Wheels, &[WheelSpeed, RowLength])];
+    let of_rows = Question { name: "row_length".to_owned(), groups: vec![row_length] };
+    // A cosine and a sine for each number of cycles in a turn.
+    let of_cycles = |(side, name): (Side, &str)| Question {
+        name: name.to_owned(),
+        groups: of_cycles(side).chunks(2).map(<[Sparse]>::to_vec).collect(),
+    };
+    let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
     of_motion.chain([of_rows]).chain(of_wheels).collect()
 }
 
@@ -322,8 +334,8 @@ pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
 /// Score tests of every question, all in one pass.
 fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let questions = questions(&model.fit);
-    let library: Vec<Choice> =
-        questions.iter().flat_map(|(_, products)| products.iter().cloned().map(Choice::Sparse)).collect();
+    let groups = questions.iter().flat_map(|question| &question.groups);
+    let library: Vec<Choice> = groups.flatten().cloned().map(Choice::Sparse).collect();
     let mut all = terms(&model.choices);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
     all.extend(terms_together(&library.iter().collect::<Vec<_>>()));
@@ -332,22 +344,23 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let Some(projection) = Projection::of(&model.fit, &evidence) else { return };
     let freedom = freedom(&model.fit, &evidence);
     let mut at = first;
-    for (name, products) in &questions {
-        let own = products.len();
-        let columns: Vec<usize> = (at..at + own).collect();
-        let parameters: Vec<_> =
-            library[at - first..at - first + own].iter().map(|choice| choice.parameters()[0]).collect();
-        at += own;
-        let Projected { information, gradient, .. } = projection.of_columns(&evidence, &columns);
-        let (mut statistic, mut dimensions) = (0.0, 0);
-        for (value, gradient) in principal(&information, &gradient, &parameters) {
-            if value >= 1.0 {
-                statistic += gradient * gradient / value;
-                dimensions += 1;
+    for Question { name, groups } in &questions {
+        let mut answers = Vec::new();
+        for group in groups {
+            let columns: Vec<usize> = (at..at + group.len()).collect();
+            let own = &library[at - first..at - first + group.len()];
+            let parameters: Vec<_> = own.iter().map(|choice| choice.parameters()[0]).collect();
+            at += group.len();
+            let Projected { information, gradient, .. } = projection.of_columns(&evidence, &columns);
+            let shown = principal(&information, &gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
+            let (statistic, dimensions) =
+                shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
+            if dimensions > 0 {
+                answers.push((statistic, p_of_score(statistic, dimensions, evidence.count, freedom)));
             }
         }
-        if dimensions > 0 {
-            add(name, statistic, p_of_score(statistic, dimensions, evidence.count, freedom));
+        if let Some((statistic, p_value)) = answers.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+            add(name, *statistic, of_trials(*p_value, answers.len()));
         }
     }
 }

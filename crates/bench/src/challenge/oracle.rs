@@ -67,6 +67,24 @@ pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, term
     look(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * LOUD * seen.total.chi_square)
 }
 
+/// The same with the lengths and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
+pub(crate) fn misfit_of_form(
+    datasets: &[Dataset],
+    model: &Model,
+    noise: TrueNoise,
+    terms: &mut [Box<dyn ModelTerm>],
+) -> f64 {
+    let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain((0..model.sizes.len()).map(Column::Term)).collect();
+    let (mut model, mut least) = (model.clone(), f64::INFINITY);
+    for _ in 0..=LENGTH_STEPS {
+        let Some(seen) = look(datasets, &model, noise, terms) else { return least };
+        least = least.min(0.5 * LOUD * seen.total.chi_square);
+        let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
+        columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+    }
+    least
+}
+
 /// A pass over noise-free runs.
 struct Seen {
     total: Evidence,

@@ -9,7 +9,7 @@ use kinematics::DriveGeometry;
 use super::case::{Case, OracleView, Round};
 use super::hidden::{EffectKind, kind_of};
 use super::looks::{NoiseClass, TruthKind};
-use super::oracle::misfit;
+use super::oracle::{misfit, misfit_of_form};
 use super::robot::PathFamily;
 use crate::BenchError;
 
@@ -173,7 +173,7 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
     Ok(Some([found, possible]))
 }
 
-/// What is left of the effects in which chance has a part, each alone, with its own term at its true sizes, of the shape that leaves least.
+/// What is left of the effects in which chance has a part, each alone, with its own term and the lengths at the sizes and in the shape that leave least.
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];
@@ -182,7 +182,7 @@ fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
         let of_shape = |shape: Shape| {
             let mut model = Model::of(truth, 0);
             model.sizes = shape.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
-            misfit(std::slice::from_ref(log), &model, case.noise, &mut [shape.term])
+            misfit_of_form(std::slice::from_ref(log), &model, case.noise, &mut [shape.term])
         };
         let shapes = hypothesis(hidden.id).and_then(Hypothesis::into_shapes)?;
         Some((shapes.into_iter().map(of_shape).fold(f64::INFINITY, f64::min) - floor).max(0.0))
