@@ -1,3 +1,5 @@
+//! A term of a scenario: what it adds to a step, to what is seen and to the record, and what makes none.
+
 use super::*;
 use crate::catalogue::specimen_step;
 
