@@ -398,7 +398,15 @@ fn verdict(findings: &[Finding]) -> Verdict {
 }
 
 fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> String {
-    let names: Vec<String> = findings.iter().map(|finding| finding.names.join(" or ")).collect();
+    let names = |finding: &Finding| {
+        let names = finding.names.join(" or ");
+        // What has no name is told by what it goes with.
+        finding.unlisted_term.as_ref().map_or_else(
+            || names.clone(),
+            |term| format!("{names} ({} with {})", term.channel, term.covariates.join(" · ")),
+        )
+    };
+    let names: Vec<String> = findings.iter().map(names).collect();
     let gains = match gain {
         Some(gain) if gain.log_score_per_observation.low > 0.0 => "; the extended model predicts unseen runs better",
         Some(_) => "; on unseen runs the extended model gains nothing that is certain",
