@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::document::Finding;
-use crate::search::{Found, SCAN_LEVEL};
+use crate::search::{Found, SCAN_LEVEL, tests_in};
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
@@ -41,8 +41,7 @@ pub enum Fate {
 pub(crate) fn alternatives(found: &Found<'_>, findings: &[Finding]) -> Vec<Alternative> {
     let entries = &found.first_scan;
     let best = entries.iter().map(|entry| entry.scored.log_odds).fold(0.0, f64::max);
-    #[allow(clippy::cast_precision_loss)]
-    let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    let tests = tests_in(entries);
     let mut all: Vec<Alternative> = entries
         .iter()
         .map(|entry| {

@@ -62,8 +62,8 @@ struct Question {
 
 fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RowLength, RunTime, SessionTime, SinHeading,
-        SinPhase, SinceReversal, Speed, Way, WheelSpeed, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
+        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
     };
     let mut questions: Vec<(String, Vec<Vec<Covariate>>)> = [
         ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
@@ -91,8 +91,7 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         .into_iter()
         .map(|(name, products)| Question { name, groups: vec![products.iter().flat_map(on_motion).collect()] });
     // A row that is longer than usual by its stamps, and not in truth.
-    let row_length = vec![on(Channel::Wheels, &[WheelSpeed, RowLength])];
-    let of_rows = Question { name: "row_length".to_owned(), groups: vec![row_length] };
+    let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Sparse::of_rows()]] };
     // A cosine and a sine for each number of cycles in a turn.
     let of_cycles = |(side, name): (Side, &str)| Question {
         name: name.to_owned(),

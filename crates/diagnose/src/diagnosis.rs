@@ -211,7 +211,7 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         asked.found = found;
     }
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
-    let alone = Extended { fit: asked.base.clone(), choices: Vec::new() };
+    let alone = Extended::alone(&asked.base);
     if !asked.found.model.choices.is_empty()
         && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
     {
@@ -378,7 +378,7 @@ fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<S
     if model.choices.is_empty() {
         return (None, Some("nothing was added to the calibrated model's mean".to_owned()));
     }
-    let alone = Extended { fit: base.clone(), choices: Vec::new() };
+    let alone = Extended::alone(base);
     match gain(&alone, model) {
         Ok(gain) => (Some(gain), None),
         Err(why) => (None, Some(why)),

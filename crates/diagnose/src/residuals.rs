@@ -287,7 +287,7 @@ fn residuals_of(model: &Extended<'_>, keys: &[String]) -> Vec<Residual> {
 pub(crate) fn residuals(base: &JointFit<'_>, model: &Extended<'_>) -> Residuals {
     let covariates = covariates(base);
     let keys: Vec<String> = covariates.iter().map(|covariate| covariate.key.clone()).collect();
-    let alone = Extended { fit: base.clone(), choices: Vec::new() };
+    let alone = Extended::alone(base);
     let (before, after) = (residuals_of(&alone, &keys), residuals_of(model, &keys));
     let looks = before.iter().filter(|residual| residual.component == 0).count();
     let against = covariates.iter().enumerate().filter_map(|(number, covariate)| {

@@ -114,6 +114,12 @@ pub(crate) fn best_shapes(scored: &[Scored]) -> Vec<Entry> {
     entries
 }
 
+/// How many effects of a scan can be seen at all, each a test: at least one.
+#[allow(clippy::cast_precision_loss)] // dozens
+pub(crate) fn tests_in(entries: &[Entry]) -> f64 {
+    entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64
+}
+
 /// A fit with effects.
 #[derive(Debug, Clone)]
 pub(crate) struct Extended<'a> {
@@ -121,7 +127,12 @@ pub(crate) struct Extended<'a> {
     pub(crate) choices: Vec<Choice>,
 }
 
-impl Extended<'_> {
+impl<'a> Extended<'a> {
+    /// A fit without any.
+    pub(crate) fn alone(base: &JointFit<'a>) -> Self {
+        Self { fit: base.clone(), choices: Vec::new() }
+    }
+
     /// Which of the fit's sizes are a choice's.
     pub(crate) fn range(&self, place: usize) -> Range<usize> {
         let first = self.choices[..place].iter().map(|choice| choice.parameters().len()).sum();
@@ -383,8 +394,7 @@ fn confirmed<'a>(
 
 /// The model with one effect more, if the scan finds one.
 fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>, level: f64) -> Option<Grown<'a>> {
-    #[allow(clippy::cast_precision_loss)]
-    let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    let tests = tests_in(&entries);
     for _ in 0..MOST_TRIED {
         let best = entries
             .iter()
@@ -404,7 +414,7 @@ fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>,
 /// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
 /// `scans` are those made before on the same base.
 pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, mut scans: Scans) -> Found<'a> {
-    let mut model = Extended { fit: base.clone(), choices: Vec::new() };
+    let mut model = Extended::alone(base);
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
     // The models on the way, and the rivals of the last: most of them are asked for again below.
@@ -423,11 +433,8 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
     while place < model.choices.len() {
         let mut others = model.choices.clone();
         others.remove(place);
-        let without = if others.is_empty() {
-            Some(Extended { fit: base.clone(), choices: Vec::new() })
-        } else {
-            known_or_refit(&known, base, others)
-        };
+        let without =
+            if others.is_empty() { Some(Extended::alone(base)) } else { known_or_refit(&known, base, others) };
         let Some(without) = without else { break };
         let entries = best_shapes(scans.beside(&without, catalogue));
         let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
@@ -442,8 +449,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         }
         let shapes =
             |id| entries.iter().find(|entry| entry.scored.choice.id() == id).map_or(1, |entry| entry.shapes.max(1));
-        #[allow(clippy::cast_precision_loss)]
-        let tests = entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+        let tests = tests_in(&entries);
         let stands = |(name, extended): &(Name, Extended<'_>)| {
             examine(extended, place)
                 .is_some_and(|(test, _)| of_trials(test.p_value, shapes(name.choice.id())) * tests <= level)
@@ -468,16 +474,14 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
     }
     let mut wider: Vec<Vec<f64>> = (0..model.choices.len()).map(|place| fit_shape(base, &mut model, place)).collect();
     // What stood for a shape that was not met is not needed any more.
-    #[allow(clippy::cast_precision_loss)]
-    let tests = first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    let tests = tests_in(&first_scan);
     for place in (0..names.len()).rev() {
         if examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= level) {
             continue;
         }
         let mut others = model.choices.clone();
         others.remove(place);
-        let alone = || Some(Extended { fit: base.clone(), choices: Vec::new() });
-        if let Some(without) = if others.is_empty() { alone() } else { refit(base, others) } {
+        if let Some(without) = if others.is_empty() { Some(Extended::alone(base)) } else { refit(base, others) } {
             model = without;
             names.remove(place);
             wider.remove(place);
@@ -515,11 +519,9 @@ pub(crate) fn search_every_look<'a>(base: &JointFit<'a>, found: &Found<'a>, cata
     let outliers = |model: &Extended<'_>| model.fit.fit.pass.outliers.len();
     let (before, after) = (evidence(base, &found.model), evidence(base, &model));
     let tests = tests_of(&model, &bold.wider);
-    #[allow(clippy::cast_precision_loss)]
-    let trials = bold.first_scan.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64;
+    let trials = tests_in(&bold.first_scan);
     let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
-    let alone = Extended { fit: base.clone(), choices: Vec::new() };
-    let predicts = gain(&alone, &model).map_or(true, |gain| !gain.drifts_more());
+    let predicts = gain(&Extended::alone(base), &model).map_or(true, |gain| !gain.drifts_more());
     let holds = outliers(&model) < outliers(&found.model) && after > before + reach(before) && stands && predicts;
     holds.then(|| Found { model, tests, first_scan: found.first_scan.clone(), scans: found.scans.clone(), ..bold })
 }

@@ -109,9 +109,8 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
     let seen = seen.into_iter().flat_map(|covariates| {
         Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
-    let stamps = Sparse { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] };
     let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Choice::Sparse);
-    moved.chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(stamps)]).collect()
+    moved.chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(Sparse::of_rows())]).collect()
 }
 
 /// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.

@@ -49,16 +49,28 @@ impl Sparse {
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
-        match IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop()) {
-            Some(shape) if self.covariates.iter().any(Covariate::is_of_rows) => Box::new(OfRows(shape.term)),
-            _ => Box::new(Recorded::new(self)),
+        if self.is_of_rows()
+            && let Some(shape) = IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop())
+        {
+            return Box::new(OfRows(shape.term));
         }
+        Box::new(Recorded::new(self))
     }
 
     /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
     #[must_use]
     pub fn term_on(&self, channels: [Channel; 3]) -> Box<dyn ModelTerm> {
         Box::new(OnThree { recorded: Recorded::new(self), channels })
+    }
+
+    /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.
+    #[must_use]
+    pub fn of_rows() -> Self {
+        Self { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] }
+    }
+
+    fn is_of_rows(&self) -> bool {
+        self.covariates.iter().any(Covariate::is_of_rows)
     }
 
     fn product(&self, at: &Moment<'_>) -> f64 {
@@ -125,14 +137,12 @@ impl SparseTerm {
             let wheels = Channel::WHEELS.map(Channel::name).join(", ");
             return no_term(format!("\"{}\" goes with {wheels} alone, and not with {channel}", own.name()));
         }
-        let rows = [Covariate::WheelSpeed, Covariate::RowLength];
-        if covariates.iter().any(Covariate::is_of_rows) && (self.channel != Channel::Wheels || covariates != rows) {
-            return no_term(format!(
-                "\"{}\" goes with the channel wheels and \"{}\" alone",
-                rows[1].name(),
-                rows[0].name()
-            ));
+        let sparse = Sparse { channel: self.channel, covariates };
+        if sparse.is_of_rows() && sparse != Sparse::of_rows() {
+            let (rows, wheel) = (Covariate::RowLength.name(), Covariate::WheelSpeed.name());
+            return no_term(format!("\"{rows}\" goes with the channel wheels and \"{wheel}\" alone"));
         }
+        let covariates = &sparse.covariates;
         let (what, holds) = if self.channel.is_seen() {
             ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
         } else {
@@ -145,7 +155,7 @@ impl SparseTerm {
             };
             return no_term(format!("{channel} {what}: {}", listed(Covariate::NAMED.iter().filter(fits))));
         }
-        Ok(Sparse { channel: self.channel, covariates })
+        Ok(sparse)
     }
 
     fn covariate(&self, name: &str) -> Result<Covariate, EffectError> {
@@ -177,7 +187,7 @@ impl PhysicalEffect for SparseTerm {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         let sparse = self.sparse().ok()?;
-        if sparse.covariates.iter().any(Covariate::is_of_rows) {
+        if sparse.is_of_rows() {
             // Rows are of unlike length where stamps are irregular, and it shows in no others.
             let irregular =
                 IntervalError { share: self.coefficient / ROW_SHARE, jitter_s: IntervalError::USUAL_JITTER_S };

@@ -45,6 +45,13 @@ pub(crate) enum Gate {
     Open,
 }
 
+impl Gate {
+    /// Open for every look.
+    pub(crate) const fn of(every_look: bool) -> Self {
+        if every_look { Self::Open } else { Self::Shut }
+    }
+}
+
 /// What to carry along in a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Want {

@@ -55,10 +55,6 @@ impl FitOptions {
             every_look: false,
         }
     }
-
-    fn gate(&self) -> Gate {
-        if self.every_look { Gate::Open } else { Gate::Shut }
-    }
 }
 
 /// A fitted model.
@@ -162,7 +158,7 @@ pub(crate) fn fit_from(
             }
         }
     }
-    let want = Want { noise_score: !options.noise_held, gate: options.gate(), ..Want::default() };
+    let want = Want { noise_score: !options.noise_held, gate: Gate::of(options.every_look), ..Want::default() };
     let (mut converged, mut pace) = (false, Pace::default());
     for _ in 0..options.max_steps {
         let found = pass(records, selections, &model, &noise, &headings, terms, want);
@@ -173,7 +169,7 @@ pub(crate) fn fit_from(
             break;
         }
     }
-    let want = Want { innovations: true, gate: options.gate(), ..Want::default() };
+    let want = Want { innovations: true, gate: Gate::of(options.every_look), ..Want::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, want);
     Ok(Fit { model, noise, free_headings: headings, pass, converged })
 }

@@ -310,7 +310,7 @@ impl JointFit<'_> {
     }
 
     pub(crate) fn gate(&self) -> Gate {
-        if self.every_look { Gate::Open } else { Gate::Shut }
+        Gate::of(self.every_look)
     }
 
     /// The fit to every look, those that lie far off too: a large effect that shows in few looks makes them lie far off, and without them it is not seen. Where some
