@@ -107,6 +107,15 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     if let Some([found, possible]) = result.gain {
         terminal.say(&format!("gain on the held-out log: {found:.1} of {possible:.1}"))?;
     }
+    if let Some(planned) = &result.planned {
+        let said: Vec<String> = planned.said.iter().map(|said| said.names.join("|")).collect();
+        let said = if said.is_empty() { "nothing".to_owned() } else { said.join(" + ") };
+        let can = if planned.can_be_told() { "the right name can be told" } else { "nothing tells the right name" };
+        terminal.say(&match planned.planned {
+            true => format!("after the planned runs: {said}; by the oracle {can}"),
+            false => format!("no planned runs; by the oracle {can}"),
+        })?;
+    }
     Ok(())
 }
 

@@ -15,8 +15,8 @@ mod trial;
 
 pub use bound::{FisherInformation, Innovation, NoBound};
 pub use challenge::{
-    CaseResult, ChallengeResult, Confusion, EffectKind, Measure, NoiseClass, OracleView, PathFamily, Round, Said,
-    TruthKind, challenge, challenge_case, challenge_datasets,
+    CaseResult, ChallengeResult, Confusion, EffectKind, Measure, NoiseClass, OracleView, PathFamily, Planned, Round,
+    Said, TruthKind, challenge, challenge_case, challenge_datasets,
 };
 pub use error::BenchError;
 pub use moments::Moments;

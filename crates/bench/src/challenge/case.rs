@@ -68,12 +68,16 @@ pub struct OracleView {
     pub ratio: Option<f64>,
     /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross faults and scatter.
     pub form_share: Option<f64>,
-    /// Other names that the best test between the two does not tell from it with nine chances in ten.
+    /// Noncentrality of the best test between it and each other name whose sizes can be, the least first: what the other name leaves of it. Empty for gross faults.
+    pub rivals: Vec<(String, f64)>,
+    /// The other names that this test does not tell from it with nine chances in ten.
     pub aliases: Vec<String>,
 }
 
 /// A case ready to be diagnosed.
 pub(crate) struct Case {
+    seed: u64,
+    number: u64,
     pub(crate) round: Round,
     pub(crate) robot: RandomRobot,
     pub(crate) watching: Watching,
@@ -96,6 +100,8 @@ const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
 const CLOSE: f64 = 1.5;
 /// Where the held-out log's draws are, away from the sessions'.
 const HELD_OUT: u32 = 16;
+/// Where those of planned runs are.
+const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
 const MOST_STEPS: usize = 5;
 /// Another form of which the hypothesis takes up less is another effect: the forms of tests/effect_hypotheses leave at most 0.65² of their squares.
@@ -275,6 +281,8 @@ impl Case {
             held_out_by_chance.extend(log(&[effect])?.map(|log| (place, log)));
         }
         Ok(Some(Self {
+            seed,
+            number,
             round,
             watching,
             hidden,
@@ -288,10 +296,32 @@ impl Case {
         }))
     }
 
+    /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only effect, which is a mean: other names, each with the noncentrality of the
+    /// test between it and the true one by all that was driven.
+    pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<More>, BenchError> {
+        let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
+        let sight = Sight { seed: self.seed, number: self.number, robot: &self.robot, watching: &self.watching };
+        let first = PLANNED;
+        let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, BenchError> {
+            let mut all = drive(&self.robot.sessions, &sight, hidden, false, 0)?;
+            all.extend(drive(plans, &sight, hidden, false, first)?);
+            Ok(all)
+        };
+        let Some(shown) = Shown::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else { return Ok(None) };
+        let rivals = shown.rivals(effect.id, known(effect, &shown));
+        Ok(Some(More { datasets: drive(plans, &sight, &[effect], true, first)?, rivals }))
+    }
+
     /// The drive that a calibration should find.
     pub(crate) fn truth(&self) -> Option<DriveGeometry> {
         self.robot.sessions[0].scenario.true_geometry().ok()
     }
+}
+
+/// What a robot brings home that drives some more.
+pub(crate) struct More {
+    pub(crate) datasets: Vec<Dataset>,
+    pub(crate) rivals: Vec<(&'static str, f64)>,
 }
 
 enum Chosen {
@@ -385,6 +415,7 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
         noncentrality: None,
         ratio: None,
         form_share: None,
+        rivals: Vec::new(),
         aliases: Vec::new(),
     };
     let Some(own) = shown[place].as_ref() else { return view };
@@ -409,8 +440,9 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
         view.ratio = Some(ratio(effect, own));
     }
     // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
-    let rivals = own.rivals(effect.id, known(effect, own)).into_iter().filter(|(_, left)| *left < TOLD_APART);
-    view.aliases = rivals.map(|(id, _)| id.to_owned()).collect();
+    view.rivals =
+        own.rivals(effect.id, known(effect, own)).into_iter().map(|(id, left)| (id.to_owned(), left)).collect();
+    view.aliases = view.rivals.iter().filter(|(_, left)| *left < TOLD_APART).map(|(id, _)| id.clone()).collect();
     view
 }
 

@@ -6,6 +6,7 @@ use super::case::{OracleView, Round};
 use super::draw::Draw;
 use super::hidden::EffectKind;
 use super::looks::NoiseClass;
+use super::planned::Planned;
 use super::power::limits;
 use super::score::{CaseResult, Said};
 
@@ -111,6 +112,7 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
         power(seed, cases),
     ];
     measures.extend(names(cases));
+    measures.extend(resolved(cases));
     measures.extend(left_out(cases));
     measures.push(pairs(cases));
     measures.push(gain(
@@ -171,6 +173,33 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
         .collect();
     measures.push(ratio_of_sums("set_size", "aliased: size of sets over the oracle's", &sizes, 1.2, true));
     measures
+}
+
+/// Sets that the planned runs leave with the right name alone, of those of which the oracle could tell it after some runs on that floor and in that time.
+fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
+    let sets = || cases.iter().filter_map(|case| Some((case, case.planned.as_ref()?)));
+    let alone = |(case, planned): &(&CaseResult, &Planned)| {
+        planned.said.iter().any(|said| said.names[..] == [case.hidden[0].id.clone()])
+    };
+    let of: Vec<_> = sets().filter(|(_, planned)| planned.can_be_told()).collect();
+    let can = of.len();
+    let shown = share(
+        "sets_that_can_be_told",
+        "sets that the oracle could tell after more runs (shown only)",
+        (can, sets().count()),
+        0.0,
+        false,
+    );
+    [
+        share(
+            "resolved",
+            "sets that can be told: the right name alone after the planned runs",
+            count(of.iter(), alone),
+            0.9,
+            false,
+        ),
+        Measure { met: None, ..shown },
+    ]
 }
 
 /// Σa/Σb with its one-sided limit, linearised over cases.

@@ -13,6 +13,7 @@ mod hidden;
 mod looks;
 mod measure;
 mod oracle;
+mod planned;
 mod power;
 mod robot;
 mod score;
@@ -30,6 +31,7 @@ pub use case::{OracleView, Round};
 pub use hidden::EffectKind;
 pub use looks::{NoiseClass, TruthKind};
 pub use measure::Measure;
+pub use planned::Planned;
 pub use robot::PathFamily;
 pub use score::{CaseResult, Said};
 

@@ -167,6 +167,11 @@ fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw
                 .collect();
         }
     };
+    programs_of(&schedules)
+}
+
+/// The programs of some schedules, each with a name of its own.
+pub(crate) fn programs_of(schedules: &[Schedule]) -> Vec<MotionProgram> {
     let mut programs: Vec<MotionProgram> = Vec::new();
     for (number, schedule) in schedules.iter().enumerate() {
         for mut program in schedule.programs() {

@@ -10,6 +10,7 @@ use super::case::{Case, OracleView, Round};
 use super::hidden::{EffectKind, kind_of};
 use super::looks::{NoiseClass, TruthKind};
 use super::oracle::{misfit, misfit_of_form};
+use super::planned::{Planned, planned};
 use super::robot::PathFamily;
 use crate::BenchError;
 
@@ -55,16 +56,21 @@ pub struct CaseResult {
     pub extended: bool,
     /// Gain in log score on the held-out log: of the tool, and of who knows the true term.
     pub gain: Option<[f64; 2]>,
+    /// Where its effect was found among several names: what the planned run made of them.
+    pub planned: Option<Planned>,
 }
 
 impl CaseResult {
     /// The findings that are not right anyway because of what the looks err by.
     pub(crate) fn findings(&self) -> impl Iterator<Item = &Said> {
+        self.not_right_anyway(&self.said)
+    }
+
+    /// Those of some findings.
+    pub(crate) fn not_right_anyway<'s>(&'s self, said: &'s [Said]) -> impl Iterator<Item = &'s Said> {
         let right = self.noise.right_answers();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
-        self.said
-            .iter()
-            .filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
+        said.iter().filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
     }
 
     /// What was said of it, in short.
@@ -106,6 +112,7 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, BenchError> 
         refused: None,
         extended: false,
         gain: None,
+        planned: None,
     };
     match diagnosed {
         Ok(diagnosis) => {
@@ -115,6 +122,9 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, BenchError> 
             result.extended = !diagnosis.found.terms().is_empty();
             debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.said.is_empty());
             result.gain = gain(case, Some(&diagnosis))?;
+            if case.round == Round::Single {
+                result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
+            }
         }
         Err(error) => {
             result.refused = Some(error.to_string());
@@ -124,7 +134,7 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, BenchError> 
     Ok(result)
 }
 
-fn said(document: &Document, case: &Case) -> Vec<Said> {
+pub(crate) fn said(document: &Document, case: &Case) -> Vec<Said> {
     document
         .findings
         .iter()

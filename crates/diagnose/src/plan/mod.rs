@@ -21,8 +21,8 @@ use crate::scan::total;
 use crate::search::{Extended, Found};
 
 use library::{Manoeuvre, foreseen, library};
-pub use setting::Limits;
 use setting::Setting;
+pub use setting::{Limits, moved_over_m};
 pub use show::{PlanError, ScenarioPlan, plan_scenario};
 
 /// Runs of one manoeuvre.

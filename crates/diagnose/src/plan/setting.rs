@@ -58,7 +58,7 @@ impl Setting {
         let (free_m, floor) = match limits.room_m {
             Some(room_m) => (room_m.map(|side| side - CLEARANCE * separation_m), of_room(room_m)),
             None => {
-                let [x_m, y_m] = extent(datasets);
+                let [x_m, y_m] = moved_over_m(datasets);
                 ([x_m, y_m], format!("the {x_m:.1} m by {y_m:.1} m over which the robot moved so far"))
             }
         };
@@ -137,7 +137,8 @@ fn minutes(limits: &Limits, otherwise: f64) -> (f64, String) {
 }
 
 /// Over how much of the floor a robot moved, metres: of the runs that reached farthest, by what was seen, or by dead reckoning where only displacements were.
-fn extent(datasets: &[Dataset]) -> [f64; 2] {
+#[must_use]
+pub fn moved_over_m(datasets: &[Dataset]) -> [f64; 2] {
     let mut sides = [0.0_f64; 2];
     for dataset in datasets {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
