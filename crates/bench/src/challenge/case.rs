@@ -301,15 +301,14 @@ impl Case {
     pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<More>, BenchError> {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
         let sight = Sight { seed: self.seed, number: self.number, robot: &self.robot, watching: &self.watching };
-        let first = PLANNED;
         let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, BenchError> {
             let mut all = drive(&self.robot.sessions, &sight, hidden, false, 0)?;
-            all.extend(drive(plans, &sight, hidden, false, first)?);
+            all.extend(drive(plans, &sight, hidden, false, PLANNED)?);
             Ok(all)
         };
         let Some(shown) = Shown::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else { return Ok(None) };
         let rivals = shown.rivals(effect.id, known(effect, &shown));
-        Ok(Some(More { datasets: drive(plans, &sight, &[effect], true, first)?, rivals }))
+        Ok(Some(More { datasets: drive(plans, &sight, &[effect], true, PLANNED)?, rivals }))
     }
 
     /// The drive that a calibration should find.

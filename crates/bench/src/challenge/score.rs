@@ -63,14 +63,11 @@ pub struct CaseResult {
 impl CaseResult {
     /// The findings that are not right anyway because of what the looks err by.
     pub(crate) fn findings(&self) -> impl Iterator<Item = &Said> {
-        self.not_right_anyway(&self.said)
-    }
-
-    /// Those of some findings.
-    pub(crate) fn not_right_anyway<'s>(&'s self, said: &'s [Said]) -> impl Iterator<Item = &'s Said> {
         let right = self.noise.right_answers();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
-        said.iter().filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
+        self.said
+            .iter()
+            .filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
     }
 
     /// What was said of it, in short.
