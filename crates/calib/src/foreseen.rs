@@ -20,7 +20,7 @@ impl Joint {
             thinning: Thinning::NONE,
             nominal: model.clone(),
             start: model.clone(),
-            fit: Fit { model, noise, free_headings: headings, pass: Pass::nothing(), converged: true },
+            fit: Fit { model, noise, free_headings: headings, pass: Pass::nothing(), converged: true, strayed: false },
             columns: Column::GEOMETRY.to_vec(),
             unseen: Vec::new(),
             prior: NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default()),

@@ -4,15 +4,15 @@
 
 use crate::candidate::Choice;
 use crate::document::{Blind, Smallest};
-use crate::search::{Extended, Scans};
+use crate::search::{Extended, Known};
 
 /// √λ for power 0.9 at a two-sided level of 1e-3.
 pub(crate) const SHOWS: f64 = 4.57;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
-pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice], scans: &mut Scans) -> (Vec<Blind>, Vec<Blind>) {
+pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice], known: &mut Known<'_>) -> (Vec<Blind>, Vec<Blind>) {
     let mut best: Vec<(Blind, f64)> = Vec::new();
-    for scored in scans.beside(model, catalogue) {
+    for scored in known.beside(model, catalogue) {
         let id = scored.choice.id();
         // The parameter that shows soonest, the others at rest, in units of what would be large.
         let smallest = scored

@@ -32,6 +32,11 @@ impl Choice {
         }
     }
 
+    /// Whether both are the same effect of the catalogue, perhaps in two of its shapes.
+    pub(crate) fn is_shape_of(&self, other: &Self) -> bool {
+        matches!((self, other), (Self::Effect { id, .. }, Self::Effect { id: of, .. }) if id == of)
+    }
+
     /// Its held shape parameters.
     pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
         match self {

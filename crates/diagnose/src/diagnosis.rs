@@ -21,9 +21,10 @@ use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
 use crate::search::{
-    Extended, Found, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, Scans, evidence, examine, reach, search, search_every_look,
+    Extended, Found, Known, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, chance, evidence, examine, reach, search,
+    search_every_look,
 };
-use crate::unlisted::{SparseFound, UNLISTED_LEVEL, Unlisted, sparse};
+use crate::unlisted::{Sought, SparseFound, UNLISTED_LEVEL, Unlisted, sparse};
 
 /// What to leave out.
 #[derive(Debug, Clone, Default)]
@@ -168,8 +169,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) correlated: Option<(f64, f64)>,
     /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
     pub(crate) in_disguise: bool,
-    /// One term that is in no catalogue makes the data about as likely as all the names together, or likelier, though not by enough to stand in their place.
-    pub(crate) rivalled: bool,
+    /// The chance of one term that is in no catalogue over that of all the names together, where it has any and does not stand in their place.
+    pub(crate) rivalled: Option<f64>,
 }
 
 impl<'a> Asked<'a> {
@@ -200,10 +201,10 @@ impl<'a> Asked<'a> {
 const SURE_LEVEL: f64 = 0.2;
 
 fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], restored: bool) -> Asked<'a> {
-    let found = search(&base, catalogue, SCAN_LEVEL, Scans::default());
+    let found = search(&base, catalogue, SCAN_LEVEL, Known::default());
     let checked = check(&found.model);
     let mut asked =
-        Asked { base, found, checked, unlisted: None, correlated: None, in_disguise: false, rivalled: false };
+        Asked { base, found, checked, unlisted: None, correlated: None, in_disguise: false, rivalled: None };
     if asked.lie_far_off()
         && let Some(found) = search_every_look(&asked.base, &asked.found, catalogue)
     {
@@ -213,19 +214,21 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
     // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
     let alone = Extended::alone(&asked.base);
     if !asked.found.model.choices.is_empty()
-        && let Some(sparse) = sparse(&asked.base, &alone, UNLISTED_LEVEL)
+        && let Some(sought) = Sought::beside(&asked.base, &alone)
     {
         let named = evidence(&alone.fit, &asked.found.model);
-        #[allow(clippy::cast_precision_loss)]
-        let unnamed = evidence(&alone.fit, &sparse.model) - (sparse.trials as f64).ln();
-        if unnamed > named + reach(named) {
+        let finding = sought.finding(UNLISTED_LEVEL);
+        let unnamed = finding.as_ref().map_or_else(|| sought.evidence(), |sparse| sought.evidence_of(&sparse.model));
+        if let Some(sparse) = finding
+            && unnamed > named + reach(named)
+        {
             asked.found.model = alone;
             asked.found.names.clear();
             asked.found.tests.clear();
             asked.keep(sparse);
             return asked;
         }
-        asked.rivalled = unnamed > named - LEAST_REACH;
+        asked.rivalled = Some(chance(unnamed, named)).filter(|_| unnamed > named - LEAST_REACH);
     }
     // What was lost of the counts and is restored roughly makes looks after it err alike: they are no fault of the instrument's.
     if !restored && !is_white(&asked.checked) {
@@ -241,20 +244,20 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue, SCAN_LEVEL, Scans::default());
-            asked.rivalled = false;
+            asked.found = search(&thinned, catalogue, SCAN_LEVEL, Known::default());
+            asked.rivalled = None;
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
         }
     }
     if asked.goes_with_something() {
         // Something is there: what it is may be asked more boldly.
-        let found = search(&asked.base, catalogue, SURE_LEVEL, asked.found.scans.clone());
+        let found = search(&asked.base, catalogue, SURE_LEVEL, asked.found.known.clone());
         if found.model.choices.len() > asked.found.model.choices.len() {
             asked.checked = check(&found.model);
             asked.found = found;
             // What was refused before, or hardly stands out, is one name of what there is.
-            asked.rivalled = true;
+            asked.rivalled = Some(1.0);
         }
     }
     if asked.goes_with_something()
@@ -289,8 +292,8 @@ fn continued(
     let asked = ask(datasets, base, &catalogue, restored);
     let mut findings: Vec<Finding> = faults.iter().map(|fault| naming::of_fault(fault)).collect();
     findings.extend(naming::of_search(&asked.found));
-    if asked.rivalled {
-        naming::beside_unlisted(&mut findings);
+    if let Some(chance) = asked.rivalled {
+        naming::beside_unlisted(&mut findings, chance);
     }
     let model = asked.model();
     for (place, p_value, trials) in asked.unlisted.iter().flat_map(Unlisted::terms) {
@@ -308,19 +311,17 @@ fn continued(
     let (log, spans) = (log_rows::check(datasets), log_rows::check_spans(datasets));
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| naming::of_wrong_wheels(factor, &options.without));
-    let wrong: Vec<Finding> = naming::of_rows_astray(log.as_ref())
-        .into_iter()
-        .chain(naming::of_spans(spans.as_ref()))
-        .chain(wheels)
-        .collect();
-    if wrong.iter().any(|finding| finding.id == "unlisted") {
+    let of_log = naming::of_rows_astray(log.as_ref()).into_iter().chain(naming::of_spans(spans.as_ref()));
+    let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(|finding| finding.id == "unlisted");
+    findings.extend(named);
+    if !nameless.is_empty() {
         // With times in other units even a gross fault may be an accident.
         let sound = spans.as_ref().is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
-            naming::or_unlisted(finding, "what is wrong with the records may do the same");
+            naming::or_unlisted(finding, 1.0, "what is wrong with the records may do the same");
         }
     }
-    findings.extend(wrong);
+    findings.extend(nameless);
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
@@ -332,7 +333,7 @@ fn continued(
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);
-    let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.scans.clone());
+    let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.known.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
     let verdict = verdict(&findings);
     let extended = crate::scenario_of::scenario_of(datasets, model);

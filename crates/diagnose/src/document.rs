@@ -154,9 +154,15 @@ impl Gain {
     /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single looks.
     #[must_use]
     pub fn drifts_more(&self) -> bool {
-        self.drift_percent
-            .as_ref()
-            .is_some_and(|drift| drift.high < 0.0 && drift.extended > (1.0 + MATERIAL) * drift.base)
+        self.drifts_more_by(1.0)
+    }
+
+    /// The same so many times as far out as the 95 % interval reaches.
+    pub(crate) fn drifts_more_by(&self, reaches: f64) -> bool {
+        self.drift_percent.as_ref().is_some_and(|drift| {
+            let (mean, reach) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));
+            mean + reaches * reach < 0.0 && drift.extended > (1.0 + MATERIAL) * drift.base
+        })
     }
 }
 

@@ -11,7 +11,7 @@ use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{Found, LEAST_REACH, Name, Test, reach};
+use crate::search::{Found, Name, Test, chance};
 use crate::statistics::{of_trials, z_of_p};
 
 /// The parameters of a choice as found.
@@ -56,8 +56,7 @@ const UNWRITTEN: f64 = 0.05;
 
 fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
-    // Where a name explains thousands, its form is not known well enough for the last of them to count in full.
-    let weights: f64 = names.iter().map(|name| ((name.log_odds - top) * LEAST_REACH / reach(top)).exp()).sum();
+    let weights: f64 = names.iter().map(|name| chance(name.log_odds, top)).sum();
     let p_value = of_trials(test.p_value, trials);
     let parameters = parameters(choice, &test.sizes);
     let mut ids: Vec<String> = names.iter().map(|name| name.choice.id().to_owned()).collect();
@@ -132,24 +131,25 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     })
 }
 
-/// What is found beside something that has no name, or a scatter, that stands out as much as a third of it may be a part of that, or an accident of it.
+/// What is found beside something that has no name, or a scatter, that stands out as much as a third of it may be a part of that, or an accident of it; where it stands
+/// out less than that it is so before it is what its name says.
 const DOUBTFUL: f64 = 3.0;
 
-/// The same where as many effects were found as are sought, and there is still something left.
-const DOUBTFUL_IF_FULL: f64 = 10.0;
+/// By how much more both are so where as many effects were found as are sought, and there is still something left.
+const DOUBTFUL_IF_FULL: f64 = 3.0;
 
-/// Says of effects found that what has no name would do as well.
-pub(crate) fn beside_unlisted(findings: &mut [Finding]) {
+/// Says of effects found that what has no name would do as well, with so much of a chance over theirs.
+pub(crate) fn beside_unlisted(findings: &mut [Finding], chance: f64) {
     for finding in findings.iter_mut().filter(|finding| is_mean(finding)) {
-        or_unlisted(finding, "a term without a name would do as well");
+        or_unlisted(finding, chance, "a term without a name would do as well");
     }
 }
 
-/// Says of a finding that it may be the doing of something that has no name.
-pub(crate) fn or_unlisted(finding: &mut Finding, why: &str) {
+/// Says of a finding that it may be the doing of something that has no name, with so much of a chance over that of its names.
+pub(crate) fn or_unlisted(finding: &mut Finding, chance: f64, why: &str) {
     finding.names.retain(|name| name != "unlisted");
     finding.names.push("unlisted".to_owned());
-    finding.probability *= 0.5;
+    finding.probability /= 1.0 + chance;
     finding.sentence = format!("{}; {why}", finding.sentence);
 }
 
@@ -169,12 +169,14 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
         if !is_mean(finding) {
             continue;
         }
-        let part = finding.z < unlisted * if full { DOUBTFUL_IF_FULL } else { DOUBTFUL };
-        if part || DOUBTFUL * finding.z < scatter {
+        let stands_out = unlisted * if full { DOUBTFUL_IF_FULL } else { 1.0 };
+        if finding.z < stands_out || DOUBTFUL * finding.z < scatter {
             finding.id = "unlisted".to_owned();
             finding.names.retain(|name| name != "unlisted");
             finding.names.insert(0, "unlisted".to_owned());
             finding.sentence = format!("perhaps part of what has no name, or else {}", finding.sentence);
+        } else if finding.z < DOUBTFUL * stands_out {
+            or_unlisted(finding, 1.0, "it may be part of what has no name");
         }
     }
 }

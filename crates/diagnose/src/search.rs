@@ -22,6 +22,9 @@ pub(crate) const MOST_EFFECTS: usize = 3;
 const RIVAL_SHARE: f64 = 0.5;
 /// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
 const MOST_TRIED: usize = 3;
+/// Odometry must drift more with a name by so many times what the 95 % interval reaches before the name is none: within one of it an effect that is there, and does
+/// nothing to the drift, would be refused once in forty times.
+const NAMES_DRIFT: f64 = 2.0;
 /// Most rivals that are refitted.
 const MOST_RIVALS: usize = 6;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
@@ -32,6 +35,12 @@ const FORM_ERROR: f64 = 0.01;
 /// How much less likely than the best a name may make the data and still be told.
 pub(crate) fn reach(best: f64) -> f64 {
     LEAST_REACH.max(FORM_ERROR * best)
+}
+
+/// The chance of what makes the data likely by `log_odds`, relative to that of what explains `best`. Where that is thousands, its form is not known well enough for the
+/// last of them to count in full.
+pub(crate) fn chance(log_odds: f64, best: f64) -> f64 {
+    ((log_odds - best) * LEAST_REACH / reach(best)).exp()
 }
 
 /// Log of the chance of the data under a model over that under its base.
@@ -173,25 +182,65 @@ pub(crate) struct Found<'a> {
     wider: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
-    /// What was scanned.
-    pub(crate) scans: Scans,
+    /// What was asked of the base.
+    pub(crate) known: Known<'a>,
 }
 
-/// Scans of the catalogue's other effects beside the choices of a model on one base.
+/// What has been asked of one base: scans of the catalogue's other effects beside models, and fits of models. Many are asked for again.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Scans(Vec<(Vec<Choice>, Vec<Scored>)>);
+pub(crate) struct Known<'a> {
+    scans: Vec<(Vec<Choice>, Vec<Scored>)>,
+    fits: Vec<Extended<'a>>,
+}
 
-impl Scans {
+impl<'a> Known<'a> {
     /// The scan beside a model: one made before, or a new one.
     pub(crate) fn beside(&mut self, model: &Extended<'_>, catalogue: &[Choice]) -> &[Scored] {
-        let known = self.0.iter().position(|(choices, _)| *choices == model.choices);
+        let known = self.scans.iter().position(|(choices, _)| *choices == model.choices);
         let at = known.unwrap_or_else(|| {
             let is_chosen = |choice: &Choice| model.choices.iter().any(|chosen| chosen.id() == choice.id());
             let left: Vec<Choice> = catalogue.iter().filter(|choice| !is_chosen(choice)).cloned().collect();
-            self.0.push((model.choices.clone(), scan(&model.fit, &model.choices, &left)));
-            self.0.len() - 1
+            self.scans.push((model.choices.clone(), scan(&model.fit, &model.choices, &left)));
+            self.scans.len() - 1
         });
-        &self.0[at].1
+        &self.scans[at].1
+    }
+
+    fn fit(&self, choices: &[Choice]) -> Option<&Extended<'a>> {
+        self.fits.iter().find(|model| model.choices == choices)
+    }
+
+    /// Models that each have a choice more than another at one place, without those that diverge.
+    fn with_each(
+        &mut self,
+        base: &JointFit<'a>,
+        without: &Extended<'a>,
+        place: usize,
+        added: &[Choice],
+    ) -> Vec<Extended<'a>> {
+        let with = |choice: &Choice| {
+            let mut choices = without.choices.clone();
+            choices.insert(place, choice.clone());
+            self.fit(&choices).cloned().or_else(|| refit(base, without, choices))
+        };
+        let models: Vec<Extended<'a>> = added.par_iter().filter_map(with).collect();
+        for model in &models {
+            self.keep(model);
+        }
+        models
+    }
+
+    /// A model without one of its choices; the base where it has no other.
+    fn without(&mut self, base: &JointFit<'a>, model: &Extended<'a>, place: usize) -> Option<Extended<'a>> {
+        let fewer = self.fit(&others(model, place)).cloned().or_else(|| without(base, model, place))?;
+        self.keep(&fewer);
+        Some(fewer)
+    }
+
+    fn keep(&mut self, model: &Extended<'a>) {
+        if self.fit(&model.choices).is_none() {
+            self.fits.push(model.clone());
+        }
     }
 }
 
@@ -299,26 +348,53 @@ fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
-/// Refits a model with its choices; `None` when that diverges.
-pub(crate) fn refit<'a>(base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
-    let mut all = terms(&choices);
-    let fit = base.extended(&mut all).ok()?;
-    fit.fit.model.sizes.iter().all(|size| size.is_finite()).then_some(Extended { fit, choices })
+/// A fit that takes a smaller share of the looks that another one takes has lost the robot.
+const LEAST_FOLLOWED: f64 = 0.5;
+
+/// The model with other choices, fitted from where it stands, and where steps stray from the base too: the likelier of the two. `None` when both diverge.
+pub(crate) fn refit<'a>(base: &JointFit<'a>, from: &Extended<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
+    let mut sizes = Vec::new();
+    for choice in &choices {
+        let none = vec![0.0; choice.parameters().len()];
+        let of_shape = from.choices.iter().position(|own| own == choice);
+        let known = of_shape.or_else(|| from.choices.iter().position(|own| own.is_shape_of(choice)));
+        let own = known.map(|place| from.sizes(place).as_slice().to_vec());
+        sizes.extend(own.filter(|own| own.len() == none.len()).unwrap_or(none));
+    }
+    let follows = |fit: &JointFit<'_>| {
+        fit.fit.model.sizes.iter().all(|size| size.is_finite()) && count(fit) > LEAST_FOLLOWED * count(&from.fit)
+    };
+    let near = from.fit.extended_from(sizes, &mut terms(&choices)).ok().filter(follows);
+    let near = match near {
+        Some(fit) if !fit.fit.strayed => return Some(Extended { fit, choices }),
+        near => near,
+    };
+    let anew = base.extended(&mut terms(&choices)).ok().filter(follows);
+    let most = [&near, &anew].into_iter().flatten().map(count).fold(0.0, f64::max);
+    let fit = near.into_iter().chain(anew).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
+    Some(Extended { fit, choices })
 }
 
-/// The same, where it is not among those refitted before.
-fn known_or_refit<'a>(known: &[Extended<'a>], base: &JointFit<'a>, choices: Vec<Choice>) -> Option<Extended<'a>> {
-    known.iter().find(|model| model.choices == choices).cloned().or_else(|| refit(base, choices))
+/// A model's choices but one.
+fn others(model: &Extended<'_>, place: usize) -> Vec<Choice> {
+    let mut others = model.choices.clone();
+    others.remove(place);
+    others
+}
+
+/// A model without one of its choices; the base where it has no other. `None` when that diverges.
+pub(crate) fn without<'a>(base: &JointFit<'a>, model: &Extended<'a>, place: usize) -> Option<Extended<'a>> {
+    let others = others(model, place);
+    if others.is_empty() { Some(Extended::alone(base)) } else { refit(base, model, others) }
 }
 
 /// The rivals of one place in a model whose other choices stay, each refitted: the best shape of each effect that explains enough, most probable first.
 fn rivals<'a>(
-    base: &JointFit<'a>,
+    (base, known): (&JointFit<'a>, &mut Known<'a>),
     without: &Extended<'a>,
     place: usize,
     entries: &[Entry],
     best: f64,
-    known: &[Extended<'a>],
 ) -> Vec<(Name, Extended<'a>)> {
     let mut contenders: Vec<&Entry> = entries
         .iter()
@@ -326,20 +402,14 @@ fn rivals<'a>(
         .collect();
     contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
     contenders.truncate(MOST_RIVALS);
-    let fits: Vec<(Choice, Extended<'a>)> = contenders
-        .into_par_iter()
-        .filter_map(|entry| {
-            let mut choices = without.choices.clone();
-            choices.insert(place, entry.scored.choice.clone());
-            let extended = known_or_refit(known, base, choices)?;
-            Some((entry.scored.choice.clone(), extended))
-        })
-        .collect();
-    let most = fits.iter().map(|(_, extended)| count(&extended.fit)).fold(count(&without.fit), f64::max);
+    let contenders: Vec<Choice> = contenders.into_iter().map(|entry| entry.scored.choice.clone()).collect();
+    let fits = known.with_each(base, without, place, &contenders);
+    let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
     let mut named: Vec<(Name, Extended<'a>)> = fits
         .into_iter()
-        .map(|(choice, extended)| {
+        .map(|extended| {
+            let choice = extended.choices[place].clone();
             let shapes = entries.iter().find(|entry| entry.scored.choice.id() == choice.id());
             #[allow(clippy::cast_precision_loss)]
             let trials = (shapes.map_or(1, |entry| entry.shapes.max(1)) as f64).ln();
@@ -363,19 +433,16 @@ fn rivals<'a>(
     named
 }
 
-/// A model with one effect more, and its rivals.
-type Grown<'a> = (Extended<'a>, Vec<Extended<'a>>);
-
 /// The best of a scan, refitted, if that confirms it; else its name.
 fn confirmed<'a>(
-    base: &JointFit<'a>,
+    (base, known): (&JointFit<'a>, &mut Known<'a>),
     model: &Extended<'a>,
     entries: &[Entry],
     (best, tests): (&Entry, f64),
     level: f64,
-) -> Result<Grown<'a>, &'static str> {
+) -> Result<Extended<'a>, &'static str> {
     let place = model.choices.len();
-    let mut found = rivals(base, model, place, entries, best.scored.statistic, &[]);
+    let mut found = rivals((base, known), model, place, entries, best.scored.statistic);
     if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
         return Err(best.scored.choice.id());
     }
@@ -389,11 +456,16 @@ fn confirmed<'a>(
     if is_an_accident || !holds_over_runs(&extended, place, over_runs) {
         return Err(name.choice.id());
     }
-    Ok((extended, found.into_iter().map(|(_, extended)| extended).collect()))
+    Ok(extended)
 }
 
 /// The model with one effect more, if the scan finds one.
-fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>, level: f64) -> Option<Grown<'a>> {
+fn grown<'a>(
+    (base, known): (&JointFit<'a>, &mut Known<'a>),
+    model: &Extended<'a>,
+    mut entries: Vec<Entry>,
+    level: f64,
+) -> Option<Extended<'a>> {
     let tests = tests_in(&entries);
     for _ in 0..MOST_TRIED {
         let best = entries
@@ -402,7 +474,7 @@ fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>,
         if best.p_value * tests > level {
             return None;
         }
-        match confirmed(base, model, &entries, (best, tests), level) {
+        match confirmed((base, &mut *known), model, &entries, (best, tests), level) {
             Ok(grown) => return Some(grown),
             // What comes next may be what is there.
             Err(id) => entries.retain(|entry| entry.scored.choice.id() != id),
@@ -412,38 +484,27 @@ fn grown<'a>(base: &JointFit<'a>, model: &Extended<'a>, mut entries: Vec<Entry>,
 }
 
 /// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
-/// `scans` are those made before on the same base.
-pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, mut scans: Scans) -> Found<'a> {
+/// `known` is what has been asked of the same base before.
+pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, mut known: Known<'a>) -> Found<'a> {
     let mut model = Extended::alone(base);
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
-    // The models on the way, and the rivals of the last: most of them are asked for again below.
-    let (mut models, mut last_rivals): (Vec<Extended<'a>>, Vec<Extended<'a>>) = (Vec::new(), Vec::new());
     while model.choices.len() < MOST_EFFECTS {
-        let entries = best_shapes(scans.beside(&model, catalogue));
+        let entries = best_shapes(known.beside(&model, catalogue));
         if model.choices.is_empty() {
             first_scan.clone_from(&entries);
         }
-        let Some((extended, rivals)) = grown(base, &model, entries, level) else { break };
-        models.push(extended.clone());
-        (model, last_rivals) = (extended, rivals);
+        let Some(extended) = grown((base, &mut known), &model, entries, level) else { break };
+        model = extended;
     }
-    let known = [models, last_rivals].concat();
     let mut place = 0;
     while place < model.choices.len() {
-        let mut others = model.choices.clone();
-        others.remove(place);
-        let without =
-            if others.is_empty() { Some(Extended::alone(base)) } else { known_or_refit(&known, base, others) };
-        let Some(without) = without else { break };
-        let entries = best_shapes(scans.beside(&without, catalogue));
+        let Some(without) = known.without(base, &model, place) else { break };
+        let entries = best_shapes(known.beside(&without, catalogue));
         let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
-        let mut found = rivals(base, &without, place, &entries, best, &known);
-        if found.is_empty() {
-            break;
-        }
-        if found[0].0.log_odds <= 0.0 {
-            // Another one took over what this one stood for.
+        let mut found = rivals((base, &mut known), &without, place, &entries, best);
+        if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
+            // Another one took over what this one stood for, or beside the others it is none that can be.
             model = without;
             continue;
         }
@@ -458,7 +519,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         // what is there may predict worse.
         let predicts = gain(&without, &found[0].1).map_or(true, |gain| {
             let score = gain.log_score_per_observation;
-            score.low + score.high > 0.0 && !gain.drifts_more()
+            score.low + score.high > 0.0 && !gain.drifts_more_by(NAMES_DRIFT)
         });
         if !predicts || !found.iter().any(stands) {
             // Nor does a name that came in its place.
@@ -479,15 +540,13 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         if examine(&model, place).is_some_and(|(test, _)| test.p_value * tests <= level) {
             continue;
         }
-        let mut others = model.choices.clone();
-        others.remove(place);
-        if let Some(without) = if others.is_empty() { Some(Extended::alone(base)) } else { refit(base, others) } {
+        if let Some(without) = known.without(base, &model, place) {
             model = without;
             names.remove(place);
             wider.remove(place);
         }
     }
-    Found { tests: tests_of(&model, &wider), model, names, wider, first_scan, scans }
+    Found { tests: tests_of(&model, &wider), model, names, wider, first_scan, known }
 }
 
 /// Each choice's test beside the others.
@@ -510,7 +569,7 @@ fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
 /// the others it is not seen. It holds if by it they do not lie far off any more, and what is left out as much as what is not is likelier by it.
 pub(crate) fn search_every_look<'a>(base: &JointFit<'a>, found: &Found<'a>, catalogue: &[Choice]) -> Option<Found<'a>> {
     let open = base.with_every_look().ok()?;
-    let bold = search(&open, catalogue, SCAN_LEVEL, Scans::default());
+    let bold = search(&open, catalogue, SCAN_LEVEL, Known::default());
     if bold.model.choices.is_empty() {
         return None;
     }
@@ -521,7 +580,7 @@ pub(crate) fn search_every_look<'a>(base: &JointFit<'a>, found: &Found<'a>, cata
     let tests = tests_of(&model, &bold.wider);
     let trials = tests_in(&bold.first_scan);
     let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
-    let predicts = gain(&Extended::alone(base), &model).map_or(true, |gain| !gain.drifts_more());
+    let predicts = gain(&Extended::alone(base), &model).map_or(true, |gain| !gain.drifts_more_by(NAMES_DRIFT));
     let holds = outliers(&model) < outliers(&found.model) && after > before + reach(before) && stands && predicts;
-    holds.then(|| Found { model, tests, first_scan: found.first_scan.clone(), scans: found.scans.clone(), ..bold })
+    holds.then(|| Found { model, tests, first_scan: found.first_scan.clone(), known: found.known.clone(), ..bold })
 }

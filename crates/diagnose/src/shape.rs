@@ -41,7 +41,7 @@ pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place
         let x = x.clamp(low_end, high_end);
         let mut choices = model.choices.clone();
         choices[place] = choice.moved_to(x.exp());
-        Some(Point { x, model: refit(base, choices)? })
+        Some(Point { x, model: refit(base, model, choices)? })
     };
     let mut best = Point { x: held.ln(), model: model.clone() };
     let mut sigma = 0.0;

@@ -3,12 +3,13 @@
 use calib::methods::joint::JointFit;
 use effects::{Channel, Covariate, Sparse};
 use kinematics::Side;
+use rayon::prelude::*;
 
 use crate::candidate::Choice;
 use crate::checks::of_runs;
 use crate::gain::gain;
 use crate::scan::{Scored, scan};
-use crate::search::{Extended, refit};
+use crate::search::{Extended, evidence, refit};
 use crate::statistics::of_trials;
 
 /// Rate of false alarms of the search for a sparse term.
@@ -142,36 +143,78 @@ fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
     products
 }
 
-/// The best sparse term beside a model.
-pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) -> Option<SparseFound<'a>> {
-    let library = library(base);
-    let mut scored: Vec<Scored> =
-        scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
-    let trials = scored.len();
-    scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
-    let best = scored.first()?;
-    if of_trials(best.p_value, trials) > level {
-        return None;
+/// Sparse terms beside a model by their scores, and the best of them refitted.
+pub(crate) struct Sought<'m, 'a> {
+    model: &'m Extended<'a>,
+    p_value: f64,
+    trials: usize,
+    refitted: Vec<Extended<'a>>,
+}
+
+impl<'m, 'a> Sought<'m, 'a> {
+    /// `None` where no term can be seen.
+    pub(crate) fn beside(base: &JointFit<'a>, model: &'m Extended<'a>) -> Option<Self> {
+        Self::up_to(1.0, base, model)
     }
-    let p_value = of_trials(best.p_value, trials);
-    scored
-        .into_iter()
-        .take(TRIED)
-        .filter_map(|scored| {
-            let mut choices = model.choices.clone();
-            choices.push(scored.choice);
-            let extended = refit(base, choices)?;
-            let earned = gain(model, &extended).ok()?;
-            let score = earned.log_score_per_observation;
-            let certain = score.low + score.high > 2.0 * (score.high - score.low);
-            (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
-        })
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, extended, certain, drifts_more)| SparseFound {
-            model: extended,
+
+    /// The same if the best stands out by its score.
+    fn up_to(level: f64, base: &JointFit<'a>, model: &'m Extended<'a>) -> Option<Self> {
+        let library = library(base);
+        let mut scored: Vec<Scored> =
+            scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+        scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+        let trials = scored.len();
+        let p_value = of_trials(scored.first()?.p_value, trials);
+        if p_value > level {
+            return None;
+        }
+        let with =
+            |scored: &Scored| refit(base, model, [&model.choices[..], std::slice::from_ref(&scored.choice)].concat());
+        Some(Self {
+            model,
             p_value,
             trials,
-            certain,
-            drifts_more,
+            refitted: scored[..TRIED.min(trials)].par_iter().filter_map(with).collect(),
         })
+    }
+
+    /// The best of them that earns its place, if the best stands out by its score.
+    pub(crate) fn finding(&self, level: f64) -> Option<SparseFound<'a>> {
+        if self.p_value > level {
+            return None;
+        }
+        self.refitted
+            .iter()
+            .filter_map(|extended| {
+                let earned = gain(self.model, extended).ok()?;
+                let score = earned.log_score_per_observation;
+                let certain = score.low + score.high > 2.0 * (score.high - score.low);
+                (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, extended, certain, drifts_more)| SparseFound {
+                model: extended.clone(),
+                p_value: self.p_value,
+                trials: self.trials,
+                certain,
+                drifts_more,
+            })
+    }
+
+    /// Log of the chance of the data under the likeliest of them over that without, the trials paid for.
+    pub(crate) fn evidence(&self) -> f64 {
+        self.refitted.iter().map(|model| self.evidence_of(model)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The same under one of them.
+    pub(crate) fn evidence_of(&self, model: &Extended<'a>) -> f64 {
+        #[allow(clippy::cast_precision_loss)] // hundreds
+        let paid = (self.trials as f64).ln();
+        evidence(&self.model.fit, model) - paid
+    }
+}
+
+/// The best sparse term beside a model.
+pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) -> Option<SparseFound<'a>> {
+    Sought::up_to(level, base, model)?.finding(level)
 }

@@ -17,9 +17,11 @@ pub enum InstructionSet {
 }
 
 /// A loop over columns. To be compiled for each instruction set `run` and all that it calls must be `#[inline(always)]`.
-pub(crate) trait Kernel {
+pub trait Kernel {
+    /// What the loop returns.
     type Output;
 
+    /// The loop.
     fn run(self) -> Self::Output;
 }
 
@@ -67,7 +69,7 @@ impl InstructionSet {
 
     /// Runs a kernel compiled for this set; for the baseline where the machine does not have it.
     #[inline]
-    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
         {
             if self == Self::Avx512

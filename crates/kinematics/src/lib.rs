@@ -31,7 +31,7 @@ pub use covariance::{ArcScatter, OdometryCovariance, WheelNoise};
 pub use dead_reckoning::{Count, DeadReckoning, Odometry, Rule};
 pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
 pub use fleet::Fleet;
-pub use instruction_set::InstructionSet;
+pub use instruction_set::{InstructionSet, Kernel};
 pub use pose::{Frame, Point, Pose};
 pub use trig::{atan2, sin_cos, sinc};
 pub use wheels::{Side, Wheels};

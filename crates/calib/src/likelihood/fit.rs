@@ -4,6 +4,7 @@ use dataset::ModelTerm;
 use kinematics::{Increment, Pose, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
+use super::acceleration::{Acceleration, Size};
 use super::evidence::{Information, total};
 use super::filter::{Gate, Want};
 use super::model::{Column, Model};
@@ -21,6 +22,8 @@ const LARGEST_NOISE_STEP: f64 = 1.5;
 /// Steps before outliers are told: at least, and at most.
 const LEAST_STARTS: usize = 3;
 const MOST_STARTS: usize = 20;
+/// A step of ten standard deviations, squared, is a long way.
+const FAR: f64 = 100.0;
 /// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
 const DAMPING: f64 = 1e-7;
 const LEAST_INFORMATION: f64 = 1e-9;
@@ -70,13 +73,22 @@ pub struct Fit {
     pub pass: Pass,
     /// Did the steps die out?
     pub converged: bool,
+    /// Did a step go far, and farther than the first? What it ends at may be one of several minima.
+    pub strayed: bool,
 }
 
 impl Fit {
     /// Before anything is fitted.
     pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
         let pass = Pass::nothing();
-        Self { model: nominal.clone(), noise: prior.noise(), free_headings: Vec::new(), pass, converged: false }
+        Self {
+            model: nominal.clone(),
+            noise: prior.noise(),
+            free_headings: Vec::new(),
+            pass,
+            converged: false,
+            strayed: false,
+        }
     }
 
     /// The normal equation of some columns at the values found, over all runs.
@@ -143,7 +155,9 @@ pub(crate) fn fit_from(
         for round in 1..=MOST_STARTS {
             let want = Want { innovations: true, gate: Gate::Open, ..Want::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, want);
-            let moved = step(&mut model, &mut headings, &found, options, &basis)?;
+            let mean = MeanStep::of(&found, options, &basis)?;
+            let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
+            let moved = mean.squared + own;
             let mut squares: Vec<f64> =
                 found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
             if squares.is_empty() {
@@ -159,19 +173,35 @@ pub(crate) fn fit_from(
         }
     }
     let want = Want { noise_score: !options.noise_held, gate: Gate::of(options.every_look), ..Want::default() };
-    let (mut converged, mut pace) = (false, Pace::default());
+    let (mut converged, mut strayed, mut first) = (false, false, None);
+    let (mut pace, mut acceleration) = (Pace::default(), Acceleration::default());
     for _ in 0..options.max_steps {
         let found = pass(records, selections, &model, &noise, &headings, terms, want);
-        let moved = step(&mut model, &mut headings, &found, options, &basis)?;
-        let noise_moved = if options.noise_held { 0.0 } else { step_noise(&mut noise, &mut pace, &found, prior) };
-        if moved < SETTLED && noise_moved < options.noise_settled {
+        let mean = MeanStep::of(&found, options, &basis)?;
+        let of_noise = if options.noise_held { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
+        let columns = options.columns.len();
+        let tamed = pace.tamed(of_noise.by);
+        let own = if acceleration.engages(Size { mean: mean.squared, noise: of_noise.by.amax() }) {
+            let proposed = stacked(&mean.by, &of_noise.by);
+            let by = acceleration.instead_of(&proposed, &block_diagonal(&mean.information, &of_noise.information));
+            let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
+            let (moved, own) = take_step(&mut model, &mut headings, &found, options, by.rows(0, columns).into_owned())?;
+            acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut noise, by_noise)));
+            own
+        } else {
+            take_noise_step(&mut noise, tamed);
+            take_step(&mut model, &mut headings, &found, options, mean.by)?.1
+        };
+        let moved = mean.squared + own;
+        strayed |= moved > FAR.max(*first.get_or_insert(moved));
+        if moved < SETTLED && of_noise.by.amax() < options.noise_settled {
             converged = true;
             break;
         }
     }
     let want = Want { innovations: true, gate: Gate::of(options.every_look), ..Want::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, want);
-    Ok(Fit { model, noise, free_headings: headings, pass, converged })
+    Ok(Fit { model, noise, free_headings: headings, pass, converged, strayed })
 }
 
 /// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
@@ -191,8 +221,8 @@ pub(crate) fn pass_settled(
         let found = pass(records, selections, &model, noise, &headings, &mut [], Want::default());
         let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
         let mut next = model.clone();
-        let moved = step(&mut next, &mut headings, &found, &options, &basis(&options))?;
-        if (turned < HEADING_SETTLED_RAD && moved < SETTLED) || round == MOST_STARTS {
+        let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
+        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MOST_STARTS {
             return Ok((model, found));
         }
         model = next;
@@ -227,39 +257,53 @@ pub(crate) fn basis(options: &FitOptions) -> DMatrix<f64> {
     if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
 }
 
-/// A damped Gauss–Newton step of the mean; returns its squared length over its variance.
-fn step(
-    model: &mut Model,
-    headings: &mut [f64],
-    found: &Pass,
-    options: &FitOptions,
-    basis: &DMatrix<f64>,
-) -> Result<f64, FitError> {
-    let Some(sum) = total(&found.runs) else { return Err(FitError::NoLooks) };
-    let mut moved = vec![0.0; sum.gradient.len()];
-    let mut size = 0.0;
-    if !options.columns.is_empty() && basis.ncols() > 0 {
+/// A damped Gauss–Newton step of the mean.
+struct MeanStep {
+    /// By column of the options.
+    by: DVector<f64>,
+    /// Information on those columns.
+    information: DMatrix<f64>,
+    /// Squared length over its variance.
+    squared: f64,
+}
+
+impl MeanStep {
+    fn of(found: &Pass, options: &FitOptions, basis: &DMatrix<f64>) -> Result<Self, FitError> {
+        let Some(sum) = total(&found.runs) else { return Err(FitError::NoLooks) };
         let Information { matrix, gradient } = sum.of(&options.columns);
+        if options.columns.is_empty() || basis.ncols() == 0 {
+            return Ok(Self { by: DVector::zeros(options.columns.len()), information: matrix, squared: 0.0 });
+        }
         let reduced = basis.transpose() * &matrix * basis;
         let m = reduced.nrows();
         let damping = DVector::from_fn(m, |k, _| DAMPING * reduced[(k, k)] + LEAST_INFORMATION);
         let damped =
             Information { matrix: &reduced + DMatrix::from_diagonal(&damping), gradient: basis.transpose() * gradient };
         let (step, _) = damped.solve().ok_or(FitError::Diverges)?;
-        size = (step.transpose() * &reduced * &step)[0];
-        let step = basis * step;
-        for (column, by) in options.columns.iter().zip(step.iter()) {
-            // A drive that a step makes a half or twice as large is none; the next step goes on.
-            let by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
-            if !by.is_finite() {
-                return Err(FitError::Diverges);
-            }
-            model.advance(*column, by);
-            moved[column.index()] = by;
-        }
+        let squared = (step.transpose() * &reduced * &step)[0];
+        Ok(Self { by: basis * step, information: matrix, squared })
     }
-    let step =
-        DVector::from_iterator(options.columns.len(), options.columns.iter().map(|column| moved[column.index()]));
+}
+
+/// Moves the mean by a step, and the start headings and instruments that follow it; returns what was moved by in the end, and the squared length, over its variance,
+/// of what groups' own instruments moved by.
+fn take_step(
+    model: &mut Model,
+    headings: &mut [f64],
+    found: &Pass,
+    options: &FitOptions,
+    mut step: DVector<f64>,
+) -> Result<(DVector<f64>, f64), FitError> {
+    let mut moved = vec![0.0; found.runs.first().ok_or(FitError::NoLooks)?.gradient.len()];
+    for (column, by) in options.columns.iter().zip(step.iter_mut()) {
+        // A drive that a step makes a half or twice as large is none; the next step goes on.
+        *by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
+        if !by.is_finite() {
+            return Err(FitError::Diverges);
+        }
+        model.advance(*column, *by);
+        moved[column.index()] = *by;
+    }
     let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
     for FreeHeading { chain, run, rest, by } in &found.headings {
         let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
@@ -275,11 +319,41 @@ fn step(
         }
         headings[*chain] += rest + follows;
     }
+    let mut size = 0.0;
     for (follow, by) in found.own.iter().zip(&own_steps) {
         size += follow.squared(by);
         model.advance_own(follow.group, by);
     }
-    Ok(size)
+    Ok((step, size))
+}
+
+/// A scoring step of the logarithms of the variances.
+struct NoiseStep {
+    by: Vector4<f64>,
+    information: Matrix4<f64>,
+}
+
+impl NoiseStep {
+    fn none() -> Self {
+        Self { by: Vector4::zeros(), information: Matrix4::identity() }
+    }
+
+    fn of(noise: &Noise, found: &Pass, prior: &NoisePrior) -> Self {
+        let pull = prior.pull(noise);
+        let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+        let information =
+            found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
+        let Some(mut by) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else {
+            return Self::none();
+        };
+        // What stands at its floor does not move.
+        for (by, variance) in by.iter_mut().zip(noise.variance) {
+            if variance <= LEAST_SIGMA * LEAST_SIGMA {
+                *by = by.max(0.0);
+            }
+        }
+        Self { by, information }
+    }
 }
 
 /// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
@@ -303,26 +377,31 @@ impl Pace {
                 if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
         }
         self.last = step;
-        let tamed = step.component_mul(&self.share);
-        tamed * (LARGEST_NOISE_STEP / tamed.amax()).min(1.0)
+        step.component_mul(&self.share)
     }
 }
 
-/// A scoring step of the noise; returns the largest component of the whole step.
-fn step_noise(noise: &mut Noise, pace: &mut Pace, found: &Pass, prior: &NoisePrior) -> f64 {
-    let pull = prior.pull(noise);
-    let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
-    let information =
-        found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
-    let Some(step) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else { return 0.0 };
-    let tamed = pace.tamed(step);
+/// Moves the noise, by so much at the most; returns by how much.
+fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
+    let by = by * (LARGEST_NOISE_STEP / by.amax()).min(1.0);
     let before = *noise;
-    for (variance, by) in noise.variance.iter_mut().zip(tamed.iter()) {
+    for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
         *variance = (*variance * by.exp()).max(LEAST_SIGMA * LEAST_SIGMA);
     }
-    // What stands at its floor does not move.
-    let moving = (0..4).filter(|&k| noise.variance[k] != before.variance[k]);
-    moving.map(|k| step[k].abs()).fold(0.0, f64::max)
+    Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
+}
+
+/// The steps of mean and noise as one.
+fn stacked(mean: &DVector<f64>, noise: &Vector4<f64>) -> DVector<f64> {
+    DVector::from_iterator(mean.len() + noise.len(), mean.iter().chain(noise.iter()).copied())
+}
+
+fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
+    let n = mean.nrows();
+    let mut all = DMatrix::zeros(n + noise.nrows(), n + noise.nrows());
+    all.view_mut((0, 0), (n, n)).copy_from(mean);
+    all.view_mut((n, n), noise.shape()).copy_from(noise);
+    all
 }
 
 /// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.

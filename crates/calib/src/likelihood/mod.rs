@@ -9,7 +9,10 @@
 //! (mean-only information). A wrong noise model on 10⁵ looks would outvote the mean.
 //! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974 (scoring); Chong & Kleeman 1997 (k²|s|).
 
+mod acceleration;
 mod apart;
+mod covariances;
+mod derivatives;
 mod evidence;
 mod filter;
 mod fit;

@@ -199,7 +199,7 @@ fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> 
 }
 
 /// F C Fᵀ for a step that moves by (dx, dy): F = [1 0 a; 0 1 b; 0 0 1] with a = −dy, b = dx.
-pub(crate) fn carry(covariance: &mut Matrix3<f64>, a: f64, b: f64) {
+fn carry(covariance: &mut Matrix3<f64>, a: f64, b: f64) {
     let c = covariance;
     let (c02, c12, c22) = (c[(0, 2)], c[(1, 2)], c[(2, 2)]);
     c[(0, 0)] += a * (2.0 * c02 + a * c22);

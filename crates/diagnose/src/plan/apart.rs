@@ -8,13 +8,13 @@ use calib::methods::joint::JointFit;
 use super::library::Manoeuvre;
 use super::predict::predictions;
 use super::setting::Setting;
-use super::weigh::{Candidate, Frame, Rivals, with_parts, with_runs};
+use super::weigh::{Candidate, Frame, Rivals, Sure, with_parts, with_runs};
 use super::words::Predictions;
 use super::{Part, evidences, words};
 use crate::candidate::{Choice, terms};
 use crate::document::NextExperiment;
 use crate::scan::total;
-use crate::search::{Extended, Found, refit};
+use crate::search::{Found, without};
 
 /// Two kinds of run must save this share of the time against one to be worth the trouble.
 const WORTH_TWO_KINDS: f64 = 0.8;
@@ -28,14 +28,9 @@ pub(super) fn tell_apart(
     place: usize,
     setting: &Setting,
     manoeuvres: &[Manoeuvre],
+    sure: Sure,
 ) -> Result<NextExperiment, String> {
-    let mut others = found.model.choices.clone();
-    others.remove(place);
-    let without = if others.is_empty() {
-        Extended { fit: base.clone(), choices: Vec::new() }
-    } else {
-        refit(base, others).ok_or("the model without this finding has no fit")?
-    };
+    let without = without(base, &found.model, place).ok_or("the model without this finding has no fit")?;
     let names: Vec<Choice> = found.names[place].iter().map(|name| name.choice.clone()).collect();
     let all: Vec<Choice> = without.choices.iter().chain(&names).cloned().collect();
     let mut at = Column::BASE.len() + parameters(&without.choices);
@@ -47,7 +42,7 @@ pub(super) fn tell_apart(
     let candidates: Vec<Candidate> = candidates.collect();
     let before = total(&without.fit.scan(&mut terms(&all)).runs).ok_or("no run has looks")?;
     let frame = Frame::of(&without.fit, &all);
-    let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
+    let rivals = Rivals::new(frame, candidates, &before, sure).ok_or("the data do not determine the names' sizes")?;
     let options = evidences(&without.fit, &all, setting, manoeuvres);
     let id = |k: usize| rivals.candidates[k].choice.id();
 
@@ -108,8 +103,9 @@ pub(super) fn tell_apart(
     } else {
         (pairs(&told), format!(" It does not tell {}.", pairs(&never)))
     };
+    let tell = if sure == Sure::Certain { "tells" } else { "tells, with even chances," };
     let why = format!(
-        "it takes {minutes:.1} min and tells {tells} by {sigmas:.1} standard deviations or more, sought {}. Diagnose the new runs together with the old ones.{still}{what}",
+        "it takes {minutes:.1} min and {tell} {tells} by {sigmas:.1} standard deviations or more, sought {}. Diagnose the new runs together with the old ones.{still}{what}",
         setting.within
     );
     Ok(words::next_experiment(&parts, setting, minutes, &why, predicts))

@@ -19,8 +19,25 @@ const LENGTH_SD: f64 = 0.05;
 const MOUNT_SD_M: f64 = 0.2;
 const MOUNT_SD_RAD: f64 = 0.3;
 const LATENCY_SD_S: f64 = 0.2;
-/// The log of the odds is normal with mean λ/2 and variance λ: with 19 chances in 20 it is not lower than this many standard deviations below.
-const CERTAIN: f64 = 1.645;
+
+/// How sure it must be that names are told apart. The log of the odds is normal with mean λ/2 and variance λ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sure {
+    /// With 19 chances in 20.
+    Certain,
+    /// With even chances.
+    AsNot,
+}
+
+impl Sure {
+    /// With its chance the log of the odds is not lower than so many standard deviations below its mean.
+    const fn sigmas(self) -> f64 {
+        match self {
+            Self::Certain => 1.645,
+            Self::AsNot => 0.0,
+        }
+    }
+}
 
 /// One of several names, with its columns of the normal equation.
 #[derive(Debug, Clone)]
@@ -92,10 +109,11 @@ pub(crate) struct Rivals {
     pub(crate) frame: Frame,
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) sizes: Vec<DVector<f64>>,
+    pub(crate) sure: Sure,
 }
 
 impl Rivals {
-    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence) -> Option<Self> {
+    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence, sure: Sure) -> Option<Self> {
         let sizes = candidates
             .iter()
             .map(|candidate| {
@@ -103,7 +121,7 @@ impl Rivals {
                 Some(step.rows(frame.free.len(), candidate.columns.len()).into_owned())
             })
             .collect::<Option<_>>()?;
-        Some(Self { frame, candidates, sizes })
+        Some(Self { frame, candidates, sizes, sure })
     }
 
     /// Every pair of names.
@@ -120,7 +138,7 @@ impl Rivals {
             let alone = self.frame.information(evidence, own, &self.frame.free)?;
             let lambda = (size.transpose() * left * size)[0].max(0.0);
             let explained = 0.5 * (size.transpose() * alone * size)[0].max(0.0);
-            let margin = 0.5 * lambda - CERTAIN * lambda.sqrt() - reach(explained);
+            let margin = 0.5 * lambda - self.sure.sigmas() * lambda.sqrt() - reach(explained);
             Some(Apart { sigmas: lambda.sqrt(), margin })
         };
         let (there, back) = (one_way(a, b)?, one_way(b, a)?);
@@ -169,7 +187,7 @@ mod tests {
             columns: vec![column],
         };
         let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
-        Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
+        Rivals::new(frame, vec![candidate(1), candidate(2)], before, Sure::Certain).expect("determined")
     }
 
     /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
@@ -188,6 +206,6 @@ mod tests {
         let apart = rivals.apart(&after, (0, 1)).expect("determined");
         // To the size of the priors. Without the other name at its best both would leave 100 or more.
         assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
-        assert!((apart.margin - (25.0 - CERTAIN * 50_f64.sqrt() - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((apart.margin - (25.0 - 1.645 * 50_f64.sqrt() - 3.0)).abs() < 1e-3, "{apart:?}");
     }
 }

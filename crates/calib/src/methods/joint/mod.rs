@@ -351,11 +351,19 @@ impl JointFit<'_> {
     /// [`CalibError`] when it diverges.
     pub fn extended(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, CalibError> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+        self.extended_from(vec![0.0; parameters], terms)
+    }
+
+    /// The same, begun with given sizes: those of the terms that are in this fit already, say. The terms are those of `terms` only.
+    ///
+    /// # Errors
+    /// [`CalibError`] when it diverges.
+    pub fn extended_from(&self, sizes: Vec<f64>, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, CalibError> {
         let mut columns = self.columns.clone();
         columns.retain(|column| !matches!(column, Column::Term(_)));
-        columns.extend((0..parameters).map(Column::Term));
+        columns.extend((0..sizes.len()).map(Column::Term));
         let mut from = self.here();
-        from.model.sizes = vec![0.0; parameters];
+        from.model.sizes = sizes;
         let noise_settled = self.noise_settled.max(EXTENDED_NOISE_SETTLED);
         let mut extended = Self { columns, noise_settled, ..self.clone() };
         extended.refit_with(Some(from), terms)?;

@@ -1,0 +1,109 @@
+//! Anderson's acceleration of the fit's steps. Mean and noise step side by side, each as if the other stayed: what one moves, the other follows in the next step, and
+//! steps shrink by a constant share. The last few of them show that share, and where it leads.
+//!
+//! Reference: Anderson 1965; Walker & Ni 2011 (the mixing as least squares over differences of steps).
+
+use std::collections::VecDeque;
+
+use nalgebra::{DMatrix, DVector};
+
+/// So many differences are kept.
+const DEPTH: usize = 3;
+/// A step that is made longer than so many times is none that the last ones showed.
+const LONGEST: f64 = 10.0;
+/// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Size {
+    pub(super) mean: f64,
+    pub(super) noise: f64,
+}
+
+/// Steps that are smaller follow each other as those of a linear map do; larger ones do not. A variance that is far too large shrinks by one in its logarithm.
+const NEAR: Size = Size { mean: 1.0, noise: 0.3 };
+/// Where steps become larger than this, what the last ones showed has led astray.
+const ASTRAY: Size = Size { mean: 10.0, noise: 0.9 };
+/// Led astray so often, the fit goes on without.
+const MOST_ASTRAY: u32 = 2;
+/// Differences that hardly differ, as a share of the largest, tell nothing apart.
+const SINGULAR: f64 = 1e-10;
+
+/// The steps so far.
+#[derive(Debug, Default)]
+pub(super) struct Acceleration {
+    /// The last step that was proposed, and what was moved by instead.
+    last: Option<(DVector<f64>, DVector<f64>)>,
+    /// How proposed steps differed from those before, and what had been moved by in between; the newest last.
+    differences: VecDeque<(DVector<f64>, DVector<f64>)>,
+    engaged: bool,
+    astray: u32,
+}
+
+impl Acceleration {
+    /// Whether to go by the last steps at all, the next one being so large.
+    pub(super) fn engages(&mut self, step: Size) -> bool {
+        if self.engaged && (step.mean > ASTRAY.mean || step.noise > ASTRAY.noise) {
+            (self.engaged, self.last) = (false, None);
+            self.differences.clear();
+            self.astray += 1;
+        }
+        self.engaged |= step.mean < NEAR.mean && step.noise < NEAR.noise && self.astray < MOST_ASTRAY;
+        self.engaged
+    }
+
+    /// What to move by instead of a step that is proposed. `metric` is the information on what is moved: lengths are in standard deviations.
+    pub(super) fn instead_of(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
+        let squared = |of: &DVector<f64>| of.dot(&(metric * of));
+        if let Some((before, moved)) = self.last.take() {
+            self.differences.push_back((step - before, moved));
+        }
+        if self.differences.len() > DEPTH {
+            self.differences.pop_front();
+        }
+        if self.differences.is_empty() {
+            return step.clone();
+        }
+        let n = self.differences.len();
+        let weighed: Vec<DVector<f64>> = self.differences.iter().map(|(difference, _)| metric * difference).collect();
+        let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&weighed[j]));
+        let along = DVector::from_fn(n, |i, _| weighed[i].dot(step));
+        let least = SINGULAR * products.diagonal().max();
+        let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
+        let mixed = self
+            .differences
+            .iter()
+            .zip(shares.iter())
+            .fold(step.clone(), |sum, ((difference, moved), share)| sum - (difference + moved) * *share);
+        if mixed.iter().all(|by| by.is_finite()) && squared(&mixed) <= LONGEST * LONGEST * squared(step) {
+            mixed
+        } else {
+            self.differences.clear();
+            step.clone()
+        }
+    }
+
+    /// What was moved by in the end, for a step that had been proposed.
+    pub(super) fn moved(&mut self, proposed: DVector<f64>, by: DVector<f64>) {
+        self.last = Some((proposed, by));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map that draws nearer by a constant share in each direction is solved in as many steps as it has directions, and one to see it by.
+    #[test]
+    fn a_linear_iteration_ends_once_its_shares_have_been_seen() {
+        let shares = DVector::from_vec(vec![0.9, -0.5, 0.3]);
+        let metric = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 1e4, 1.0]));
+        let mut acceleration = Acceleration::default();
+        let mut x = DVector::from_vec(vec![1.0, -2.0, 3.0]);
+        for _ in 0..5 {
+            let step = shares.component_mul(&x) - &x;
+            let by = acceleration.instead_of(&step, &metric);
+            x += &by;
+            acceleration.moved(step, by);
+        }
+        assert!(x.norm() < 1e-9, "{x}");
+    }
+}
