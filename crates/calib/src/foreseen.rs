@@ -60,7 +60,7 @@ impl JointFit<'_> {
             .filter_map(|(legs, chain)| {
                 let (start, _, (_, end)) = chain.ends()?;
                 let ([leg], moved) = (&legs[..], start.to(end)) else { return None };
-                let mut covariance = leg.noise[0] * wheel + leg.noise[1] * turn;
+                let mut covariance = leg.noise.matrix(0) * wheel + leg.noise.matrix(1) * turn;
                 let lever = Vector3::new(-moved.y_m, moved.x_m, 1.0);
                 covariance += Matrix3::from_diagonal(&Vector3::new(xy, xy, 0.0)) + lever * lever.transpose() * theta;
                 let (sin, cos) = moved.theta_rad.sin_cos();

@@ -30,5 +30,5 @@ pub use document::{
     Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
     Value, Verdict,
 };
-pub use plan::{Limits, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
+pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Against, Bin, Component, Profile, Residuals};

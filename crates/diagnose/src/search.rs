@@ -1,6 +1,7 @@
 //! Which effects the data show: forward selection over the catalogue with refits, and which other names would do as well.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use calib::likelihood::{Column, Evidence, NoiseComponent};
 use calib::methods::joint::JointFit;
@@ -190,7 +191,7 @@ pub(crate) struct Found<'a> {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Known<'a> {
     scans: Vec<(Vec<Choice>, Vec<Scored>)>,
-    fits: Vec<Extended<'a>>,
+    fits: Vec<Arc<Extended<'a>>>,
 }
 
 impl<'a> Known<'a> {
@@ -207,7 +208,7 @@ impl<'a> Known<'a> {
     }
 
     fn fit(&self, choices: &[Choice]) -> Option<&Extended<'a>> {
-        self.fits.iter().find(|model| model.choices == choices)
+        self.fits.iter().map(Arc::as_ref).find(|model| model.choices == choices)
     }
 
     /// Models that each have a choice more than another at one place, without those that diverge.
@@ -239,7 +240,7 @@ impl<'a> Known<'a> {
 
     fn keep(&mut self, model: &Extended<'a>) {
         if self.fit(&model.choices).is_none() {
-            self.fits.push(model.clone());
+            self.fits.push(Arc::new(model.clone()));
         }
     }
 }

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use dataset::{Pace, Schedule};
-use diagnose::{NextExperiment, Options, diagnose};
+use diagnose::{HANDLING_S, MINUTES, NextExperiment, Options, diagnose};
 
 use super::case::{Case, More};
 use super::hidden::EffectKind;
@@ -106,11 +106,7 @@ fn sessions(case: &Case, next: &NextExperiment) -> Vec<SessionPlan> {
     next.sessions.iter().map(|planned| session(case, planned.speed_m_s, &planned.schedules)).collect()
 }
 
-/// As long as diagnosis seeks plans for where nobody says otherwise, minutes, and what it takes to place the robot for each run, seconds.
-const MINUTES: f64 = 10.0;
-const HANDLING_S: f64 = 20.0;
-
-/// All kinds of runs on the floor over which the robot moved so far, as often as they fit the time.
+/// All kinds of runs on the floor over which the robot moved so far, as often as they fit the time that plans have where nobody says otherwise.
 fn battery(case: &Case) -> Vec<SessionPlan> {
     let [x_m, y_m] = diagnose::moved_over_m(&case.datasets);
     let (shorter_m, longer_m) = (x_m.min(y_m), x_m.max(y_m));

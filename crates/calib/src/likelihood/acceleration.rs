@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 const DEPTH: usize = 3;
 /// A step that is made longer than so many times is none that the last ones showed.
 const LONGEST: f64 = 10.0;
+
 /// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Size {

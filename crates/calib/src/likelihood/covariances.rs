@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Several symmetric matrices of a pose, element by element: what is done to one is done to all at a time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Covariances<const N: usize> {
+pub(crate) struct Covariances<const N: usize> {
     xx: [f64; N],
     xy: [f64; N],
     yy: [f64; N],
@@ -16,7 +16,7 @@ pub(super) struct Covariances<const N: usize> {
 pub(super) type Covariance = Covariances<1>;
 
 impl<const N: usize> Covariances<N> {
-    pub(super) const ZERO: Self =
+    pub(crate) const ZERO: Self =
         Self { xx: [0.0; N], xy: [0.0; N], yy: [0.0; N], xt: [0.0; N], yt: [0.0; N], tt: [0.0; N] };
 
     #[inline(always)]
@@ -25,7 +25,7 @@ impl<const N: usize> Covariances<N> {
         Self { xx: at(0, 0), xy: at(0, 1), yy: at(1, 1), xt: at(0, 2), yt: at(1, 2), tt: at(2, 2) }
     }
 
-    /// F P Fᵀ for a step of the pose: F = [1 0 a; 0 1 b; 0 0 1].
+    /// F P Fᵀ for a step of the pose by (dx, dy): F = [1 0 a; 0 1 b; 0 0 1] with a = −dy, b = dx.
     #[inline(always)]
     pub(super) fn carry(&mut self, a: f64, b: f64) {
         for k in 0..N {
@@ -78,6 +78,23 @@ impl<const N: usize> Covariances<N> {
     #[inline(always)]
     fn elements(&mut self) -> [&mut [f64; N]; 6] {
         [&mut self.xx, &mut self.xy, &mut self.yy, &mut self.xt, &mut self.yt, &mut self.tt]
+    }
+
+    /// Adds a column times itself, so many times, to one of them.
+    #[inline(always)]
+    pub(super) fn add_outer(&mut self, at: usize, column: &Vector3<f64>, times: f64) {
+        self.xx[at] += column.x * column.x * times;
+        self.xy[at] += column.x * column.y * times;
+        self.yy[at] += column.y * column.y * times;
+        self.xt[at] += column.x * column.z * times;
+        self.yt[at] += column.y * column.z * times;
+        self.tt[at] += column.z * column.z * times;
+    }
+
+    /// One of them.
+    pub(crate) fn matrix(&self, of: usize) -> Matrix3<f64> {
+        let Self { xx, xy, yy, xt, yt, tt } = self;
+        Matrix3::new(xx[of], xy[of], xt[of], xy[of], yy[of], yt[of], xt[of], yt[of], tt[of])
     }
 
     /// P h: the three coordinates of each.

@@ -222,7 +222,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
             self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), start_s);
             let pieces = 0..self.chain.pieces.len();
-            self.predict(&Leg { pieces, from: 0, look: 0, noise: [Matrix3::zeros(); 2] });
+            self.predict(&Leg { pieces, from: 0, look: 0, noise: Covariances::ZERO });
             return;
         };
         match self.chain.start {
@@ -433,8 +433,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
         self.by.add_turned(Column::BASE.len(), (sin, cos), &self.leg_by_terms);
         self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
-        let [wheel, turn] = &leg.noise;
-        let noise = Covariances::of([wheel, turn]).turned((sin, cos)).times([
+        let noise = leg.noise.turned((sin, cos)).times([
             self.noise.variance[NoiseComponent::Wheel as usize],
             self.noise.variance[NoiseComponent::Turn as usize],
         ]);

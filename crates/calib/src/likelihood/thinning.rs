@@ -7,8 +7,9 @@
 //! Of looks, those in between are passed over, and the way from one taken to the next is whole. A displacement cannot be lengthened, as its instrument would err twice:
 //! displacements in between are left out, way and all. The other phases take those, all of them where each phase takes one in as many as there are phases, or more.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use super::covariances::Covariances;
 use super::model::Model;
 use super::records::{Chain, Records, Start};
 
@@ -34,7 +35,7 @@ pub(crate) struct Leg {
     pub(crate) from: usize,
     pub(crate) look: usize,
     /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a turn noise of 1 rad²/rad.
-    pub(crate) noise: [Matrix3<f64>; 2],
+    pub(crate) noise: Covariances<2>,
 }
 
 /// The looks taken in one phase.
@@ -173,8 +174,10 @@ fn legs(chain: &Chain<'_>, taken: &[usize], nominal: &Model) -> Vec<Leg> {
 }
 
 /// The covariance of a leg's motion for unit noises. It is that of the nominal drive: an estimate of the lengths must not gain by what it does to covariances.
-fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> [Matrix3<f64>; 2] {
-    let (mut wheel, mut turn) = (Matrix3::zeros(), Matrix3::zeros());
+fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
+    const WHEEL: usize = 0;
+    const TURN: usize = 1;
+    let mut noise = Covariances::ZERO;
     let mut theta_rad = 0.0;
     for piece in &chain.pieces[pieces] {
         let travel_m = nominal.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -182,32 +185,16 @@ fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> 
             (0.5 * (travel_m.left + travel_m.right), (travel_m.right - travel_m.left) / nominal.separation_m);
         let (sin, cos) = (theta_rad + 0.5 * turn_rad).sin_cos();
         let (dx_m, dy_m) = (way_m * cos, way_m * sin);
-        for covariance in [&mut wheel, &mut turn] {
-            carry(covariance, -dy_m, dx_m);
-        }
+        noise.carry(-dy_m, dx_m);
         // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on half of the way.
         for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {
             let by_turn = side / nominal.separation_m;
             let column = Vector3::new(0.5 * (cos - dy_m * by_turn), 0.5 * (sin + dx_m * by_turn), by_turn);
-            wheel += column * column.transpose() * travel_m.abs();
+            noise.add_outer(WHEEL, &column, travel_m.abs());
         }
         let column = Vector3::new(-0.5 * dy_m, 0.5 * dx_m, 1.0);
-        turn += column * column.transpose() * turn_rad.abs();
+        noise.add_outer(TURN, &column, turn_rad.abs());
         theta_rad += turn_rad;
     }
-    [wheel, turn]
-}
-
-/// F C Fᵀ for a step that moves by (dx, dy): F = [1 0 a; 0 1 b; 0 0 1] with a = −dy, b = dx.
-fn carry(covariance: &mut Matrix3<f64>, a: f64, b: f64) {
-    let c = covariance;
-    let (c02, c12, c22) = (c[(0, 2)], c[(1, 2)], c[(2, 2)]);
-    c[(0, 0)] += a * (2.0 * c02 + a * c22);
-    c[(0, 1)] += a * c12 + b * c02 + a * b * c22;
-    c[(1, 1)] += b * (2.0 * c12 + b * c22);
-    c[(0, 2)] += a * c22;
-    c[(1, 2)] += b * c22;
-    c[(1, 0)] = c[(0, 1)];
-    c[(2, 0)] = c[(0, 2)];
-    c[(2, 1)] = c[(1, 2)];
+    noise
 }

@@ -22,7 +22,7 @@ use crate::search::{Extended, Found};
 
 use library::{Manoeuvre, foreseen, library};
 use setting::Setting;
-pub use setting::{Limits, moved_over_m};
+pub use setting::{HANDLING_S, Limits, MINUTES, moved_over_m};
 pub use show::{PlanError, ScenarioPlan, plan_scenario};
 use weigh::Sure;
 

@@ -21,11 +21,11 @@ pub struct Limits {
 /// Acceleration of a wheel's contact where nothing is known of it, m/s²: that of the robot that stands in.
 const ACCELERATION_M_S2: f64 = 0.5;
 /// To place the robot for a run, where nothing is known of it, seconds.
-const HANDLING_S: f64 = 20.0;
+pub const HANDLING_S: f64 = 20.0;
 /// What a robot needs of each side of a room, in wheel separations: its own width and a hand's breadth.
 const CLEARANCE: f64 = 1.5;
 /// Time where nobody says how much, minutes.
-const MINUTES: f64 = 10.0;
+pub const MINUTES: f64 = 10.0;
 
 /// The setting of an experiment.
 #[derive(Debug, Clone)]
