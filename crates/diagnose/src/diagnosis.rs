@@ -24,7 +24,7 @@ use crate::search::{
     Extended, Found, Known, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, chance, evidence, examine, reach, search,
     search_every_look,
 };
-use crate::unlisted::{Sought, SparseFound, UNLISTED_LEVEL, Unlisted, sparse};
+use crate::unlisted::{Sought, UNLISTED_LEVEL, Unlisted, lack_of_fit, sparse};
 
 /// What to leave out.
 #[derive(Debug, Clone, Default)]
@@ -179,11 +179,42 @@ impl<'a> Asked<'a> {
         self.unlisted.as_ref().map_or(&self.found.model, |unlisted| &unlisted.model)
     }
 
-    /// A term without a name is there, and perhaps more of them.
-    fn keep(&mut self, sparse: SparseFound<'a>) {
-        let unlisted = Unlisted::from(&self.base, sparse);
+    /// Terms without a name are there.
+    fn keep(&mut self, unlisted: Unlisted<'a>) {
         self.checked = check(&unlisted.model);
         self.unlisted = Some(unlisted);
+    }
+
+    /// Holds the names against one term that is in no catalogue: where that explains more than all of them together, something without a name is there. Whether it is.
+    fn hold_against_sparse(&mut self) -> bool {
+        self.rivalled = None;
+        let alone = Extended::alone(&self.base);
+        if self.found.model.choices.is_empty() {
+            return false;
+        }
+        let Some(sought) = Sought::beside(&self.base, &alone) else { return false };
+        let named = evidence(&alone.fit, &self.found.model);
+        let finding = sought.finding(UNLISTED_LEVEL);
+        let unnamed = finding.as_ref().map_or_else(|| sought.evidence(), |sparse| sought.evidence_of(&sparse.model));
+        let Some(sparse) = finding.filter(|_| unnamed > named + reach(named)) else {
+            self.rivalled = Some(chance(unnamed, named)).filter(|_| unnamed > named - LEAST_REACH);
+            return false;
+        };
+        let instead = Unlisted::from(&self.base, sparse);
+        let beside = self.sparse_beside().filter(|beside| beside.evidence(&alone.fit) >= instead.evidence(&alone.fit));
+        if beside.is_none() {
+            // The names only stand round it.
+            self.found.model = alone;
+            self.found.names.clear();
+            self.found.tests.clear();
+        }
+        self.keep(beside.unwrap_or(instead));
+        true
+    }
+
+    /// What is there without a name beside the names that were found.
+    fn sparse_beside(&self) -> Option<Unlisted<'a>> {
+        sparse(&self.base, &self.found.model, UNLISTED_LEVEL).map(|sparse| Unlisted::from(&self.base, sparse))
     }
 
     /// Whether more looks lie far off than chance makes.
@@ -211,24 +242,8 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         asked.checked = check(&found.model);
         asked.found = found;
     }
-    // One term that is in no catalogue and explains more than all the names together: the names only stand round what is there.
-    let alone = Extended::alone(&asked.base);
-    if !asked.found.model.choices.is_empty()
-        && let Some(sought) = Sought::beside(&asked.base, &alone)
-    {
-        let named = evidence(&alone.fit, &asked.found.model);
-        let finding = sought.finding(UNLISTED_LEVEL);
-        let unnamed = finding.as_ref().map_or_else(|| sought.evidence(), |sparse| sought.evidence_of(&sparse.model));
-        if let Some(sparse) = finding
-            && unnamed > named + reach(named)
-        {
-            asked.found.model = alone;
-            asked.found.names.clear();
-            asked.found.tests.clear();
-            asked.keep(sparse);
-            return asked;
-        }
-        asked.rivalled = Some(chance(unnamed, named)).filter(|_| unnamed > named - LEAST_REACH);
+    if asked.hold_against_sparse() {
+        return asked;
     }
     // What was lost of the counts and is restored roughly makes looks after it err alike: they are no fault of the instrument's.
     if !restored && !is_white(&asked.checked) {
@@ -239,15 +254,17 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         asked.in_disguise = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
         let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
         if let Some((_, sparse)) = explains {
-            asked.keep(sparse);
+            asked.keep(Unlisted::from(&asked.base, sparse));
             return asked;
         }
         if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
             asked.correlated = Some(asked.checked.correlation);
             asked.found = search(&thinned, catalogue, SCAN_LEVEL, Known::default());
-            asked.rivalled = None;
             asked.checked = check(&asked.found.model);
             asked.base = thinned;
+            if asked.hold_against_sparse() {
+                return asked;
+            }
         }
     }
     if asked.goes_with_something() {
@@ -261,9 +278,9 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         }
     }
     if asked.goes_with_something()
-        && let Some(sparse) = sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL)
+        && let Some(unlisted) = asked.sparse_beside()
     {
-        asked.keep(sparse);
+        asked.keep(unlisted);
     }
     asked
 }
@@ -292,10 +309,14 @@ fn continued(
     let asked = ask(datasets, base, &catalogue, restored);
     let mut findings: Vec<Finding> = faults.iter().map(|fault| naming::of_fault(fault)).collect();
     findings.extend(naming::of_search(&asked.found));
-    if let Some(chance) = asked.rivalled {
-        naming::beside_unlisted(&mut findings, chance);
-    }
     let model = asked.model();
+    if let Some(chance) = asked.rivalled {
+        naming::or_all_unlisted(&mut findings, chance, "a term without a name would do as well");
+    } else if !asked.found.names.is_empty()
+        && let Some(chance) = naming::incomplete(lack_of_fit(&asked.base, model))
+    {
+        naming::or_all_unlisted(&mut findings, chance, "it does not explain all that is there");
+    }
     for (place, p_value, trials) in asked.unlisted.iter().flat_map(Unlisted::terms) {
         let test = examine(model, place).map(|(test, _)| test);
         findings.extend(test.and_then(|test| naming::of_sparse(&model.choices[place], &test, p_value, trials)));
@@ -329,7 +350,7 @@ fn continued(
     if !(restored || scatters || told) {
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
-    naming::doubt(&mut findings, asked.found.model.choices.len() >= MOST_EFFECTS);
+    naming::doubt(&mut findings[faults.len()..], asked.found.model.choices.len() >= MOST_EFFECTS);
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);

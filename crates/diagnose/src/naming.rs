@@ -139,10 +139,20 @@ const DOUBTFUL: f64 = 3.0;
 const DOUBTFUL_IF_FULL: f64 = 3.0;
 
 /// Says of effects found that what has no name would do as well, with so much of a chance over theirs.
-pub(crate) fn beside_unlisted(findings: &mut [Finding], chance: f64) {
+pub(crate) fn or_all_unlisted(findings: &mut [Finding], chance: f64, why: &str) {
     for finding in findings.iter_mut().filter(|finding| is_mean(finding)) {
-        or_unlisted(finding, chance, "a term without a name would do as well");
+        or_unlisted(finding, chance, why);
     }
+}
+
+/// Chance at which the names found do not explain all that is there though they do.
+const LACK_OF_FIT: f64 = 0.05;
+
+/// The chance, over that of the names, that they are not what is there, where terms without a name still stand out beside them. A chance p speaks against what it was
+/// computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+pub(crate) fn incomplete(p_value: f64) -> Option<f64> {
+    let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
+    (p_value < LACK_OF_FIT).then(|| (against * UNWRITTEN / (1.0 - UNWRITTEN)).min(1.0))
 }
 
 /// Says of a finding that it may be the doing of something that has no name, with so much of a chance over that of its names.
@@ -158,7 +168,8 @@ fn is_mean(finding: &Finding) -> bool {
     hypothesis(&finding.id).and_then(Hypothesis::into_shapes).is_some() && !finding.parameters.is_empty()
 }
 
-/// Says of names that they may be part of something that has none: where that stands out as well, the more so where as many effects were found as are sought.
+/// Says of names that they may be part of something that has none: where that stands out as well, the more so where as many effects were found as are sought. A scatter
+/// keeps its name first.
 pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
         findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
@@ -166,11 +177,12 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let unlisted = strongest(findings, |finding| finding.id == "unlisted");
     let scatter = strongest(findings, |finding| finding.id == "contact_patch_wheelbase");
     for finding in findings {
-        if !is_mean(finding) {
+        if finding.id == "unlisted" {
             continue;
         }
-        let stands_out = unlisted * if full { DOUBTFUL_IF_FULL } else { 1.0 };
-        if finding.z < stands_out || DOUBTFUL * finding.z < scatter {
+        let is_mean = is_mean(finding);
+        let stands_out = unlisted * if full && is_mean { DOUBTFUL_IF_FULL } else { 1.0 };
+        if is_mean && (finding.z < stands_out || DOUBTFUL * finding.z < scatter) {
             finding.id = "unlisted".to_owned();
             finding.names.retain(|name| name != "unlisted");
             finding.names.insert(0, "unlisted".to_owned());

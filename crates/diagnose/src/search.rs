@@ -9,14 +9,16 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::candidate::{Choice, terms};
+use crate::checks::CHECKS_LEVEL;
 use crate::gain::{LEAST_RUNS, gain};
 use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
 use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
 use crate::shape::fit_shape;
 use crate::statistics::{of_trials, p_of_statistic, p_of_student, student_95};
+use crate::unlisted::UNLISTED_LEVEL;
 
-/// Family-wise rate of false alarms of the scan over the catalogue.
-pub(crate) const SCAN_LEVEL: f64 = 0.02;
+/// Family-wise rate of false alarms of the scan over the catalogue: with the checks' and that of terms without a name, 5 %.
+pub(crate) const SCAN_LEVEL: f64 = 0.05 - CHECKS_LEVEL - UNLISTED_LEVEL;
 /// Most effects that are sought.
 pub(crate) const MOST_EFFECTS: usize = 3;
 /// A candidate that explains less than this share of what the best does, before any refit, is not its rival.

@@ -29,6 +29,12 @@ pub(crate) struct SparseFound<'a> {
     pub(crate) drifts_more: bool,
 }
 
+/// Log of the trials that a sparse term has to pay for.
+#[allow(clippy::cast_precision_loss)] // hundreds
+fn paid(trials: usize) -> f64 {
+    (trials as f64).ln()
+}
+
 /// Sparse terms of one thing at the most: a wheel's phase has a sine and a cosine, and there are two wheels.
 const MOST_SPARSE: usize = 4;
 
@@ -50,6 +56,11 @@ impl<'a> Unlisted<'a> {
             all.tried.push((next.p_value, next.trials));
         }
         all
+    }
+
+    /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
+    pub(crate) fn evidence(&self, alone: &JointFit<'a>) -> f64 {
+        evidence(alone, &self.model) - self.tried.iter().map(|(_, trials)| paid(*trials)).sum::<f64>()
     }
 
     /// The places of its sparse terms among the model's choices, each with its chance and how many were tried.
@@ -159,12 +170,8 @@ impl<'m, 'a> Sought<'m, 'a> {
 
     /// The same if the best stands out by its score.
     fn up_to(level: f64, base: &JointFit<'a>, model: &'m Extended<'a>) -> Option<Self> {
-        let library = library(base);
-        let mut scored: Vec<Scored> =
-            scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
-        scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+        let (scored, p_value) = best_first(base, model)?;
         let trials = scored.len();
-        let p_value = of_trials(scored.first()?.p_value, trials);
         if p_value > level {
             return None;
         }
@@ -208,10 +215,23 @@ impl<'m, 'a> Sought<'m, 'a> {
 
     /// The same under one of them.
     pub(crate) fn evidence_of(&self, model: &Extended<'a>) -> f64 {
-        #[allow(clippy::cast_precision_loss)] // hundreds
-        let paid = (self.trials as f64).ln();
-        evidence(&self.model.fit, model) - paid
+        evidence(&self.model.fit, model) - paid(self.trials)
     }
+}
+
+/// The chance of the best sparse term's score beside a model, where all is explained.
+pub(crate) fn lack_of_fit(base: &JointFit<'_>, model: &Extended<'_>) -> f64 {
+    best_first(base, model).map_or(1.0, |(_, p_value)| p_value)
+}
+
+/// Sparse terms by their scores beside a model, the best first, and the best's chance; `None` where no term can be seen.
+fn best_first(base: &JointFit<'_>, model: &Extended<'_>) -> Option<(Vec<Scored>, f64)> {
+    let library = library(base);
+    let mut scored: Vec<Scored> =
+        scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+    scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    let p_value = of_trials(scored.first()?.p_value, scored.len());
+    Some((scored, p_value))
 }
 
 /// The best sparse term beside a model.
