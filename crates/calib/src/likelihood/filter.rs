@@ -58,12 +58,12 @@ impl Gate {
 
 /// What to carry along in a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Want {
+pub(crate) struct Want<'p> {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
     pub(crate) gate: Gate,
-    /// Terms from this one on are tested one by one: their columns have no products with each other's.
-    pub(crate) apart_from: Option<usize>,
+    /// The last columns come in parts of so many, each tested for itself: columns of two parts have no products with each other.
+    pub(crate) parts: &'p [usize],
 }
 
 /// Score of the cost by the logarithms of the variances, and its information.
@@ -101,7 +101,7 @@ pub(super) struct Filter<'f, 'a> {
     instrument: Instrument,
     noise: &'f Noise,
     terms: &'f mut [Box<dyn ModelTerm>],
-    want: Want,
+    want: Want<'f>,
     /// The chain's frame in that of the run's displacements; the identity for poses.
     run_from_chain: Pose,
     pose: Pose,
@@ -158,7 +158,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         noise: &'f Noise,
         products: &'f Products,
         terms: &'f mut [Box<dyn ModelTerm>],
-        want: Want,
+        want: Want<'f>,
     ) -> Self {
         let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
         // One more for a free heading.

@@ -67,10 +67,10 @@ pub(crate) fn pass(
     noise: &Noise,
     free_headings: &[f64],
     terms: &mut [Box<dyn ModelTerm>],
-    want: Want,
+    want: Want<'_>,
 ) -> Pass {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let products = Products::of(terms, want.apart_from);
+    let products = Products::of(columns, want.parts);
     let mut result = Pass::nothing();
     #[allow(clippy::cast_precision_loss)] // a handful of phases
     let weight = 1.0 / selections.len() as f64;

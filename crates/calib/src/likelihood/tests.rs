@@ -134,19 +134,19 @@ fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
 }
 
 #[test]
-fn terms_apart_have_all_products_but_those_with_each_other() {
+fn parts_have_all_products_but_those_with_each_other() {
     let dataset = dataset(true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
     let model = Model { sizes: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
     let headings = vec![0.0; records.chains.len()];
-    let of = |apart_from| {
+    let of = |parts| {
         let worn = || Box::new(Worn { way_m: 0.0 });
         let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), worn(), worn()];
-        let want = Want { apart_from, ..Want::default() };
+        let want = Want { parts, ..Want::default() };
         super::total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, want).runs).expect("runs")
     };
-    let (all, apart) = (of(None), of(Some(1)));
+    let (all, apart) = (of(&[]), of(&[2, 2]));
     let common = Column::BASE.len() + 2;
     for row in 0..common + 4 {
         for column in 0..common + 4 {
