@@ -38,12 +38,14 @@ pub struct Interval<'r> {
 
 impl Interval<'_> {
     /// Motion of the drive's centre by the counts.
+    #[inline]
     #[must_use]
     pub fn increment(&self) -> Increment {
         Increment::from_travel(self.travel_m, self.wheel_separation_m)
     }
 
     /// Motion of the drive's centre when the wheels' travels change by this much.
+    #[inline]
     #[must_use]
     pub fn change(&self, travel_m: Wheels<f64>) -> Pose {
         let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.wheel_separation_m);
@@ -51,18 +53,21 @@ impl Interval<'_> {
     }
 
     /// Mean speed of each wheel's contact, m/s; zero in an interval of no length.
+    #[inline]
     #[must_use]
     pub fn speed_m_s(&self) -> Wheels<f64> {
         self.travel_m.map(|travel_m| if self.dt_s > 0.0 { travel_m / self.dt_s } else { 0.0 })
     }
 
     /// Mean speed of each wheel's contact in the interval before, m/s.
+    #[inline]
     #[must_use]
     pub fn previous_speed_m_s(&self) -> Wheels<f64> {
         self.previous_m.map(|travel_m| if self.previous_dt_s > 0.0 { travel_m / self.previous_dt_s } else { 0.0 })
     }
 
     /// Time on the session's clock, seconds; that of the run where the run does not say when it began.
+    #[inline]
     #[must_use]
     pub fn session_s(&self) -> f64 {
         self.run.start_s.unwrap_or(0.0) + self.t_s
@@ -99,7 +104,7 @@ pub struct TermParameter {
 /// Runs may go to copies of a term, at the same time.
 pub trait ModelTerm: CopyTerm + Send + Sync {
     /// The parameters in the order of the gradients.
-    fn parameters(&self) -> &'static [TermParameter];
+    fn parameters(&self) -> &[TermParameter];
 
     /// A run begins; nothing stays known of the run before.
     fn restart(&mut self, run: &RunInfo) {

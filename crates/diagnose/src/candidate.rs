@@ -1,7 +1,7 @@
 //! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
 
 use dataset::{ModelTerm, TermParameter};
-use effects::{CATALOGUE, Channel, Hypothesis, Sparse, hypothesis};
+use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
 
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,8 +67,8 @@ impl Choice {
         }
     }
 
-    pub(crate) fn parameters(&self) -> &'static [TermParameter] {
-        self.term().map_or(&[], |term| term.parameters())
+    pub(crate) fn parameters(&self) -> Vec<TermParameter> {
+        self.term().map_or_else(Vec::new, |term| term.parameters().to_vec())
     }
 }
 
@@ -77,30 +77,18 @@ pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
     choices.iter().filter_map(Choice::term).collect()
 }
 
-/// The terms of candidates, in order; those of one product on all channels of the motion or of the wheels, one after the other, come as one.
-pub(crate) fn terms_together(choices: &[&Choice]) -> Vec<Box<dyn ModelTerm>> {
-    let mut terms = Vec::new();
-    let mut left = choices;
-    while let Some((first, rest)) = left.split_first() {
-        let product = match first {
-            Choice::Sparse(sparse) => sparse,
-            Choice::Effect { .. } => {
-                terms.extend(first.term());
-                left = rest;
-                continue;
-            }
-        };
-        let is_on = |(choice, channel): (&&Choice, Channel)| matches!(choice, Choice::Sparse(sparse) if sparse.channel == channel && sparse.covariates == product.covariates);
-        let all_on = |channels: &[Channel; 3]| left.len() >= 3 && left.iter().zip(*channels).all(is_on);
-        if let Some(channels) = [Channel::MOTION, Channel::WHEELS].into_iter().find(all_on) {
-            terms.push(product.term_on(channels));
-            left = &left[channels.len()..];
-        } else {
-            terms.push(product.term());
-            left = rest;
-        }
-    }
-    terms
+/// The terms of candidates, in order; products that follow each other come as one.
+pub(crate) fn terms_together<'c>(choices: impl Iterator<Item = &'c Choice>) -> Vec<Box<dyn ModelTerm>> {
+    let product = |choice: &&Choice| matches!(choice, Choice::Sparse(sparse) if sparse.shares_moments());
+    let choices: Vec<&Choice> = choices.collect();
+    let of_chunk = |chunk: &[&Choice]| {
+        let sparse = chunk.iter().filter_map(|choice| match choice {
+            Choice::Sparse(sparse) => Some(sparse.clone()),
+            Choice::Effect { .. } => None,
+        });
+        if product(&chunk[0]) { Sparse::together(&sparse.collect::<Vec<_>>()) } else { chunk[0].term() }
+    };
+    choices.chunk_by(|a, b| product(a) && product(b)).filter_map(of_chunk).collect()
 }
 
 fn shapes(id: &str) -> Vec<effects::Shape> {

@@ -4,14 +4,14 @@
 //! every channel, beside what the model has: a regression of innovations would be blurred by the filter.
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
-use calib::likelihood::{Chain, Column, Innovation};
+use calib::likelihood::{Chain, Innovation};
 use calib::methods::joint::{JointFit, WHITE_BELOW};
 use effects::{Channel, Covariate, Sparse};
 use kinematics::Side;
 
-use crate::candidate::{Choice, terms, terms_together};
+use crate::candidate::Choice;
 use crate::document::Check;
-use crate::scan::{Projected, Projection, freedom, principal, total};
+use crate::scan::{Projected, ask, freedom, principal};
 use crate::search::Extended;
 use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
 use crate::unlisted::of_cycles;
@@ -57,7 +57,7 @@ pub(crate) struct Outliers {
 struct Question {
     name: String,
     /// In groups, each of which is tested as a whole: the best of them answers, and pays for all.
-    groups: Vec<Vec<Sparse>>,
+    groups: Vec<Vec<Choice>>,
 }
 
 fn questions(fit: &JointFit<'_>) -> Vec<Question> {
@@ -85,17 +85,17 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         let name = format!("covariate_{}", covariate.name());
         questions.push((name, vec![vec![covariate.clone(), Speed], vec![covariate, YawRate]]));
     }
-    let on = |channel, covariates: &[Covariate]| Sparse { channel, covariates: covariates.to_vec() };
+    let on = |channel, covariates: &[Covariate]| Choice::Sparse(Sparse { channel, covariates: covariates.to_vec() });
     let on_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
     let of_motion = questions
         .into_iter()
         .map(|(name, products)| Question { name, groups: vec![products.iter().flat_map(on_motion).collect()] });
     // A row that is longer than usual by its stamps, and not in truth.
-    let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Sparse::of_rows()]] };
+    let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Choice::Sparse(Sparse::of_rows())]] };
     // A cosine and a sine for each number of cycles in a turn.
     let of_cycles = |(side, name): (Side, &str)| Question {
         name: name.to_owned(),
-        groups: of_cycles(side).chunks(2).map(<[Sparse]>::to_vec).collect(),
+        groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Choice::Sparse).collect()).collect(),
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
     of_motion.chain([of_rows]).chain(of_wheels).collect()
@@ -330,36 +330,24 @@ pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
     }
 }
 
-/// Score tests of every question, all in one pass.
+/// Score tests of every question.
 fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     let questions = questions(&model.fit);
-    let groups = questions.iter().flat_map(|question| &question.groups);
-    let library: Vec<Choice> = groups.flatten().cloned().map(Choice::Sparse).collect();
-    let mut all = terms(&model.choices);
-    let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-    all.extend(terms_together(&library.iter().collect::<Vec<_>>()));
-    let pass = model.fit.scan(&mut all);
-    let Some(evidence) = total(&pass.runs) else { return };
-    let Some(projection) = Projection::of(&model.fit, &evidence) else { return };
-    let freedom = freedom(&model.fit, &evidence);
-    let mut at = first;
+    let parts: Vec<&[Choice]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
+    // Statistic and chance of each group that can be seen.
+    let answers = ask(&model.fit, &model.choices, &parts, |own, Projected { information, gradient, .. }, evidence| {
+        let parameters: Vec<_> = own.iter().flat_map(Choice::parameters).collect();
+        let shown = principal(information, gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
+        let (statistic, dimensions) =
+            shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
+        let freedom = freedom(&model.fit, evidence);
+        (dimensions > 0).then(|| (statistic, p_of_score(statistic, dimensions, evidence.count, freedom)))
+    });
+    let mut answers = answers.into_iter();
     for Question { name, groups } in &questions {
-        let mut answers = Vec::new();
-        for group in groups {
-            let columns: Vec<usize> = (at..at + group.len()).collect();
-            let own = &library[at - first..at - first + group.len()];
-            let parameters: Vec<_> = own.iter().map(|choice| choice.parameters()[0]).collect();
-            at += group.len();
-            let Projected { information, gradient, .. } = projection.of_columns(&evidence, &columns);
-            let shown = principal(&information, &gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
-            let (statistic, dimensions) =
-                shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
-            if dimensions > 0 {
-                answers.push((statistic, p_of_score(statistic, dimensions, evidence.count, freedom)));
-            }
-        }
-        if let Some((statistic, p_value)) = answers.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            add(name, *statistic, of_trials(*p_value, answers.len()));
+        let own: Vec<(f64, f64)> = answers.by_ref().take(groups.len()).flatten().collect();
+        if let Some((statistic, p_value)) = own.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+            add(name, *statistic, of_trials(*p_value, own.len()));
         }
     }
 }

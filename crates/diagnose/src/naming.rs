@@ -20,7 +20,7 @@ pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<Stri
         let unit = name.rsplit_once('_').map_or("1", |(_, unit)| unit);
         (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() })
     });
-    let fitted = choice.parameters().iter().zip(sizes).map(|(parameter, (value, sigma))| {
+    let fitted = choice.parameters().into_iter().zip(sizes).map(|(parameter, (value, sigma))| {
         let sigma = Some(*sigma).filter(|sigma| sigma.is_finite());
         (parameter.name.to_owned(), Value { value: *value, sigma, unit: parameter.unit.to_owned() })
     });

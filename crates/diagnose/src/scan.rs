@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(crate) struct Scored {
     pub(crate) choice: Choice,
-    pub(crate) parameters: &'static [TermParameter],
+    pub(crate) parameters: Vec<TermParameter>,
     /// Its projected information.
     pub(crate) information: DMatrix<f64>,
     /// How many directions are tested.
@@ -178,47 +178,68 @@ pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
     (evidence.count - columns).max(1.0)
 }
 
-/// Tests every candidate beside the choices that the fit already has.
-pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
-    // A normal equation grows with the square of the columns: many candidates go in groups.
-    candidates.par_chunks(GROUP).flat_map_iter(|group| scan_group(fit, chosen, group)).collect()
+/// Most columns of a pass over a scan's candidates: a whole number of products on three channels. A normal equation grows with the square of the columns.
+const MOST_COLUMNS: usize = 63;
+
+/// Asks something of parts of a scan, each of candidates that are tested as a whole beside the choices that the fit already has: of its candidates, what the fit leaves of
+/// their columns, and the evidence. Nothing where the fit's own columns are not determined.
+pub(crate) fn ask<T: Send>(
+    fit: &JointFit<'_>,
+    chosen: &[Choice],
+    parts: &[&[Choice]],
+    answer: impl Fn(&[Choice], &Projected, &Evidence) -> T + Sync,
+) -> Vec<T> {
+    let mut passes: Vec<Vec<(usize, &[Choice])>> = Vec::new();
+    let mut columns = 0;
+    for part in parts {
+        let own = part.iter().map(|choice| choice.parameters().len()).sum::<usize>();
+        columns += own;
+        match passes.last_mut() {
+            Some(last) if columns <= MOST_COLUMNS => last.push((own, part)),
+            _ => {
+                passes.push(vec![(own, part)]);
+                columns = own;
+            }
+        }
+    }
+    let of_pass = |parts: &Vec<(usize, &[Choice])>| {
+        let mut all = terms(chosen);
+        let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
+        all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
+        let sizes: Vec<usize> = parts.iter().map(|(own, _)| *own).collect();
+        let Some(evidence) = total(&fit.scan_parts(&mut all, &sizes)) else { return Vec::new() };
+        let Some(projection) = Projection::of(fit, &evidence) else { return Vec::new() };
+        let of_part = |(own, part): &(usize, &[Choice])| {
+            let columns: Vec<usize> = (at..at + own).collect();
+            at += own;
+            answer(part, &projection.of_columns(&evidence, &columns), &evidence)
+        };
+        parts.iter().map(of_part).collect::<Vec<T>>()
+    };
+    passes.par_iter().flat_map_iter(of_pass).collect()
 }
 
-/// A whole number of products on three channels.
-const GROUP: usize = 42;
-
-fn scan_group(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
-    let mut all = terms(chosen);
-    let first: usize = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let apart_from = all.len();
-    all.extend(terms_together(&candidates.iter().collect::<Vec<_>>()));
-    let Some(evidence) = total(&fit.scan_apart(&mut all, apart_from)) else { return Vec::new() };
-    let Some(projection) = Projection::of(fit, &evidence) else { return Vec::new() };
-    let freedom = freedom(fit, &evidence);
-    // Noise is estimated by likelihood, without its degrees of freedom.
-    let shrink = freedom / evidence.count.max(1.0);
-    let mut at = first;
-    candidates
-        .iter()
-        .map(|choice| {
-            let parameters = choice.parameters();
-            let columns: Vec<usize> = (at..at + parameters.len()).collect();
-            at += parameters.len();
-            let Projected { information, gradient, share } = projection.of_columns(&evidence, &columns);
-            let shown = share.iter().any(|share| *share > ROUNDING);
-            let mut directions = Vec::new();
-            if shown {
-                directions = principal(&information, &gradient, parameters);
-                directions.retain(|(value, _)| *value >= LEAST_SHOWN * LEAST_SHOWN);
-            }
-            let dimensions = directions.len();
-            let explained: Vec<(f64, f64)> =
-                directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
-            let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
-            let log_odds = 0.5 * statistic + log_weight(&explained);
-            let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
-            let choice = choice.clone();
-            Scored { choice, parameters, information, dimensions, statistic, p_value, log_odds }
-        })
-        .collect()
+/// Tests every candidate beside the choices that the fit already has.
+pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
+    let each: Vec<&[Choice]> = candidates.chunks(1).collect();
+    ask(fit, chosen, &each, |own, Projected { information, gradient, share }, evidence| {
+        let freedom = freedom(fit, evidence);
+        // Noise is estimated by likelihood, without its degrees of freedom.
+        let shrink = freedom / evidence.count.max(1.0);
+        let choice = own[0].clone();
+        let parameters = choice.parameters();
+        let shown = share.iter().any(|share| *share > ROUNDING);
+        let mut directions = Vec::new();
+        if shown {
+            directions = principal(information, gradient, &parameters);
+            directions.retain(|(value, _)| *value >= LEAST_SHOWN * LEAST_SHOWN);
+        }
+        let dimensions = directions.len();
+        let explained: Vec<(f64, f64)> =
+            directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
+        let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
+        let log_odds = 0.5 * statistic + log_weight(&explained);
+        let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
+        Scored { choice, parameters, information: information.clone(), dimensions, statistic, p_value, log_odds }
+    })
 }

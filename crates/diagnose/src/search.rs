@@ -63,7 +63,8 @@ fn is_physical(extended: &Extended<'_>, place: usize) -> bool {
     let Choice::Effect { id, .. } = &extended.choices[place] else { return true };
     let Some((test, _)) = examine(extended, place) else { return false };
     let choice = &extended.choices[place];
-    let fitted = choice.parameters().iter().zip(&test.sizes);
+    let parameters = choice.parameters();
+    let fitted = parameters.iter().zip(&test.sizes);
     let sizes: Vec<(&str, f64)> = fitted
         .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
         .chain(choice.held())
@@ -280,7 +281,7 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     let projected = Projection::beside(&extended.fit, &evidence, &own)?.of_columns(&evidence, &own);
     let sizes = extended.sizes(choice);
     let gradient = &projected.information * &sizes;
-    let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, parameters)
+    let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
         .into_iter()
         .filter(|(value, _)| *value >= 1.0)
         .map(|(value, gradient)| (value, gradient / value))

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::{Side, Wheels, sinc};
+use kinematics::{Side, Wheels, sin_cos, sinc};
 use serde::{Deserialize, Serialize};
 
 /// Which increment a term adds to.
@@ -281,8 +281,8 @@ impl Covariate {
             Self::RowLength => 0.0,
             Self::CosHeading => at.heading_rad.cos(),
             Self::SinHeading => at.heading_rad.sin(),
-            Self::CosPhase(side, cycles) => at.of_cycle(*side, *cycles, f64::cos),
-            Self::SinPhase(side, cycles) => at.of_cycle(*side, *cycles, f64::sin),
+            Self::CosPhase(side, cycles) => at.of_cycle(*side, *cycles).1,
+            Self::SinPhase(side, cycles) => at.of_cycle(*side, *cycles).0,
             Self::RunTime => at.run_s / 60.0,
             Self::SessionTime => at.session_s / 600.0,
             Self::Way => at.session_m / 100.0,
@@ -321,10 +321,12 @@ pub(crate) struct Moment<'r> {
 }
 
 impl Moment<'_> {
-    /// A wheel's speed times the mean over the interval of a sine or cosine that comes back so many times a turn.
-    fn of_cycle(&self, side: Side, cycles: u8, of: fn(f64) -> f64) -> f64 {
+    /// A wheel's speed times the mean over the interval of a sine, and of a cosine, that comes back so many times a turn.
+    pub(crate) fn of_cycle(&self, side: Side, cycles: u8) -> (f64, f64) {
         let cycles = f64::from(cycles);
-        self.wheel_m_s[side] * of(cycles * self.wheel_rad[side]) * sinc(0.5 * cycles * self.turned_rad[side])
+        let (sin, cos) = sin_cos(cycles * self.wheel_rad[side]);
+        let (speed_m_s, mean) = (self.wheel_m_s[side], sinc(0.5 * cycles * self.turned_rad[side]));
+        (speed_m_s * sin * mean, speed_m_s * cos * mean)
     }
 
     /// The same for what a wheel does itself.

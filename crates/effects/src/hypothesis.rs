@@ -107,6 +107,7 @@ impl LastAngle {
     pub(crate) const NONE: Self = Self { rad: 0.0, sin_cos: (0.0, 1.0) };
 
     /// Those of this angle, which is the last one from now on.
+    #[inline]
     pub(crate) fn sin_cos(&mut self, rad: f64) -> (f64, f64) {
         if rad != self.rad {
             *self = Self { rad, sin_cos: sin_cos(rad) };

@@ -19,6 +19,9 @@ use crate::covariate::{Channel, Covariate, Moment, Reversals};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
+use together::Together;
+
+mod together;
 
 /// `kind` of a [`SparseTerm`] in a scenario.
 pub(crate) const TERM: &str = "term";
@@ -57,10 +60,16 @@ impl Sparse {
         Box::new(Recorded::new(self))
     }
 
-    /// The terms of the same product on three channels of the motion or of the wheels in turn, as one: the moment is found once for all.
+    /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of [`Self::shares_moments`].
     #[must_use]
-    pub fn term_on(&self, channels: [Channel; 3]) -> Box<dyn ModelTerm> {
-        Box::new(OnThree { recorded: Recorded::new(self), channels })
+    pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
+        all.iter().all(Self::shares_moments).then(|| Box::new(Together::new(all)) as Box<dyn ModelTerm>)
+    }
+
+    /// Whether it goes with what is found once for all products of an interval: those do that add to the motion or to the wheels' way, but for what goes with rows.
+    #[must_use]
+    pub fn shares_moments(&self) -> bool {
+        !self.channel.is_seen() && !self.is_of_rows()
     }
 
     /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.
@@ -350,6 +359,12 @@ fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> 
 #[derive(Clone)]
 struct Recorded {
     of: Sparse,
+    past: Past,
+}
+
+/// What moments need to know of the intervals before.
+#[derive(Debug, Clone, Copy)]
+struct Past {
     reversals: Reversals,
     row: Option<Row>,
 }
@@ -374,10 +389,8 @@ const fn parameter(channel: Channel) -> TermParameter {
     TermParameter { name: "coefficient", unit, plausible: 0.02 }
 }
 
-impl Recorded {
-    fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), reversals: Reversals::NONE, row: None }
-    }
+impl Past {
+    const NONE: Self = Self { reversals: Reversals::NONE, row: None };
 
     /// The middle of an interval that takes time.
     fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
@@ -419,13 +432,11 @@ impl Recorded {
             of_run: &interval.run.covariates,
         }
     }
+}
 
-    /// What an interval's motion gains on a channel.
-    fn gained(&self, channel: Channel, at: &Moment<'_>, interval: &Interval<'_>) -> Pose {
-        if channel.is_of_wheels() {
-            return interval.change(self.of.of_wheels(channel, at).map(|product| product * interval.dt_s));
-        }
-        on_channel(channel, self.of.product(at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
+impl Recorded {
+    fn new(of: &Sparse) -> Self {
+        Self { of: of.clone(), past: Past::NONE }
     }
 }
 
@@ -443,13 +454,17 @@ impl ModelTerm for Recorded {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        *self = Self::new(&self.of);
+        self.past = Past::NONE;
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
-            let at = self.moment(interval);
-            gradient[0] = self.gained(self.of.channel, &at, interval);
+            let at = self.past.moment(interval);
+            gradient[0] = if self.of.channel.is_of_wheels() {
+                interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
+            } else {
+                on_channel(self.of.channel, self.of.product(&at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
+            };
         }
     }
 
@@ -483,35 +498,6 @@ impl ModelTerm for OfRows {
         self.0.motion(interval, gradient);
         let Pose { x_m, y_m, theta_rad } = gradient[0];
         gradient[0] = Pose::new(x_m / ROW_SHARE, y_m / ROW_SHARE, theta_rad / ROW_SHARE);
-    }
-}
-
-/// One product on three channels of the motion.
-#[derive(Clone)]
-struct OnThree {
-    recorded: Recorded,
-    channels: [Channel; 3],
-}
-
-impl ModelTerm for OnThree {
-    fn parameters(&self) -> &'static [TermParameter] {
-        const MOTION: [TermParameter; 3] =
-            [parameter(Channel::Along), parameter(Channel::Across), parameter(Channel::Yaw)];
-        const WHEELS: [TermParameter; 3] = [parameter(Channel::Wheels); 3];
-        if self.channels == Channel::WHEELS { &WHEELS } else { &MOTION }
-    }
-
-    fn restart(&mut self, run: &RunInfo) {
-        self.recorded.restart(run);
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s > 0.0 {
-            let at = self.recorded.moment(interval);
-            for (gradient, channel) in gradient.iter_mut().zip(self.channels) {
-                *gradient = self.recorded.gained(channel, &at, interval);
-            }
-        }
     }
 }
 

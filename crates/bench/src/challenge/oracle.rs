@@ -27,7 +27,7 @@ const IN_ERROR: f64 = 3.0;
 struct Candidate {
     id: &'static str,
     held: Vec<(&'static str, f64)>,
-    parameters: &'static [TermParameter],
+    parameters: Vec<TermParameter>,
     columns: std::ops::Range<usize>,
 }
 
@@ -144,7 +144,7 @@ impl Shown {
         for id in CATALOGUE {
             let Some(shapes) = hypothesis(id).and_then(Hypothesis::into_shapes) else { continue };
             for shape in shapes {
-                let parameters = shape.term.parameters();
+                let parameters = shape.term.parameters().to_vec();
                 let columns = at..at + parameters.len();
                 at = columns.end;
                 candidates.push(Candidate { id, held: shape.held, parameters, columns });

@@ -3,10 +3,8 @@
 //! Scalar updates, one component of a look after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
 //! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
-use dataset::{Interval, Look, ModelTerm};
-use kinematics::{
-    Frame, Increment, InstructionSet, Kernel, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative, wrap_to_pi,
-};
+use dataset::ModelTerm;
+use kinematics::{Increment, InstructionSet, Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::apart::Instrument;
@@ -17,6 +15,10 @@ use super::noise::{Noise, NoiseComponent};
 use super::normal::{Products, Sums};
 use super::records::{Chain, Piece, Start};
 use super::thinning::Leg;
+use motion::Moved;
+pub(crate) use motion::{Kept, KeptLegs, Legs};
+
+mod motion;
 
 /// A look whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
 pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
@@ -57,13 +59,17 @@ impl Gate {
 }
 
 /// What to carry along in a pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Want {
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Want<'p> {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
     pub(crate) gate: Gate,
-    /// Terms from this one on are tested one by one: their columns have no products with each other's.
-    pub(crate) apart_from: Option<usize>,
+    /// Legs are kept, for passes at models near this one.
+    pub(crate) keep: bool,
+    /// Legs are taken as they were kept by a pass at another model.
+    pub(crate) by: Option<&'p Kept>,
+    /// The last columns come in parts of so many, each tested for itself: columns of two parts have no products with each other.
+    pub(crate) parts: &'p [usize],
 }
 
 /// Score of the cost by the logarithms of the variances, and its information.
@@ -101,7 +107,7 @@ pub(super) struct Filter<'f, 'a> {
     instrument: Instrument,
     noise: &'f Noise,
     terms: &'f mut [Box<dyn ModelTerm>],
-    want: Want,
+    want: Want<'f>,
     /// The chain's frame in that of the run's displacements; the identity for poses.
     run_from_chain: Pose,
     pose: Pose,
@@ -116,6 +122,8 @@ pub(super) struct Filter<'f, 'a> {
     previous: Option<Piece>,
     goes_on: bool,
     gradients: Vec<Pose>,
+    /// Where legs come from.
+    pub(super) legs: Legs<'f>,
     /// Derivatives of the leg in force by the terms' parameters, and of the look's by the same.
     leg_by_terms: Derivatives,
     sights: Derivatives,
@@ -144,12 +152,6 @@ impl Kernel for Run<'_, '_, '_> {
     }
 }
 
-/// A leg's motion in the frame of the body at its start, and what it depends on.
-struct Moved {
-    motion: Pose,
-    by_lengths: [Vector3<f64>; 3],
-}
-
 impl<'f, 'a> Filter<'f, 'a> {
     pub(super) fn new(
         chain: &'f Chain<'a>,
@@ -158,7 +160,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         noise: &'f Noise,
         products: &'f Products,
         terms: &'f mut [Box<dyn ModelTerm>],
-        want: Want,
+        want: Want<'f>,
     ) -> Self {
         let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
         // One more for a free heading.
@@ -182,6 +184,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             previous: None,
             goes_on: false,
             gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
+            legs: Legs::Driven,
             leg_by_terms: Derivatives::zeros(columns - Column::BASE.len()),
             sights: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
@@ -220,22 +223,22 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
         let Some(first) = legs.first() else {
             let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
-            self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), start_s);
+            self.start(Pose::IDENTITY, (0.0, 0.0), self.chain.pieces.first().copied(), (0, start_s));
             let pieces = 0..self.chain.pieces.len();
-            self.predict(&Leg { pieces, from: 0, look: 0, noise: Covariances::ZERO });
+            self.predict(0, &Leg { pieces, from: 0, look: 0, noise: Covariances::ZERO });
             return;
         };
         match self.chain.start {
-            Start::Seen => self.start_at(first.from, first.pieces.start, free_heading_rad),
+            Start::Seen => self.start_at((0, first.from), first.pieces.start, free_heading_rad),
             Start::Origin => {
                 let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
-                self.start(Pose::IDENTITY, 0.0, 0.0, self.chain.pieces.first().copied(), start_s);
+                self.start(Pose::IDENTITY, (0.0, 0.0), self.chain.pieces.first().copied(), (0, start_s));
             }
         }
         let mut lost = 0;
-        for leg in legs {
-            self.predict(leg);
-            if self.update(leg) {
+        for (number, leg) in legs.iter().enumerate() {
+            self.predict(number, leg);
+            if self.update(number, leg) {
                 lost = 0;
                 continue;
             }
@@ -243,21 +246,21 @@ impl<'f, 'a> Filter<'f, 'a> {
             lost += 1;
             // Without a heading the filter cannot start in the middle of a chain.
             if lost >= LOST_AFTER && self.chain.looks[leg.look].theta_rad.is_some() && self.chain.start == Start::Seen {
-                self.start_at(leg.look, leg.pieces.end, self.pose.theta_rad);
+                self.start_at((number + 1, leg.look), leg.pieces.end, self.pose.theta_rad);
                 lost = 0;
             }
         }
     }
 
-    /// Stands where a look saw the robot.
+    /// Stands where a look saw the robot, after so many legs.
     #[inline(always)]
-    fn start_at(&mut self, look: usize, next_piece: usize, free_heading_rad: f64) {
+    fn start_at(&mut self, (legs, look): (usize, usize), next_piece: usize, free_heading_rad: f64) {
         let seen = self.chain.looks[look];
         let [_, _, xy, theta] = self.noise.variance;
         let pose = Pose::new(seen.x_m, seen.y_m, seen.theta_rad.unwrap_or(free_heading_rad));
         let free = seen.theta_rad.is_none();
         let piece = self.chain.pieces.get(next_piece).or(self.chain.pieces.last()).copied();
-        self.start(pose, xy, if free { 0.0 } else { theta }, piece, seen.t_s);
+        self.start(pose, (xy, if free { 0.0 } else { theta }), piece, (legs, seen.t_s));
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
@@ -267,7 +270,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     #[inline(always)]
-    fn start(&mut self, seen: Pose, var_xy: f64, var_theta: f64, next: Option<Piece>, t_s: f64) {
+    fn start(&mut self, seen: Pose, (var_xy, var_theta): (f64, f64), next: Option<Piece>, (legs, t_s): (usize, f64)) {
         let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.twist(&piece));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
@@ -285,7 +288,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.by.set(Column::MountY.index(), Vector3::new(sin, -cos, 0.0));
         self.by.set(Column::MountTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
         self.by.set(Column::Latency.index(), moved);
-        self.sight(t_s, twist);
+        self.sight(legs, t_s, twist);
         for (number, size) in self.model.sizes.iter().enumerate() {
             let sight = self.sights.get(number);
             self.by.set(Column::Term(number).index(), -sight);
@@ -311,20 +314,19 @@ impl<'f, 'a> Filter<'f, 'a> {
         Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
     }
 
-    /// Finds what the terms add to a look at the pose in force, in the room, for each parameter.
+    /// Finds what the terms add to the look after so many legs at the pose in force, in the room, for each parameter.
     #[inline(always)]
-    fn sight(&mut self, t_s: f64, twist: Twist) {
+    fn sight(&mut self, legs: usize, t_s: f64, twist: Twist) {
         if self.gradients.is_empty() {
             return;
         }
-        let world_from_body = self.run_from_chain * self.pose;
-        let look = Look { t_s, world_from_body, twist, run: self.chain.info };
-        self.gradients.fill(Pose::IDENTITY);
-        let mut rest = &mut self.gradients[..];
-        for term in self.terms.iter_mut() {
-            let (own, others) = rest.split_at_mut(term.parameters().len());
-            term.sight(&look, own);
-            rest = others;
+        if let Legs::Known(kept, _) = self.legs {
+            self.gradients.copy_from_slice(kept.sight(legs));
+        } else {
+            self.sight_of_terms(t_s, twist);
+        }
+        if let Legs::Kept(kept) = &mut self.legs {
+            kept.keep_sight(legs, &self.gradients);
         }
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let sights = self.sights.x.iter_mut().zip(&mut self.sights.y).zip(&mut self.sights.theta);
@@ -335,95 +337,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
-    /// The motion of a leg by the counts and the terms.
     #[inline(always)]
-    fn motion(&mut self, leg: &Leg) -> Moved {
-        let Model { m_per_rad, separation_m, .. } = *self.model;
-        let mut moved = Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3] };
-        self.leg_by_terms.clear();
-        let run_from_start = Frame::from(self.run_from_chain * self.pose);
-        for piece in &self.chain.pieces[leg.pieces.clone()] {
-            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-            let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
-            let before = moved.motion;
-            let half_rad = 0.5 * turn_rad;
-            let (sin, cos) = sin_cos(before.theta_rad + half_rad);
-            let chord = sinc(half_rad);
-            // In the frame of the step's middle; a turn acts on half of the way.
-            let middle = |g: &Pose, by_turn: &Vector3<f64>| {
-                Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
-            };
-            let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
-            let bend = sinc_derivative(half_rad);
-            let by_turn = Vector3::new(
-                0.5 * distance_m * (bend * cos - chord * sin),
-                0.5 * distance_m * (bend * sin + chord * cos),
-                1.0,
-            );
-            let along = Vector3::new(chord * cos, chord * sin, 0.0);
-            let per_m = 1.0 / separation_m;
-            let steps = [
-                along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m),
-                along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m),
-                -by_turn * turn_rad,
-            ];
-            if !self.gradients.is_empty() {
-                self.term_gradients(piece, travel_m, run_from_start * before);
-                for (gradient, size) in self.gradients.iter().zip(&self.model.sizes).filter(|(_, size)| **size != 0.0) {
-                    step += *size * middle(gradient, &by_turn);
-                }
-            }
-            for (by, of_step) in moved.by_lengths.iter_mut().zip(steps) {
-                *by = turned(*by, step) + of_step;
-            }
-            moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
-            // As if the rest of the leg led back to its start: one turn at the end of the leg then does for those of all pieces.
-            let by_turn = by_turn + Vector3::new(moved.motion.y_m, -moved.motion.x_m, 0.0);
-            let legs = self.leg_by_terms.x.iter_mut().zip(&mut self.leg_by_terms.y).zip(&mut self.leg_by_terms.theta);
-            for (((x, y), theta), gradient) in legs.zip(&self.gradients) {
-                *x += cos * gradient.x_m - sin * gradient.y_m + by_turn.x * gradient.theta_rad;
-                *y += sin * gradient.x_m + cos * gradient.y_m + by_turn.y * gradient.theta_rad;
-                *theta += gradient.theta_rad;
-            }
-            self.session_m += distance_m.abs();
-            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
-            self.previous = Some(*piece);
-        }
-        let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
-        self.leg_by_terms.turn(end);
-        moved
-    }
-
-    #[inline(always)]
-    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, world_from_body: Pose) {
-        let m_per_rad = self.model.m_per_rad;
-        let previous = self.previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
-        let interval = Interval {
-            t_s: piece.t_s,
-            dt_s: piece.dt_s,
-            row_s: piece.row_s,
-            travel_m,
-            previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
-            previous_dt_s: previous.dt_s,
-            wheel_separation_m: self.model.separation_m,
-            wheel_rad: self.wheel_rad,
-            turned_rad: piece.wheel_rad,
-            world_from_body,
-            session_m: self.session_m,
-            run: self.chain.info,
-        };
-        self.gradients.fill(Pose::IDENTITY);
-        let mut rest = &mut self.gradients[..];
-        for term in self.terms.iter_mut() {
-            let (own, others) = rest.split_at_mut(term.parameters().len());
-            term.motion(&interval, own);
-            rest = others;
-        }
-    }
-
-    #[inline(always)]
-    fn predict(&mut self, leg: &Leg) {
-        let Moved { motion, by_lengths } = self.motion(leg);
+    fn predict(&mut self, number: usize, leg: &Leg) {
+        let Moved { motion, by_lengths } = self.moved(number, leg);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
@@ -454,11 +370,11 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     /// Takes a look; false, and nothing changes, when it lies too far off.
     #[inline(always)]
-    fn update(&mut self, leg: &Leg) -> bool {
+    fn update(&mut self, number: usize, leg: &Leg) -> bool {
         let seen = self.chain.looks[leg.look];
         let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
         let twist = self.twist(&piece);
-        self.sight(seen.t_s, twist);
+        self.sight(number + 1, seen.t_s, twist);
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
@@ -575,10 +491,4 @@ struct Update {
     /// Innovation, the components before it taken into account, and its variance.
     v: f64,
     s: f64,
-}
-
-/// A derivative carried over a step: a heading that is off turns what comes after.
-#[inline(always)]
-fn turned(by: Vector3<f64>, step: Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(by.x - step.y * by.z, by.y + step.x * by.z, by.z)
 }

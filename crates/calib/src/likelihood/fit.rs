@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::acceleration::{Acceleration, Size};
 use super::evidence::{Information, total};
-use super::filter::{Gate, Want};
+use super::filter::{Gate, Kept, Want};
 use super::model::{Column, Model};
 use super::noise::{LEAST_SIGMA, Noise, NoisePrior};
 use super::pass::{FreeHeading, Pass, pass};
@@ -19,6 +19,10 @@ const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 const SETTLED: f64 = 1e-8;
 pub(crate) const NOISE_SETTLED: f64 = 1e-4;
 const LARGEST_NOISE_STEP: f64 = 1.5;
+/// After a step of less than a standard deviation, legs need not be driven again for the next: they follow it to first order.
+const NEAR: f64 = 1.0;
+/// Where steps by kept legs have settled, one by driven legs that is this small, squared and over its variance, is the last: the next would be less by orders.
+const CONFIRMED: f64 = 1e-4;
 /// Steps before outliers are told: at least, and at most.
 const LEAST_STARTS: usize = 3;
 const MOST_STARTS: usize = 20;
@@ -175,8 +179,11 @@ pub(crate) fn fit_from(
     let want = Want { noise_score: !options.noise_held, gate: Gate::of(options.every_look), ..Want::default() };
     let (mut converged, mut strayed, mut first) = (false, false, None);
     let (mut pace, mut acceleration) = (Pace::default(), Acceleration::default());
+    let keep = Selection::has_long_legs(selections);
+    let (mut kept, mut confirms): (Option<Kept>, bool) = (None, false);
     for _ in 0..options.max_steps {
-        let found = pass(records, selections, &model, &noise, &headings, terms, want);
+        let by_kept = Want { keep: keep && kept.is_none(), by: kept.as_ref(), ..want };
+        let mut found = pass(records, selections, &model, &noise, &headings, terms, by_kept);
         let mean = MeanStep::of(&found, options, &basis)?;
         let of_noise = if options.noise_held { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
         let columns = options.columns.len();
@@ -194,12 +201,18 @@ pub(crate) fn fit_from(
         };
         let moved = mean.squared + own;
         strayed |= moved > FAR.max(*first.get_or_insert(moved));
-        if moved < SETTLED && of_noise.by.amax() < options.noise_settled {
-            converged = true;
+        // By kept legs steps only seem to settle: driven ones have the last word.
+        let settled = if confirms { CONFIRMED } else { SETTLED };
+        confirms = moved < settled && of_noise.by.amax() < options.noise_settled;
+        if confirms && kept.is_none() {
+            (converged, kept) = (true, found.kept.take());
             break;
         }
+        kept = if confirms { None } else { kept.or(found.kept.take()).filter(|_| moved < NEAR) };
     }
-    let want = Want { innovations: true, gate: Gate::of(options.every_look), ..Want::default() };
+    // The last step was so small that legs follow it as if they were driven.
+    let by = kept.as_ref().filter(|_| converged);
+    let want = Want { innovations: true, gate: Gate::of(options.every_look), by, ..Want::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, want);
     Ok(Fit { model, noise, free_headings: headings, pass, converged, strayed })
 }

@@ -1,10 +1,8 @@
 //! The sums of a chain's innovations, and the elimination of a start heading that nobody saw.
 
-use dataset::ModelTerm;
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
-use super::model::Column;
 
 /// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
 /// each other.
@@ -12,18 +10,17 @@ use super::model::Column;
 pub(crate) struct Products {
     /// So many columns come first, which have products with all.
     common: usize,
-    /// For each further column, the first of those of its term: it has products with these.
+    /// For each further column, the first of those of its part: it has products with these.
     first: Vec<usize>,
 }
 
 impl Products {
-    /// Those of all columns with each other; where terms stand apart from one on, of its columns and those of the ones after with the others' and their own.
-    pub(crate) fn of(terms: &[Box<dyn ModelTerm>], apart_from: Option<usize>) -> Self {
-        let (own, apart) = terms.split_at(apart_from.unwrap_or(terms.len()).min(terms.len()));
-        let common = Column::BASE.len() + own.iter().map(|term| term.parameters().len()).sum::<usize>();
+    /// Of so many columns, the last of which come in parts: those of a part have products with what comes before all parts, and with each other.
+    pub(crate) fn of(columns: usize, parts: &[usize]) -> Self {
+        let common = columns - parts.iter().sum::<usize>();
         let mut first = Vec::new();
-        for term in apart {
-            first.extend(std::iter::repeat_n(common + first.len(), term.parameters().len()));
+        for part in parts {
+            first.extend(std::iter::repeat_n(common + first.len(), *part));
         }
         Self { common, first }
     }
@@ -38,7 +35,7 @@ pub(crate) struct Sums<'p> {
     columns: usize,
     /// Products with all columns: a row for each that comes first, and one for the heading.
     common: Vec<f64>,
-    /// Products of each further column with those of its term up to itself.
+    /// Products of each further column with those of its part up to itself.
     own: Vec<f64>,
     gradient: Vec<f64>,
     chi_square: f64,
@@ -89,8 +86,13 @@ impl<'p> Sums<'p> {
             let column = self.products.common + further;
             let (out, rest) = own.split_at_mut(column + 1 - first);
             let scaled = j[column] * per_s;
-            for (out, b) in out.iter_mut().zip(&j[first..]) {
-                *out += scaled * b;
+            if let [out] = out {
+                // Most parts are of one column: no loop.
+                *out += scaled * j[column];
+            } else {
+                for (out, b) in out.iter_mut().zip(&j[first..]) {
+                    *out += scaled * b;
+                }
             }
             own = rest;
         }

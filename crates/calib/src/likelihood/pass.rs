@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::apart::Follow;
 use super::evidence::Evidence;
-use super::filter::{Filter, Innovation, NoiseScore, Trail, Want};
+use super::filter::{Filter, Innovation, Kept, KeptLegs, Legs, NoiseScore, Trail, Want};
 use super::model::{Column, Model};
 use super::noise::Noise;
 use super::normal::Products;
 use super::records::{Chain, Records, Start};
 use super::thinning::{Leg, Selection};
 
-/// From so many legs on, which take a millisecond, runs are filtered on all cores; without terms, all chains.
+/// From so many pieces of legs on, or kept legs, which take a millisecond, runs are filtered on all cores; without terms, all chains.
 pub(super) const LEGS_AT_ONCE: usize = 4096;
 
 /// The result of a pass.
@@ -32,6 +32,8 @@ pub struct Pass {
     pub(crate) headings: Vec<FreeHeading>,
     /// How the instruments that groups have for themselves follow one.
     pub(crate) own: Vec<Follow>,
+    /// The legs, where they are to be kept.
+    pub(crate) kept: Option<Kept>,
 }
 
 /// How the free start heading of a chain follows a step of the parameters.
@@ -55,6 +57,7 @@ impl Pass {
             noise: NoiseScore::zero(),
             headings: Vec::new(),
             own: Vec::new(),
+            kept: None,
         }
     }
 }
@@ -67,27 +70,35 @@ pub(crate) fn pass(
     noise: &Noise,
     free_headings: &[f64],
     terms: &mut [Box<dyn ModelTerm>],
-    want: Want,
+    want: Want<'_>,
 ) -> Pass {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let products = Products::of(terms, want.apart_from);
+    let products = Products::of(columns, want.parts);
     let mut result = Pass::nothing();
     #[allow(clippy::cast_precision_loss)] // a handful of phases
     let weight = 1.0 / selections.len() as f64;
     let runs = runs(&records.chains);
     result.runs = runs.iter().map(|chains| Evidence::new(records.chains[chains.start].run, columns)).collect();
-    let of_chain = |number: usize, legs: &[Leg], terms: &mut [Box<dyn ModelTerm>], trail: &mut Option<Trail>| {
-        let chain = &records.chains[number];
-        let mut filter = Filter::new(chain, number, model, noise, &products, terms, want);
-        if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
-            filter.go_on(trail);
-        }
-        filter.run(legs, free_headings[number]);
-        *trail = Some(filter.trail());
-        let Filter { sums, outliers, innovations, noise_score, .. } = filter;
-        let (evidence, heading) = sums.eliminated(chain.run, columns);
-        (evidence, OfChain { number, heading, innovations, outliers, noise_score })
-    };
+    let known = want.by.map(|kept| (kept, kept.change_to(model)));
+    let of_chain =
+        |(phase, number): (usize, usize), legs: &[Leg], terms: &mut [Box<dyn ModelTerm>], trail: &mut Option<Trail>| {
+            let chain = &records.chains[number];
+            let mut filter = Filter::new(chain, number, model, noise, &products, terms, want);
+            if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
+                filter.go_on(trail);
+            }
+            if let Some((kept, change)) = &known {
+                filter.legs = kept.known(phase, number, change);
+            } else if want.keep {
+                filter.legs = Legs::kept(legs.len(), columns - Column::BASE.len());
+            }
+            filter.run(legs, free_headings[number]);
+            *trail = Some(filter.trail());
+            let Filter { sums, outliers, innovations, noise_score, legs, .. } = filter;
+            let (evidence, heading) = sums.eliminated(chain.run, columns);
+            (evidence, OfChain { number, heading, innovations, outliers, noise_score, kept: legs.into_kept() })
+        };
+    let mut phases = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {
         let legs = &selection.legs;
         let of_run = |chains: &Range<usize>, evidence: &mut Evidence, terms: &mut [Box<dyn ModelTerm>]| {
@@ -96,10 +107,11 @@ pub(crate) fn pass(
             for number in chains.clone() {
                 let unseen = legs[number].is_empty();
                 // Terms remember what was driven on the way to the next displacement, seen or not.
-                if unseen && (terms.is_empty() || records.chains[number].start == Start::Seen) {
+                let remember = !terms.is_empty() && want.by.is_none();
+                if unseen && (!remember || records.chains[number].start == Start::Seen) {
                     continue;
                 }
-                let (own, of_chain) = of_chain(number, &legs[number], terms, &mut trail);
+                let (own, of_chain) = of_chain((phase, number), &legs[number], terms, &mut trail);
                 if !unseen {
                     evidence.add(&own, weight);
                     found.push(of_chain);
@@ -108,10 +120,12 @@ pub(crate) fn pass(
             found
         };
         // Sums are taken in the order of the chains whichever way they go.
-        let at_once = legs.iter().map(Vec::len).sum::<usize>() >= LEGS_AT_ONCE;
+        let work = |leg: &Leg| if want.by.is_some() { 1 } else { leg.pieces.len().max(1) };
+        let at_once = legs.iter().flatten().map(work).sum::<usize>() >= LEGS_AT_ONCE;
         let found: Vec<Vec<OfChain>> = if at_once && terms.is_empty() {
-            let of =
-                |number: usize| (!legs[number].is_empty()).then(|| of_chain(number, &legs[number], &mut [], &mut None));
+            let of = |number: usize| {
+                (!legs[number].is_empty()).then(|| of_chain((phase, number), &legs[number], &mut [], &mut None))
+            };
             let mut ready: Vec<_> = (0..legs.len()).into_par_iter().map(of).collect();
             let in_run = |(chains, evidence): (&Range<usize>, &mut Evidence)| {
                 let ready = ready[chains.clone()].iter_mut().filter_map(Option::take);
@@ -129,7 +143,11 @@ pub(crate) fn pass(
         };
         let known = found.iter().flatten().map(|of| of.innovations.len()).sum();
         let mut innovations = Vec::with_capacity(known);
+        let mut kept = vec![None; if want.keep { legs.len() } else { 0 }];
         for of in found.into_iter().flatten() {
+            if want.keep {
+                kept[of.number] = of.kept;
+            }
             innovations.extend(of.innovations);
             if phase == 0 {
                 result.outliers.extend(of.outliers.into_iter().map(|look| (of.number, look)));
@@ -140,10 +158,12 @@ pub(crate) fn pass(
             }
             result.noise.add(&of.noise_score, weight);
         }
+        phases.push(kept);
         if want.innovations {
             result.innovations.push(innovations);
         }
     }
+    result.kept = want.keep.then(|| Kept { model: model.clone(), phases });
     if let Some(own) = &model.own {
         result.own = own.take_out(&mut result.runs, model);
     }
@@ -168,4 +188,5 @@ struct OfChain {
     innovations: Vec<Innovation>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
+    kept: Option<KeptLegs>,
 }

@@ -6,7 +6,7 @@ use dataset::{
 };
 use kinematics::{Increment, Pose, Wheels};
 
-use super::filter::Want;
+use super::filter::{Gate, Want};
 use super::pass::{LEGS_AT_ONCE, pass};
 use super::{Column, Model, Noise, Pass, Records, Selection, Thinning};
 use crate::methods::joint::Joint;
@@ -134,19 +134,19 @@ fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
 }
 
 #[test]
-fn terms_apart_have_all_products_but_those_with_each_other() {
+fn parts_have_all_products_but_those_with_each_other() {
     let dataset = dataset(true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
     let model = Model { sizes: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
     let headings = vec![0.0; records.chains.len()];
-    let of = |apart_from| {
+    let of = |parts| {
         let worn = || Box::new(Worn { way_m: 0.0 });
         let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), worn(), worn()];
-        let want = Want { apart_from, ..Want::default() };
+        let want = Want { parts, ..Want::default() };
         super::total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, want).runs).expect("runs")
     };
-    let (all, apart) = (of(None), of(Some(1)));
+    let (all, apart) = (of(&[]), of(&[2, 2]));
     let common = Column::BASE.len() + 2;
     for row in 0..common + 4 {
         for column in 0..common + 4 {
@@ -199,7 +199,7 @@ fn columns() -> Vec<Column> {
 fn the_gradient_is_that_of_the_cost() {
     let dataset = dataset(true);
     let headings = [0.0, 0.0];
-    let found = run(&dataset, &model(), &NOISE, &headings, Want { gate: super::filter::Gate::Open, ..Want::default() });
+    let found = run(&dataset, &model(), &NOISE, &headings, Want { gate: Gate::Open, ..Want::default() });
     let gradient = found.runs.iter().fold(nalgebra::DVector::zeros(9), |sum, run| sum + &run.gradient);
     let information = found.runs.iter().fold(nalgebra::DMatrix::zeros(9, 9), |sum, run| sum + &run.information);
     for column in columns() {
@@ -208,7 +208,7 @@ fn the_gradient_is_that_of_the_cost() {
         let at = |by: f64| {
             let mut model = model();
             model.advance(column, by);
-            cost(&run(&dataset, &model, &NOISE, &headings, Want { gate: super::filter::Gate::Open, ..Want::default() }))
+            cost(&run(&dataset, &model, &NOISE, &headings, Want { gate: Gate::Open, ..Want::default() }))
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
         let scale = f64::sqrt(information[(k, k)]);
@@ -223,7 +223,7 @@ fn the_gradient_is_that_of_the_cost() {
 #[test]
 fn the_noise_score_is_the_derivative_of_the_cost() {
     let dataset = dataset(true);
-    let want = Want { gate: super::filter::Gate::Open, noise_score: true, ..Want::default() };
+    let want = Want { gate: Gate::Open, noise_score: true, ..Want::default() };
     let score = run(&dataset, &model(), &NOISE, &[0.0, 0.0], want).noise.gradient;
     for k in 0..4 {
         let h = 1e-4_f64;
@@ -244,7 +244,7 @@ fn the_noise_score_is_the_derivative_of_the_cost() {
 #[test]
 fn a_free_heading_is_at_its_best() {
     let dataset = dataset(false);
-    let want = Want { gate: super::filter::Gate::Open, ..Want::default() };
+    let want = Want { gate: Gate::Open, ..Want::default() };
     let mut headings = [0.6, 1.6];
     for _ in 0..8 {
         let found = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
@@ -374,4 +374,35 @@ fn displacements_are_thinned_where_their_errors_last_and_only_there() {
     };
     assert!(thinned(0.0) < 4);
     assert_eq!(thinned(0.7), 20);
+}
+
+#[test]
+fn kept_legs_follow_the_model_to_first_order() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    let headings = vec![0.0; records.chains.len()];
+    let model = Model { sizes: vec![0.0; 4], ..MODEL };
+    let of = |model: &Model, want: Want<'_>| {
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), Box::new(Worn { way_m: 0.0 })];
+        let want = Want { noise_score: true, innovations: true, gate: Gate::Open, ..want };
+        pass(&records, &selections, model, &NOISE, &headings, &mut terms, want)
+    };
+    let driven = of(&model, Want { keep: true, ..Want::default() });
+    let kept = driven.kept.as_ref().expect("they were to be kept");
+    let by = Want { by: Some(kept), ..Want::default() };
+    let known = of(&model, by);
+    assert_eq!((&known.runs, &known.innovations, known.noise), (&driven.runs, &driven.innovations, driven.noise));
+    // Twice as far from where they were driven they are four times as far off, to a tenth: the next order is a hundredth of that here.
+    let off = |size: f64| {
+        let mut near = model.clone();
+        let columns = Column::BASE.into_iter().chain((0..4).map(Column::Term));
+        columns.enumerate().for_each(|(k, column)| near.advance(column, size * (1.0 - 0.3 * k as f64)));
+        let (known, driven) = (of(&near, by), of(&near, Want::default()));
+        let pairs = known.innovations[0].iter().zip(&driven.innovations[0]);
+        pairs.map(|(known, driven)| (known.sigma * (known.z - driven.z)).abs()).fold(0.0, f64::max)
+    };
+    let ratio = off(2e-3) / off(1e-3);
+    assert!((ratio / 4.0 - 1.0).abs() < 0.1, "{ratio}");
+    assert!(off(1e-3) < 1e-4, "{}", off(1e-3));
 }

@@ -85,6 +85,18 @@ impl Selection {
         Self { legs }
     }
 
+    /// Whether driving the legs takes long, and longer than all else in a pass. So many pieces leave errors so small that legs follow a step of that size to first
+    /// order; where few looks are followed over a few pieces, they need not.
+    pub(crate) fn has_long_legs(all: &[Self]) -> bool {
+        /// Pieces of a leg, on average.
+        const LONG: usize = 3;
+        /// Pieces in all: some ten milliseconds.
+        const MANY: usize = 100_000;
+        let legs = || all.iter().flat_map(|selection| &selection.legs).flatten();
+        let pieces: usize = legs().map(|leg| leg.pieces.len()).sum();
+        pieces >= MANY && pieces >= LONG * legs().count()
+    }
+
     /// How many looks it takes of a series that has any, on average; starts left out. A series is a chain of looks, or the displacements of one run.
     #[must_use]
     pub fn mean_looks(&self, records: &Records<'_>) -> f64 {

@@ -92,7 +92,7 @@ fn some_shapes(choices: &[Choice]) -> Vec<Choice> {
 /// How well a target's most telling parameter shows at a size that would be large, in standard deviations, and the smallest size that would show.
 fn shown(frame: &Frame, evidence: &Evidence, target: &Target) -> Option<(f64, Smallest)> {
     let information = frame.information(evidence, &target.columns, &frame.free)?;
-    let parameters = target.choice.parameters().iter().enumerate();
+    let parameters = target.choice.parameters().into_iter().enumerate();
     parameters
         .map(|(k, parameter)| {
             let root = information[(k, k)].max(0.0).sqrt();

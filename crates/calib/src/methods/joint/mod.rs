@@ -334,14 +334,14 @@ impl JointFit<'_> {
         Ok(shut)
     }
 
-    /// The evidence of the same pass for terms that are tested one by one, from number `apart_from` on: there is none of two of them together.
+    /// The evidence of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
     #[must_use]
-    pub fn scan_apart(&self, terms: &mut [Box<dyn ModelTerm>], apart_from: usize) -> Vec<Evidence> {
+    pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<Evidence> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         let mut model = self.fit.model.clone();
         model.sizes.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        let want = Want { apart_from: Some(apart_from), gate: self.gate(), ..Want::default() };
+        let want = Want { parts, gate: self.gate(), ..Want::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, want).runs
     }
 
