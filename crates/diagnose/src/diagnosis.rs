@@ -311,11 +311,7 @@ fn continued(
     findings.extend(naming::of_search(&asked.found));
     let model = asked.model();
     if let Some(chance) = asked.rivalled {
-        naming::or_all_unlisted(&mut findings, chance, "a term without a name would do as well");
-    } else if !asked.found.names.is_empty()
-        && let Some(chance) = naming::incomplete(lack_of_fit(&asked.base, model))
-    {
-        naming::or_all_unlisted(&mut findings, chance, "it does not explain all that is there");
+        naming::beside_unlisted(&mut findings, chance);
     }
     for (place, p_value, trials) in asked.unlisted.iter().flat_map(Unlisted::terms) {
         let test = examine(model, place).map(|(test, _)| test);
@@ -351,6 +347,12 @@ fn continued(
         findings.extend(naming::of_failed_checks(&asked.checked));
     }
     naming::doubt(&mut findings[faults.len()..], asked.found.model.choices.len() >= MOST_EFFECTS);
+    // A term without a name that stands out beside all that was found, though not by enough to be a finding.
+    if findings.iter().any(naming::is_sure)
+        && let Some(left) = lack_of_fit(&asked.base, model)
+    {
+        naming::or_incomplete(&mut findings, left);
+    }
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);

@@ -11,7 +11,7 @@ use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{Found, Name, Test, chance};
+use crate::search::{FORM_ERROR, Found, Name, Test, chance};
 use crate::statistics::{of_trials, z_of_p};
 
 /// The parameters of a choice as found.
@@ -139,20 +139,32 @@ const DOUBTFUL: f64 = 3.0;
 const DOUBTFUL_IF_FULL: f64 = 3.0;
 
 /// Says of effects found that what has no name would do as well, with so much of a chance over theirs.
-pub(crate) fn or_all_unlisted(findings: &mut [Finding], chance: f64, why: &str) {
+pub(crate) fn beside_unlisted(findings: &mut [Finding], chance: f64) {
     for finding in findings.iter_mut().filter(|finding| is_mean(finding)) {
-        or_unlisted(finding, chance, why);
+        or_unlisted(finding, chance, "a term without a name would do as well");
     }
 }
 
 /// Chance at which the names found do not explain all that is there though they do.
 const LACK_OF_FIT: f64 = 0.05;
 
-/// The chance, over that of the names, that they are not what is there, where terms without a name still stand out beside them. A chance p speaks against what it was
-/// computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
-pub(crate) fn incomplete(p_value: f64) -> Option<f64> {
+/// Says of the effects found, where no other doubt is on them, that they may not be what is there where the score of a term without a name still stands out beside them,
+/// by more than what their form may err by. A chance p speaks against what it was computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
+    if p_value >= LACK_OF_FIT {
+        return;
+    }
     let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    (p_value < LACK_OF_FIT).then(|| (against * UNWRITTEN / (1.0 - UNWRITTEN)).min(1.0))
+    let chance = (against * UNWRITTEN / (1.0 - UNWRITTEN)).min(1.0);
+    let is_incomplete = |finding: &&mut Finding| is_sure(finding) && score > FORM_ERROR * finding.z.powi(2);
+    for finding in findings.iter_mut().filter(is_incomplete) {
+        or_unlisted(finding, chance, "it does not explain all that is there");
+    }
+}
+
+/// Whether a finding is a mean effect that nothing without a name is held to do as well.
+pub(crate) fn is_sure(finding: &Finding) -> bool {
+    is_mean(finding) && !finding.names.iter().any(|name| name == "unlisted")
 }
 
 /// Says of a finding that it may be the doing of something that has no name, with so much of a chance over that of its names.

@@ -33,7 +33,7 @@ const MOST_RIVALS: usize = 6;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
 pub(crate) const LEAST_REACH: f64 = 3.0;
 /// A hypothesis describes its effect to a tenth of its size or so, and errs by the square of that in what it explains.
-const FORM_ERROR: f64 = 0.01;
+pub(crate) const FORM_ERROR: f64 = 0.01;
 
 /// How much less likely than the best a name may make the data and still be told.
 pub(crate) fn reach(best: f64) -> f64 {

@@ -219,9 +219,10 @@ impl<'m, 'a> Sought<'m, 'a> {
     }
 }
 
-/// The chance of the best sparse term's score beside a model, where all is explained.
-pub(crate) fn lack_of_fit(base: &JointFit<'_>, model: &Extended<'_>) -> f64 {
-    best_first(base, model).map_or(1.0, |(_, p_value)| p_value)
+/// The best sparse term's score beside a model, and its chance where all is explained; `None` where no term can be seen.
+pub(crate) fn lack_of_fit(base: &JointFit<'_>, model: &Extended<'_>) -> Option<(f64, f64)> {
+    let (scored, p_value) = best_first(base, model)?;
+    Some((scored.first()?.statistic, p_value))
 }
 
 /// Sparse terms by their scores beside a model, the best first, and the best's chance; `None` where no term can be seen.
