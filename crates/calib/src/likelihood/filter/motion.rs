@@ -4,7 +4,7 @@
 //! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
 //! kept legs; where they end is settled by legs that are driven.
 
-use dataset::{Interval, Look};
+use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative};
 use nalgebra::Vector3;
 
@@ -138,11 +138,17 @@ impl Filter<'_, '_> {
     pub(super) fn sight_of_terms(&mut self, t_s: f64, twist: Twist) {
         let world_from_body = self.run_from_chain * self.pose;
         let look = Look { t_s, world_from_body, twist, run: self.chain.info };
+        self.ask_terms(|term, own| term.sight(&look, own));
+    }
+
+    /// Asks each term for its gradients by its own parameters.
+    #[inline(always)]
+    fn ask_terms(&mut self, ask: impl Fn(&mut dyn ModelTerm, &mut [Pose])) {
         self.gradients.fill(Pose::IDENTITY);
         let mut rest = &mut self.gradients[..];
         for term in self.terms.iter_mut() {
             let (own, others) = rest.split_at_mut(term.parameters().len());
-            term.sight(&look, own);
+            ask(term.as_mut(), own);
             rest = others;
         }
     }
@@ -226,13 +232,7 @@ impl Filter<'_, '_> {
             session_m: self.session_m,
             run: self.chain.info,
         };
-        self.gradients.fill(Pose::IDENTITY);
-        let mut rest = &mut self.gradients[..];
-        for term in self.terms.iter_mut() {
-            let (own, others) = rest.split_at_mut(term.parameters().len());
-            term.motion(&interval, own);
-            rest = others;
-        }
+        self.ask_terms(|term, own| term.motion(&interval, own));
     }
 }
 
