@@ -21,7 +21,7 @@ fn with(mut scenario: Scenario, term: &SparseTerm) -> Scenario {
 }
 
 /// Channel, covariates, coefficient, and the share of the whole that may remain; [`crate::means`] says of the last whence it comes.
-const CASES: [(Channel, &[&str], f64, f64); 33] = [
+const CASES: [(Channel, &[&str], f64, f64); 38] = [
     (Channel::Along, &["v", "|v|"], 0.1, 0.0),
     (Channel::Along, &["|omega|"], 0.005, 0.0),
     (Channel::Along, &["v", "cos(theta)"], 0.03, 0.0),
@@ -56,6 +56,11 @@ const CASES: [(Channel, &[&str], f64, f64); 33] = [
     (Channel::Wheels, &["wheel sense"], 0.003, 0.03),
     (Channel::LeftWheel, &["wheel acceleration"], 0.03, 0.06),
     (Channel::RightWheel, &["v cos(5 right wheel)"], 0.1, 0.0),
+    (Channel::Yaw, &["|v|", "bend"], 0.03, 0.0),
+    (Channel::Yaw, &["|v|", "exp(-distance since reversal / 0.1 m)", "last turn"], 0.3, 0.05),
+    (Channel::Wheels, &["wheel v", "exp(-wheel distance since reversal / 2 mm)"], 0.3, 0.0),
+    (Channel::LeftWheel, &["wheel v", "exp(-|wheel v| / 0.05 m/s)"], 0.3, 0.06),
+    (Channel::RightWheel, &["wheel acceleration", "exp(-|wheel v| / 0.05 m/s)"], 0.05, 0.06),
     // The speed of a row by its own stamps goes with their errors, and the first rows have no beat yet.
     (Channel::Wheels, &["wheel v", "row length"], 0.01, 0.3),
     // A row knows the time at its start.

@@ -60,15 +60,18 @@ struct Question {
     groups: Vec<Vec<Choice>>,
 }
 
+const SINCE_REVERSAL: &str = "distance_since_reversal";
+
 fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
-        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, Bend, CosHeading, CosPhase, LastTurn, RunTime, SessionTime, SinHeading,
+        SinPhase, SinceReversal, Speed, Way, WheelSinceReversal, WheelSpeed, X, Y, YawAcceleration, YawRate,
     };
     let mut questions: Vec<(String, Vec<Vec<Covariate>>)> = [
         ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
         ("yaw_rate", vec![vec![AbsYawRate], vec![YawRate, AbsYawRate]]),
         ("speed_times_yaw_rate", vec![vec![Speed, YawRate], vec![AbsSpeed, YawRate]]),
+        ("bend", vec![vec![AbsSpeed, Bend], vec![AbsYawRate, Bend]]),
         ("acceleration", vec![vec![Acceleration], vec![YawAcceleration]]),
         ("heading_in_the_room", vec![vec![AbsSpeed, CosHeading], vec![AbsSpeed, SinHeading]]),
         ("left_wheel_phase", vec![vec![CosPhase(Side::Left, 1)], vec![SinPhase(Side::Left, 1)]]),
@@ -76,7 +79,7 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         ("time_in_run", vec![vec![RunTime, Speed], vec![RunTime, YawRate]]),
         ("time_in_session", vec![vec![SessionTime, Speed], vec![SessionTime, YawRate]]),
         ("distance", vec![vec![Way, Speed], vec![Way, YawRate]]),
-        ("distance_since_reversal", vec![vec![SinceReversal, Speed], vec![SinceReversal, AbsSpeed]]),
+        (SINCE_REVERSAL, vec![vec![SinceReversal, Speed], vec![SinceReversal, AbsSpeed]]),
         ("position", vec![vec![X, Speed], vec![Y, Speed], vec![X, YawRate], vec![Y, YawRate]]),
     ]
     .map(|(name, products)| (name.to_owned(), products))
@@ -87,9 +90,19 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     }
     let on = |channel, covariates: &[Covariate]| Choice::Sparse(Sparse { channel, covariates: covariates.to_vec() });
     let on_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
-    let of_motion = questions
-        .into_iter()
-        .map(|(name, products)| Question { name, groups: vec![products.iter().flat_map(on_motion).collect()] });
+    // To the side of the last turn, and of each wheel for itself.
+    let of_reversals = || {
+        let of_wheel = [WheelSpeed, WheelSinceReversal];
+        let wheels = [Channel::LeftWheel, Channel::RightWheel].map(|channel| on(channel, &of_wheel));
+        [vec![on(Channel::Yaw, &[SinceReversal, AbsSpeed, LastTurn])], wheels.to_vec()]
+    };
+    let of_motion = questions.into_iter().map(|(name, products)| {
+        let mut groups = vec![products.iter().flat_map(on_motion).collect()];
+        if name == SINCE_REVERSAL {
+            groups.extend(of_reversals());
+        }
+        Question { name, groups }
+    });
     // A row that is longer than usual by its stamps, and not in truth.
     let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Choice::Sparse(Sparse::of_rows())]] };
     // A cosine and a sine for each number of cycles in a turn.

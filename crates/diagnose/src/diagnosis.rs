@@ -21,9 +21,9 @@ use crate::plan::{Limits, next_experiment};
 use crate::residuals::{Residuals, residuals};
 use crate::scatter::scatter;
 use crate::search::{
-    Extended, Found, Known, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, chance, evidence, examine, reach, search,
-    search_every_look,
+    Extended, Found, Known, LEAST_REACH, MOST_EFFECTS, SCAN_LEVEL, chance, evidence, reach, search, search_every_look,
 };
+use crate::sizes::examine;
 use crate::unlisted::{Sought, UNLISTED_LEVEL, Unlisted, lack_of_fit, sparse};
 
 /// What to leave out.

@@ -21,6 +21,7 @@ mod scatter;
 mod scenario_of;
 mod search;
 mod shape;
+mod sizes;
 mod statistics;
 mod unlisted;
 

@@ -11,7 +11,8 @@ use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{FORM_ERROR, Found, Name, Test, chance};
+use crate::search::{FORM_ERROR, Found, Name, chance};
+use crate::sizes::Test;
 use crate::statistics::{of_trials, z_of_p};
 
 /// The parameters of a choice as found.

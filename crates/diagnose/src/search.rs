@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use calib::likelihood::{Column, Evidence, NoiseComponent};
 use calib::methods::joint::JointFit;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::candidate::{Choice, terms};
 use crate::checks::CHECKS_LEVEL;
-use crate::gain::{LEAST_RUNS, gain};
-use crate::scan::{Projection, Scored, inverse, log_weight, principal, scan, total};
+use crate::gain::gain;
+use crate::scan::{Scored, log_weight, scan, total};
 use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
 use crate::shape::fit_shape;
-use crate::statistics::{of_trials, p_of_statistic, p_of_student, student_95};
+use crate::sizes::{RUNS_LEVEL, Test, examine, holds_over_runs, over_names, tests_of};
+use crate::statistics::of_trials;
 use crate::unlisted::UNLISTED_LEVEL;
 
 /// Family-wise rate of false alarms of the scan over the catalogue: with the checks' and that of terms without a name, 5 %.
@@ -153,12 +154,12 @@ impl<'a> Extended<'a> {
     }
 
     /// The indices of a choice's columns.
-    fn columns(&self, place: usize) -> Vec<usize> {
+    pub(crate) fn columns(&self, place: usize) -> Vec<usize> {
         self.range(place).map(|k| Column::Term(k).index()).collect()
     }
 
     /// A choice's sizes.
-    fn sizes(&self, place: usize) -> DVector<f64> {
+    pub(crate) fn sizes(&self, place: usize) -> DVector<f64> {
         DVector::from_column_slice(&self.fit.fit.model.sizes[self.range(place)])
     }
 }
@@ -182,7 +183,7 @@ pub(crate) struct Found<'a> {
     pub(crate) names: Vec<Vec<Name>>,
     /// For each choice, its test at the end, in the presence of the others.
     pub(crate) tests: Vec<Test>,
-    /// By how much a choice's shape, not being known for certain, widens each of its sizes.
+    /// By how much a choice's shape and the names beside it, not being known for certain, widen each of its sizes.
     wider: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
@@ -248,15 +249,6 @@ impl<'a> Known<'a> {
     }
 }
 
-/// A test of one choice of a fitted model.
-#[derive(Debug, Clone)]
-pub(crate) struct Test {
-    pub(crate) statistic: f64,
-    pub(crate) p_value: f64,
-    /// Value and standard deviation of each parameter.
-    pub(crate) sizes: Vec<(f64, f64)>,
-}
-
 /// −log likelihood of a fit over as many innovations as the fullest of those compared: a look that one fit takes for an outlier is charged as one.
 pub(crate) fn cost(fit: &JointFit<'_>, count: f64) -> f64 {
     total(&fit.fit.pass.runs).map_or(f64::INFINITY, |sum| sum.cost() + left_out_cost(&sum, count))
@@ -271,85 +263,6 @@ pub(crate) fn left_out_cost(evidence: &Evidence, count: f64) -> f64 {
 
 pub(crate) fn count(fit: &JointFit<'_>) -> f64 {
     fit.fit.pass.runs.iter().map(|run| run.count).sum()
-}
-
-/// The test of a choice in its fitted model, and along its principal directions in units of the plausible: information and size.
-pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, Vec<(f64, f64)>)> {
-    let evidence = total(&extended.fit.fit.pass.runs)?;
-    let parameters = extended.choices[choice].parameters();
-    let own = extended.columns(choice);
-    let projected = Projection::beside(&extended.fit, &evidence, &own)?.of_columns(&evidence, &own);
-    let sizes = extended.sizes(choice);
-    let gradient = &projected.information * &sizes;
-    let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
-        .into_iter()
-        .filter(|(value, _)| *value >= 1.0)
-        .map(|(value, gradient)| (value, gradient / value))
-        .collect();
-    let freedom = crate::scan::freedom(&extended.fit, &evidence);
-    let shrink = freedom / evidence.count.max(1.0);
-    let statistic = directions.iter().map(|(value, size)| shrink * value * size * size).sum();
-    let covariance = inverse(&projected.information);
-    let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
-    let test = Test {
-        statistic,
-        p_value: p_of_statistic(statistic, directions.len(), freedom),
-        sizes: sizes.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
-    };
-    Some((test, directions))
-}
-
-/// Chance at which a size that is none passes for one over the runs, once it has passed over the looks.
-const RUNS_LEVEL: f64 = 0.05;
-
-/// Whether a choice's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
-/// motion, looks that resemble each other), and a likelihood that takes looks for independent believes them too much.
-///
-/// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
-/// Liang & Zeger 1986.
-pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64) -> bool {
-    // Fewer runs do not say how a size differs between them.
-    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < LEAST_RUNS {
-        return true;
-    }
-    let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
-    let own = extended.columns(choice);
-    let Some(projection) = Projection::beside(&extended.fit, &evidence, &own) else { return false };
-    let information = projection.of_columns(&evidence, &own).information;
-    let sizes = extended.sizes(choice);
-    let stands = sizes.dot(&(&information * &sizes));
-    #[allow(clippy::cast_precision_loss)]
-    let n = runs.len() as f64;
-    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &evidence, &own).dot(&sizes).powi(2)).sum();
-    let t = stands / (squares * n / (n - 1.0)).sqrt();
-    t.is_nan() || p_of_student(t, n - 1.0) < level
-}
-
-/// Standard deviations of a choice's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
-/// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
-fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
-    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < LEAST_RUNS {
-        return None;
-    }
-    let evidence = total(&extended.fit.fit.pass.runs)?;
-    let own = extended.columns(choice);
-    let projection = Projection::beside(&extended.fit, &evidence, &own)?;
-    let inverse = inverse(&projection.of_columns(&evidence, &own).information)?;
-    let mut scatter = DMatrix::zeros(own.len(), own.len());
-    for run in &runs {
-        let leverage = projection.variance_of(run, &evidence, &own) * &inverse;
-        let others = (DMatrix::identity(own.len(), own.len()) - leverage).try_inverse()?;
-        let without = others * projection.score_of(run, &evidence, &own);
-        scatter += &without * without.transpose();
-    }
-    #[allow(clippy::cast_precision_loss)]
-    let n = runs.len() as f64;
-    let covariance = &inverse * scatter * &inverse * ((n - 1.0) / n);
-    // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
-    let widening = student_95(n - 1.0) / 1.96;
-    Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
 /// A fit that takes a smaller share of the looks that another one takes has lost the robot.
@@ -493,6 +406,7 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
     let mut model = Extended::alone(base);
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
+    let mut beside = Vec::new();
     while model.choices.len() < MOST_EFFECTS {
         let entries = best_shapes(known.beside(&model, catalogue));
         if model.choices.is_empty() {
@@ -532,12 +446,19 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         }
         let (top, most) = (found[0].0.log_odds, found.iter().map(|(name, _)| name.explains).fold(f64::MIN, f64::max));
         // Neither what is plausible nor the prior of sizes may silence a name that explains as much.
-        let near = |name: &Name| name.log_odds > top - reach(top) || name.explains > most - reach(most);
-        names.push(found.iter().filter(|(name, _)| near(name)).map(|(name, _)| name.clone()).collect());
+        found.retain(|(name, _)| name.log_odds > top - reach(top) || name.explains > most - reach(most));
+        names.push(found.iter().map(|(name, _)| name.clone()).collect());
+        beside.extend(over_names(place, &found));
         model = found.swap_remove(0).1;
         place += 1;
     }
-    let mut wider: Vec<Vec<f64>> = (0..model.choices.len()).map(|place| fit_shape(base, &mut model, place)).collect();
+    let choices = model.choices.clone();
+    let mut wider: Vec<Vec<f64>> = (0..choices.len()).map(|place| fit_shape(base, &mut model, place)).collect();
+    for (choice, variances) in beside {
+        if let Some(place) = choices.iter().position(|own| *own == choice) {
+            wider[place].iter_mut().zip(variances).for_each(|(wider, variance)| *wider = wider.hypot(variance.sqrt()));
+        }
+    }
     // What stood for a shape that was not met is not needed any more.
     let tests = tests_in(&first_scan);
     for place in (0..names.len()).rev() {
@@ -551,22 +472,6 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
         }
     }
     Found { tests: tests_of(&model, &wider), model, names, wider, first_scan, known }
-}
-
-/// Each choice's test beside the others.
-fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
-    let test = |(choice, wider): (usize, &Vec<f64>)| {
-        let (mut test, _) = examine(model, choice)?;
-        // Where runs differ more than looks say, a size is known no better than by the runs.
-        if let Some(over_runs) = over_runs(model, choice) {
-            test.sizes.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
-        }
-        for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
-            *sigma = sigma.hypot(*wider);
-        }
-        Some(test)
-    };
-    wider.iter().enumerate().filter_map(test).collect()
 }
 
 /// What a search among all looks finds, those too that lie far off by the model that was found: a large effect that shows in few looks makes them lie far off, and among

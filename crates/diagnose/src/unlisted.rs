@@ -73,8 +73,8 @@ impl<'a> Unlisted<'a> {
 /// Products of at most three covariates that vanish at standstill.
 fn library(fit: &JointFit<'_>) -> Vec<Choice> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, RunTime, SessionTime, SinHeading, SinPhase,
-        SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, Bend, CosHeading, CosPhase, LastTurn, RunTime, SessionTime, SinHeading,
+        SinPhase, SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
     };
     let rates = [vec![Speed], vec![AbsSpeed], vec![YawRate], vec![AbsYawRate]];
     let modulators = [
@@ -88,6 +88,9 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         vec![SessionTime],
         vec![Way],
         vec![SinceReversal],
+        vec![SinceReversal, LastTurn],
+        vec![LastTurn],
+        vec![Bend],
         vec![X],
         vec![Y],
         vec![AbsSpeed, AbsSpeed],
@@ -138,13 +141,15 @@ pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
 /// What wheels may do by themselves. Their way alone is their size, which every fit has.
 fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
     use Covariate::{
-        AbsWheelSpeed, AbsYawRate, CosPhase, RunTime, SessionTime, SinPhase, SinceReversal, Way, WheelAcceleration,
-        WheelSense, WheelSpeed,
+        AbsWheelSpeed, AbsYawRate, CosPhase, RunTime, SessionTime, SinPhase, SinceReversal, SlowWheel, Way,
+        WheelAcceleration, WheelSense, WheelSinceReversal, WheelSpeed,
     };
-    let modulators = [AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, Way, SinceReversal];
+    let modulators = [AbsWheelSpeed, AbsYawRate, RunTime, SessionTime, Way, SinceReversal, WheelSinceReversal];
     let modulators: Vec<Covariate> = modulators.into_iter().chain(of_runs(fit)).collect();
     let mut products = vec![vec![AbsWheelSpeed], vec![WheelSense], vec![WheelAcceleration]];
     products.push(vec![WheelAcceleration, AbsWheelSpeed]);
+    products.push(vec![WheelAcceleration, SlowWheel]);
+    products.push(vec![WheelSpeed, SlowWheel]);
     products.extend(Side::BOTH.into_iter().flat_map(|side| [vec![CosPhase(side, 1)], vec![SinPhase(side, 1)]]));
     products.push(vec![WheelSpeed, AbsWheelSpeed, AbsWheelSpeed]);
     for rate in [WheelSpeed, AbsWheelSpeed, WheelSense] {

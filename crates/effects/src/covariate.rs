@@ -105,6 +105,10 @@ pub enum Covariate {
     WheelSense,
     /// `wheel acceleration`: change of the contact's speed, over 1 m/s².
     WheelAcceleration,
+    /// `exp(-|wheel v| / 0.05 m/s)`: of the speed of the wheel's own contact; 1 where it stands.
+    SlowWheel,
+    /// `exp(-wheel distance since reversal / 2 mm)`: of the way since the wheel's contact last went the other way, on average over the interval; 0 before it first does.
+    WheelSinceReversal,
     /// `row length`: how much longer the logged interval is by its stamps than by the beat of its run's rows, over 2 % of itself.
     RowLength,
     /// `cos(theta)`: of the heading in the room.
@@ -123,6 +127,10 @@ pub enum Covariate {
     Way,
     /// `exp(-distance since reversal / 0.1 m)`: of the way since the robot last went the other way; 0 before it first does.
     SinceReversal,
+    /// `bend`: ω over √(ω² + (v / 0.2 m)²): 1 on the spot to the left, −1 to the right, 0 straight on.
+    Bend,
+    /// `last turn`: 1 where the robot last turned to the left, −1 to the right; 0 before it first does.
+    LastTurn,
     /// `x`: place in the room, over 1 m.
     X,
     /// `y`: place in the room, over 1 m.
@@ -149,7 +157,7 @@ fn turned(side: Side, cycles: u8) -> String {
 
 impl Covariate {
     /// Those that have a name of their own: all but [`Self::OfRun`] and phases of several cycles.
-    pub const NAMED: [Self; 23] = [
+    pub const NAMED: [Self; 27] = [
         Self::Speed,
         Self::AbsSpeed,
         Self::YawRate,
@@ -160,6 +168,8 @@ impl Covariate {
         Self::AbsWheelSpeed,
         Self::WheelSense,
         Self::WheelAcceleration,
+        Self::SlowWheel,
+        Self::WheelSinceReversal,
         Self::RowLength,
         Self::CosHeading,
         Self::SinHeading,
@@ -171,6 +181,8 @@ impl Covariate {
         Self::SessionTime,
         Self::Way,
         Self::SinceReversal,
+        Self::Bend,
+        Self::LastTurn,
         Self::X,
         Self::Y,
     ];
@@ -189,6 +201,8 @@ impl Covariate {
             Self::AbsWheelSpeed => "|wheel v|",
             Self::WheelSense => "wheel sense",
             Self::WheelAcceleration => "wheel acceleration",
+            Self::SlowWheel => "exp(-|wheel v| / 0.05 m/s)",
+            Self::WheelSinceReversal => "exp(-wheel distance since reversal / 2 mm)",
             Self::RowLength => "row length",
             Self::CosHeading => "cos(theta)",
             Self::SinHeading => "sin(theta)",
@@ -198,6 +212,8 @@ impl Covariate {
             Self::SessionTime => "session time",
             Self::Way => "distance driven",
             Self::SinceReversal => "exp(-distance since reversal / 0.1 m)",
+            Self::Bend => "bend",
+            Self::LastTurn => "last turn",
             Self::X => "x",
             Self::Y => "y",
             Self::OfRun { key, .. } => return key.clone(),
@@ -237,13 +253,25 @@ impl Covariate {
                 | Self::YawAcceleration
                 | Self::CosPhase(..)
                 | Self::SinPhase(..)
-        ) || self.is_of_a_wheel()
+                | Self::WheelSpeed
+                | Self::AbsWheelSpeed
+                | Self::WheelSense
+                | Self::WheelAcceleration
+        )
     }
 
     /// Is it what the wheel does whose way it is about? Channels of wheels have it alone.
     #[must_use]
     pub const fn is_of_a_wheel(&self) -> bool {
-        matches!(self, Self::WheelSpeed | Self::AbsWheelSpeed | Self::WheelSense | Self::WheelAcceleration)
+        matches!(
+            self,
+            Self::WheelSpeed
+                | Self::AbsWheelSpeed
+                | Self::WheelSense
+                | Self::WheelAcceleration
+                | Self::SlowWheel
+                | Self::WheelSinceReversal
+        )
     }
 
     /// Is it of the log's rows, and not of the robot? It goes with the speed of both wheels alone: a stamp that is off.
@@ -263,6 +291,15 @@ impl Covariate {
         matches!(self, Self::Speed | Self::AbsSpeed | Self::YawRate | Self::AbsYawRate)
     }
 
+    /// How many times as large as others a product with it may be, as it has faded soon: after a reversal 20 mm or 20 mrad of the robot in all, and all of a wheel's way.
+    pub(crate) const fn fades(&self) -> f64 {
+        match self {
+            Self::SinceReversal => 10.0,
+            Self::WheelSinceReversal => 50.0,
+            _ => 1.0,
+        }
+    }
+
     /// Its value at a moment.
     pub(crate) fn value(&self, at: &Moment<'_>) -> f64 {
         match self {
@@ -277,6 +314,8 @@ impl Covariate {
             Self::WheelSense if at.own_m_s == 0.0 => 0.0,
             Self::WheelSense => at.own_m_s.signum(),
             Self::WheelAcceleration => at.own_m_s2,
+            Self::SlowWheel => (-at.own_m_s.abs() / 0.05).exp(),
+            Self::WheelSinceReversal => mean_left(at.own_since_reversal_m),
             // Of the log's rows, which no moment knows: a term of it is [`crate::IntervalError`]'s.
             Self::RowLength => 0.0,
             Self::CosHeading => at.heading_rad.cos(),
@@ -286,12 +325,31 @@ impl Covariate {
             Self::RunTime => at.run_s / 60.0,
             Self::SessionTime => at.session_s / 600.0,
             Self::Way => at.session_m / 100.0,
-            Self::SinceReversal => (-at.since_reversal_m / 0.1).exp(),
+            Self::SinceReversal => (-at.since_reversal_m / FADES_M).exp(),
+            Self::Bend if at.omega_rad_s == 0.0 => 0.0,
+            Self::Bend => at.omega_rad_s / at.omega_rad_s.hypot(at.v_m_s / BEND_M),
+            Self::LastTurn => at.last_turn,
             Self::X => at.x_m,
             Self::Y => at.y_m,
             Self::OfRun { key, mean, sd } => (at.of_run.get(key).copied().unwrap_or(0.0) - mean) / sd,
         }
     }
+}
+
+/// Radius at which a bend is half-way, in the square, between straight on and on the spot, metres.
+const BEND_M: f64 = 0.2;
+
+/// Way of the robot since its reversal over which 1/e is left, metres: that of castors.
+const FADES_M: f64 = 0.1;
+/// Way of a wheel since its reversal over which 1/e is left, metres: that of teeth, keys and tyres.
+const WHEEL_FADES_M: f64 = 2e-3;
+
+/// What is left of 1 on average between two ways since a reversal.
+fn mean_left([from_m, to_m]: [f64; 2]) -> f64 {
+    let left = |way_m: f64| (-way_m / WHEEL_FADES_M).exp();
+    let over = (to_m - from_m) / WHEEL_FADES_M;
+    // Infinite before the first.
+    if over > 0.0 { (left(from_m) - left(to_m)) / over } else { left(to_m) }
 }
 
 /// What covariates are made of.
@@ -311,10 +369,15 @@ pub(crate) struct Moment<'r> {
     /// Of the wheel in question.
     pub(crate) own_m_s: f64,
     pub(crate) own_m_s2: f64,
+    pub(crate) own_since_reversal_m: [f64; 2],
     pub(crate) run_s: f64,
     pub(crate) session_s: f64,
     pub(crate) session_m: f64,
     pub(crate) since_reversal_m: f64,
+    /// Of each wheel, where the interval begins and where it ends.
+    pub(crate) wheel_since_reversal_m: Wheels<[f64; 2]>,
+    /// Sense of the last turn, 0 before any.
+    pub(crate) last_turn: f64,
     pub(crate) x_m: f64,
     pub(crate) y_m: f64,
     pub(crate) of_run: &'r BTreeMap<String, f64>,
@@ -331,37 +394,101 @@ impl Moment<'_> {
 
     /// The same for what a wheel does itself.
     pub(crate) fn of_wheel(&self, side: Side) -> Self {
-        Self { own_m_s: self.wheel_m_s[side], own_m_s2: self.wheel_m_s2[side], ..*self }
+        Self {
+            own_m_s: self.wheel_m_s[side],
+            own_m_s2: self.wheel_m_s2[side],
+            own_since_reversal_m: self.wheel_since_reversal_m[side],
+            ..*self
+        }
+    }
+}
+
+/// The side to which a value that drifts last went: it is held within a band, which it must cross to go to the other side.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LastSide {
+    half_width: f64,
+    within: f64,
+    sense: f64,
+}
+
+impl LastSide {
+    /// Neither yet.
+    pub(crate) const fn beyond(half_width: f64) -> Self {
+        Self { half_width, within: 0.0, sense: 0.0 }
+    }
+
+    /// 1 or −1, once the value has gone this far on, or back where that is negative; 0 before it has first left the band's middle.
+    pub(crate) fn after(&mut self, by: f64) -> f64 {
+        self.within = (self.within + by).clamp(-self.half_width, self.half_width);
+        if self.within.abs() >= self.half_width {
+            self.sense = self.within.signum();
+        }
+        self.sense
     }
 }
 
 /// Way back that counts as a reversal, metres: more than the counts of a standstill.
-const REVERSAL_M: f64 = 1e-3;
+pub(crate) const REVERSAL_M: f64 = 1e-3;
 
-/// The way since the robot last went the other way.
+/// A turn that counts, radians: what straight driving wanders by is far less.
+pub(crate) const TURN_RAD: f64 = 0.03;
+
+/// The way since something last went the other way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reversals {
-    swung_m: f64,
-    ahead: Option<bool>,
+    went: LastSide,
     since_m: f64,
 }
 
 impl Reversals {
     /// None yet.
-    pub(crate) const NONE: Self = Self { swung_m: 0.0, ahead: None, since_m: f64::INFINITY };
+    pub(crate) const NONE: Self = Self { went: LastSide::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
 
     /// The way since the last one, after going this far on, or back where that is negative.
     pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
-        self.swung_m = (self.swung_m + distance_m).clamp(-0.5 * REVERSAL_M, 0.5 * REVERSAL_M);
-        if self.swung_m.abs() >= 0.5 * REVERSAL_M {
-            let ahead = self.swung_m > 0.0;
-            if self.ahead.is_some_and(|before| before != ahead) {
-                self.since_m = 0.0;
-            }
-            self.ahead = Some(ahead);
+        let before = self.went.sense;
+        if self.went.after(distance_m) * before < 0.0 {
+            self.since_m = 0.0;
         }
         self.since_m += distance_m.abs();
         self.since_m
+    }
+}
+
+/// What moments remember of a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Memory {
+    centre: Reversals,
+    wheels: Wheels<Reversals>,
+    turned: LastSide,
+}
+
+/// What is remembered at a moment: ways since reversals, and the sense of the last turn.
+pub(crate) struct Remembered {
+    pub(crate) since_reversal_m: f64,
+    pub(crate) wheel_since_reversal_m: Wheels<[f64; 2]>,
+    pub(crate) last_turn: f64,
+}
+
+impl Memory {
+    /// Of a run that begins.
+    pub(crate) const NONE: Self = Self {
+        centre: Reversals::NONE,
+        wheels: Wheels { left: Reversals::NONE, right: Reversals::NONE },
+        turned: LastSide::beyond(TURN_RAD),
+    };
+
+    /// What is remembered once the wheels and the robot have gone on.
+    pub(crate) fn after(&mut self, travel_m: Wheels<f64>, distance_m: f64, turn_rad: f64) -> Remembered {
+        let since_m = Wheels::from_sides(|side| {
+            let to_m = self.wheels[side].after(travel_m[side]);
+            [to_m - travel_m[side].abs(), to_m]
+        });
+        Remembered {
+            since_reversal_m: self.centre.after(distance_m),
+            wheel_since_reversal_m: since_m,
+            last_turn: self.turned.after(turn_rad),
+        }
     }
 }
 
@@ -404,10 +531,13 @@ mod tests {
             turned_rad: Wheels { left: 0.4, right: 0.6 },
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            own_since_reversal_m: [f64::INFINITY; 2],
             run_s: 30.0,
             session_s: 900.0,
             session_m: 25.0,
             since_reversal_m: 0.2,
+            wheel_since_reversal_m: Wheels { left: [f64::INFINITY; 2], right: [0.001, 0.004] },
+            last_turn: -1.0,
             x_m: 1.5,
             y_m: -2.5,
             of_run: &load,
@@ -425,6 +555,8 @@ mod tests {
             0.6,
             -1.0,
             0.8,
+            f64::exp(-12.0),
+            (f64::exp(-0.5) - f64::exp(-2.0)) / 1.5,
             0.0,
             cos(0.5),
             sin(0.5),
@@ -436,6 +568,8 @@ mod tests {
             1.5,
             0.25,
             f64::exp(-2.0),
+            -0.7 / f64::hypot(0.7, 1.5),
+            -1.0,
             1.5,
             -2.5,
         ];

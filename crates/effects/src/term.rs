@@ -15,7 +15,7 @@ use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, Moment, Reversals};
+use crate::covariate::{Channel, Covariate, Memory, Moment, Remembered};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
@@ -55,7 +55,7 @@ impl Sparse {
         if self.is_of_rows()
             && let Some(shape) = IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop())
         {
-            return Box::new(OfRows(shape.term));
+            return Box::new(OfRows { of: shape.term, own: [parameter(self)] });
         }
         Box::new(Recorded::new(self))
     }
@@ -208,7 +208,7 @@ impl PhysicalEffect for SparseTerm {
             of_run: BTreeMap::new(),
             session_s: 0.0,
             session_m: 0.0,
-            reversals: Reversals::NONE,
+            memory: Memory::NONE,
             speeds: (0.0, 0.0),
         }))
     }
@@ -228,7 +228,7 @@ struct State {
     session_s: f64,
     /// Way of the drive's centre in the session, metres.
     session_m: f64,
-    reversals: Reversals,
+    memory: Memory,
     /// v and ω of the last step, for what is seen after it.
     speeds: (f64, f64),
 }
@@ -240,7 +240,7 @@ impl Forward for State {
 
     fn begin_run(&mut self, run: &mut RunStart<'_>) {
         (self.session_s, self.session_m) = (run.session_s, run.session_m);
-        (self.reversals, self.speeds) = (Reversals::NONE, (0.0, 0.0));
+        (self.memory, self.speeds) = (Memory::NONE, (0.0, 0.0));
         for (key, values) in &self.size.of_runs {
             let value = values[run.number as usize % values.len()];
             let said = *run.info.covariates.entry(key.clone()).or_insert(value);
@@ -260,7 +260,10 @@ impl Forward for State {
             return;
         }
         let half_s = 0.5 * step.dt_s;
-        let distance_m = v_m_s * step.dt_s;
+        let (distance_m, turn_rad) = (v_m_s * step.dt_s, omega_rad_s * step.dt_s);
+        let travel_m = wheel_m_s.map(|wheel_m_s| wheel_m_s * step.dt_s);
+        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
+            self.memory.after(travel_m, distance_m, turn_rad);
         let at = Moment {
             v_m_s,
             omega_rad_s,
@@ -271,12 +274,15 @@ impl Forward for State {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            own_since_reversal_m: [f64::INFINITY; 2],
             wheel_rad: step.wheel_angle_rad.zip_with(step.wheel_rad, |angle, turned| angle + 0.5 * turned),
             turned_rad: step.wheel_rad,
             run_s: step.t_s + half_s,
             session_s: self.session_s + step.t_s + half_s,
             session_m: self.session_m,
-            since_reversal_m: self.reversals.after(distance_m),
+            since_reversal_m,
+            wheel_since_reversal_m,
+            last_turn,
             x_m: step.world_from_body.x_m,
             y_m: step.world_from_body.y_m,
             of_run: &self.of_run,
@@ -331,12 +337,15 @@ fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> 
         wheel_m_s2: Wheels::both(0.0),
         own_m_s: 0.0,
         own_m_s2: 0.0,
+        own_since_reversal_m: [f64::INFINITY; 2],
         wheel_rad: Wheels::both(0.0),
         turned_rad: Wheels::both(0.0),
         run_s,
         session_s: 0.0,
         session_m: 0.0,
         since_reversal_m: f64::INFINITY,
+        wheel_since_reversal_m: Wheels::both([f64::INFINITY; 2]),
+        last_turn: 0.0,
         x_m: 0.0,
         y_m: 0.0,
         of_run: &NONE,
@@ -359,13 +368,14 @@ fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> 
 #[derive(Clone)]
 struct Recorded {
     of: Sparse,
+    own: [TermParameter; 1],
     past: Past,
 }
 
 /// What moments need to know of the intervals before.
 #[derive(Debug, Clone, Copy)]
 struct Past {
-    reversals: Reversals,
+    memory: Memory,
     row: Option<Row>,
 }
 
@@ -377,20 +387,21 @@ struct Row {
     wheel_m_s2: Wheels<f64>,
 }
 
-/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second.
-const fn parameter(channel: Channel) -> TermParameter {
-    let unit = match channel {
+/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second; more of what fades after a reversal.
+fn parameter(of: &Sparse) -> TermParameter {
+    let unit = match of.channel {
         Channel::Yaw => "rad/s",
         Channel::SeenAlong | Channel::SeenAcross => "m",
         Channel::SeenHeading => "rad",
         Channel::SeenLate => "s",
         _ => "m/s",
     };
-    TermParameter { name: "coefficient", unit, plausible: 0.02 }
+    let faded: f64 = of.covariates.iter().map(Covariate::fades).product();
+    TermParameter { name: "coefficient", unit, plausible: 0.02 * faded }
 }
 
 impl Past {
-    const NONE: Self = Self { reversals: Reversals::NONE, row: None };
+    const NONE: Self = Self { memory: Memory::NONE, row: None };
 
     /// The middle of an interval that takes time.
     fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
@@ -411,6 +422,8 @@ impl Past {
         self.row = Some(row);
         let wheel_m_s2 = row.wheel_m_s2;
         let Wheels { left, right } = wheel_m_s2;
+        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
+            self.memory.after(interval.travel_m, distance_m, turn_rad);
         Moment {
             v_m_s,
             omega_rad_s,
@@ -421,12 +434,15 @@ impl Past {
             wheel_m_s2,
             own_m_s: 0.0,
             own_m_s2: 0.0,
+            own_since_reversal_m: [f64::INFINITY; 2],
             wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
             turned_rad: interval.turned_rad,
             run_s: interval.t_s,
             session_s: interval.session_s(),
             session_m: interval.session_m,
-            since_reversal_m: self.reversals.after(distance_m),
+            since_reversal_m,
+            wheel_since_reversal_m,
+            last_turn,
             x_m: interval.world_from_body.x_m,
             y_m: interval.world_from_body.y_m,
             of_run: &interval.run.covariates,
@@ -436,21 +452,13 @@ impl Past {
 
 impl Recorded {
     fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), past: Past::NONE }
+        Self { of: of.clone(), own: [parameter(of)], past: Past::NONE }
     }
 }
 
 impl ModelTerm for Recorded {
-    fn parameters(&self) -> &'static [TermParameter] {
-        const EACH: [[TermParameter; 1]; 5] = [
-            [parameter(Channel::Along)],
-            [parameter(Channel::Yaw)],
-            [parameter(Channel::SeenAlong)],
-            [parameter(Channel::SeenHeading)],
-            [parameter(Channel::SeenLate)],
-        ];
-        let unit = parameter(self.of.channel).unit;
-        EACH.iter().find(|[of]| of.unit == unit).map_or(&EACH[0], |own| own)
+    fn parameters(&self) -> &[TermParameter] {
+        &self.own
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -482,20 +490,22 @@ const ROW_SHARE: f64 = 0.02;
 
 /// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is false. Which speed it goes with is not that by the same stamps.
 #[derive(Clone)]
-struct OfRows(Box<dyn ModelTerm>);
+struct OfRows {
+    of: Box<dyn ModelTerm>,
+    own: [TermParameter; 1],
+}
 
 impl ModelTerm for OfRows {
-    fn parameters(&self) -> &'static [TermParameter] {
-        const OWN: [TermParameter; 1] = [parameter(Channel::Wheels)];
-        &OWN
+    fn parameters(&self) -> &[TermParameter] {
+        &self.own
     }
 
     fn restart(&mut self, run: &RunInfo) {
-        self.0.restart(run);
+        self.of.restart(run);
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        self.0.motion(interval, gradient);
+        self.of.motion(interval, gradient);
         let Pose { x_m, y_m, theta_rad } = gradient[0];
         gradient[0] = Pose::new(x_m / ROW_SHARE, y_m / ROW_SHARE, theta_rad / ROW_SHARE);
     }

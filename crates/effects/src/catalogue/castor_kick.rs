@@ -9,6 +9,7 @@ use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::covariate::{LastSide, Reversals, TURN_RAD};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
@@ -34,7 +35,7 @@ impl PhysicalEffect for CastorKick {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, leant_rad: 0.0, sense: 0.0, swung_m: 0.0, ahead: None, since_m: None }))
+        Some(Box::new(State { size: *self, flips: Flips::NONE }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -46,21 +47,28 @@ impl PhysicalEffect for CastorKick {
     }
 }
 
-/// A turn that makes the castor lean: what straight driving wanders by is far less.
-const LEAN_RAD: f64 = 0.03;
+/// Where a castor is in its flip.
+#[derive(Debug, Clone, Copy)]
+struct Flips {
+    /// A turn makes it lean.
+    leans: LastSide,
+    reversals: Reversals,
+}
 
-/// Way back that is a reversal: the last counts before a standstill are far less.
-const REVERSAL_M: f64 = 1e-3;
+impl Flips {
+    const NONE: Self = Self { leans: LastSide::beyond(TURN_RAD), reversals: Reversals::NONE };
+
+    /// The share of a kick that a way and a turn bring, with the sense of the last turn.
+    fn after(&mut self, way_m: f64, turn_rad: f64, decay_m: f64) -> f64 {
+        let to_m = self.reversals.after(way_m);
+        let left = |way_m: f64| (-way_m / decay_m).exp();
+        self.leans.after(turn_rad) * (left(to_m - way_m.abs()) - left(to_m))
+    }
+}
 
 struct State {
     size: CastorKick,
-    leant_rad: f64,
-    /// Of the last turn: 1, −1, or 0 before any.
-    sense: f64,
-    swung_m: f64,
-    ahead: Option<bool>,
-    /// Way since the last reversal, where there was one.
-    since_m: Option<f64>,
+    flips: Flips,
 }
 
 impl Forward for State {
@@ -69,31 +77,13 @@ impl Forward for State {
     }
 
     fn start_run(&mut self, _stream: Stream) {
-        *self = Self { size: self.size, leant_rad: 0.0, sense: 0.0, swung_m: 0.0, ahead: None, since_m: None };
+        self.flips = Flips::NONE;
     }
 
     fn floor(&mut self, step: &mut Step) {
         let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
-        self.leant_rad += (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
-        if self.leant_rad.abs() > LEAN_RAD {
-            self.sense = self.leant_rad.signum();
-            self.leant_rad = self.sense * LEAN_RAD;
-        }
-        self.swung_m += way_m;
-        if self.swung_m.abs() > 0.5 * REVERSAL_M {
-            let ahead = self.swung_m > 0.0;
-            self.swung_m = 0.5 * REVERSAL_M * self.swung_m.signum();
-            if self.ahead.is_some_and(|before| before != ahead) {
-                self.since_m = Some(0.0);
-            }
-            self.ahead = Some(ahead);
-        }
-        if let Some(since_m) = &mut self.since_m {
-            let left = |way_m: f64| (-way_m / self.size.decay_m).exp();
-            let after_m = *since_m + way_m.abs();
-            step.extra_turn_rad += self.size.kick_rad * self.sense * (left(*since_m) - left(after_m));
-            *since_m = after_m;
-        }
+        let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
+        step.extra_turn_rad += self.size.kick_rad * self.flips.after(way_m, turn_rad, self.size.decay_m);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -105,28 +95,13 @@ impl Forward for State {
 #[derive(Clone)]
 struct Term {
     decay_m: f64,
-    /// Signed way and turn, each held within a band that its reversals must cross.
-    way_m: f64,
-    turn_rad: f64,
-    way_sense: f64,
-    turn_sense: f64,
-    /// What is left of the kick, 1 at the reversal.
-    left: f64,
+    flips: Flips,
 }
 
 impl Term {
     const fn new(decay_m: f64) -> Self {
-        Self { decay_m, way_m: 0.0, turn_rad: 0.0, way_sense: 0.0, turn_sense: 0.0, left: 0.0 }
+        Self { decay_m, flips: Flips::NONE }
     }
-}
-
-/// The side of a band at whose edge a drifting value is held, or the one before while it is inside.
-fn side(value: &mut f64, half_width: f64, before: f64) -> f64 {
-    if value.abs() < half_width {
-        return before;
-    }
-    *value = value.clamp(-half_width, half_width);
-    value.signum()
 }
 
 impl ModelTerm for Term {
@@ -141,17 +116,7 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let increment = interval.increment();
-        self.turn_rad += increment.turn_rad;
-        self.turn_sense = side(&mut self.turn_rad, LEAN_RAD, self.turn_sense);
-        self.way_m += increment.distance_m;
-        let way_sense = side(&mut self.way_m, 0.5 * REVERSAL_M, self.way_sense);
-        if way_sense * self.way_sense < 0.0 {
-            self.left = 1.0;
-        }
-        self.way_sense = way_sense;
-        let faded = self.left * (-increment.distance_m.abs() / self.decay_m).exp();
-        gradient[0].theta_rad = self.turn_sense * (self.left - faded);
-        self.left = faded;
+        gradient[0].theta_rad = self.flips.after(increment.distance_m, increment.turn_rad, self.decay_m);
     }
 }
 

@@ -46,7 +46,7 @@ impl Together {
             products: vec![Wheels::both(0.0); factors.len()],
             factors,
             on,
-            parameters: all.iter().map(|sparse| parameter(sparse.channel)).collect(),
+            parameters: all.iter().map(parameter).collect(),
         }
     }
 

@@ -1,0 +1,135 @@
+//! How well sizes are known: by the likelihood, by how runs differ, by what is not known of shapes, and by what is not known of the names beside them.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::candidate::Choice;
+use crate::gain::LEAST_RUNS;
+use crate::scan::{Projection, freedom, inverse, principal, total};
+use crate::search::{Extended, Name, chance};
+use crate::statistics::{p_of_statistic, p_of_student, student_95};
+
+/// A test of one choice of a fitted model.
+#[derive(Debug, Clone)]
+pub(crate) struct Test {
+    pub(crate) statistic: f64,
+    pub(crate) p_value: f64,
+    /// Value and standard deviation of each parameter.
+    pub(crate) sizes: Vec<(f64, f64)>,
+}
+
+/// The test of a choice in its fitted model, and along its principal directions in units of the plausible: information and size.
+pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, Vec<(f64, f64)>)> {
+    let evidence = total(&extended.fit.fit.pass.runs)?;
+    let parameters = extended.choices[choice].parameters();
+    let own = extended.columns(choice);
+    let projected = Projection::beside(&extended.fit, &evidence, &own)?.of_columns(&evidence, &own);
+    let sizes = extended.sizes(choice);
+    let gradient = &projected.information * &sizes;
+    let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
+        .into_iter()
+        .filter(|(value, _)| *value >= 1.0)
+        .map(|(value, gradient)| (value, gradient / value))
+        .collect();
+    let freedom = freedom(&extended.fit, &evidence);
+    let shrink = freedom / evidence.count.max(1.0);
+    let statistic = directions.iter().map(|(value, size)| shrink * value * size * size).sum();
+    let covariance = inverse(&projected.information);
+    let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
+    let test = Test {
+        statistic,
+        p_value: p_of_statistic(statistic, directions.len(), freedom),
+        sizes: sizes.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
+    };
+    Some((test, directions))
+}
+
+/// Chance at which a size that is none passes for one over the runs, once it has passed over the looks.
+pub(crate) const RUNS_LEVEL: f64 = 0.05;
+
+/// Whether a choice's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
+/// motion, looks that resemble each other), and a likelihood that takes looks for independent believes them too much.
+///
+/// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
+/// Liang & Zeger 1986.
+pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64) -> bool {
+    // Fewer runs do not say how a size differs between them.
+    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    if runs.len() < LEAST_RUNS {
+        return true;
+    }
+    let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
+    let own = extended.columns(choice);
+    let Some(projection) = Projection::beside(&extended.fit, &evidence, &own) else { return false };
+    let information = projection.of_columns(&evidence, &own).information;
+    let sizes = extended.sizes(choice);
+    let stands = sizes.dot(&(&information * &sizes));
+    #[allow(clippy::cast_precision_loss)]
+    let n = runs.len() as f64;
+    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &evidence, &own).dot(&sizes).powi(2)).sum();
+    let t = stands / (squares * n / (n - 1.0)).sqrt();
+    t.is_nan() || p_of_student(t, n - 1.0) < level
+}
+
+/// Standard deviations of a choice's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
+/// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
+fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
+    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    if runs.len() < LEAST_RUNS {
+        return None;
+    }
+    let evidence = total(&extended.fit.fit.pass.runs)?;
+    let own = extended.columns(choice);
+    let projection = Projection::beside(&extended.fit, &evidence, &own)?;
+    let inverse = inverse(&projection.of_columns(&evidence, &own).information)?;
+    let mut scatter = DMatrix::zeros(own.len(), own.len());
+    for run in &runs {
+        let leverage = projection.variance_of(run, &evidence, &own) * &inverse;
+        let others = (DMatrix::identity(own.len(), own.len()) - leverage).try_inverse()?;
+        let without = others * projection.score_of(run, &evidence, &own);
+        scatter += &without * without.transpose();
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let n = runs.len() as f64;
+    let covariance = &inverse * scatter * &inverse * ((n - 1.0) / n);
+    // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
+    let widening = student_95(n - 1.0) / 1.96;
+    Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
+}
+
+/// Variances of sizes by what the choice beside them is not known to be: how far they go where it has another of its names, by the names' chances. For each other choice
+/// of the likeliest model, its sizes in turn.
+pub(crate) fn over_names(place: usize, names: &[(Name, Extended<'_>)]) -> Vec<(Choice, Vec<f64>)> {
+    let Some((top, likeliest)) = names.first() else { return Vec::new() };
+    let weights: Vec<f64> = names.iter().map(|(name, _)| chance(name.log_odds, top.log_odds)).collect();
+    let all: f64 = weights.iter().sum();
+    let variances = |other: usize| {
+        let own = likeliest.sizes(other);
+        let moved = |model: &Extended<'_>| (model.sizes(other) - &own).map(|by| by * by);
+        let sum = names
+            .iter()
+            .zip(&weights)
+            .fold(DVector::zeros(own.len()), |sum, ((_, model), weight)| sum + moved(model) * (weight / all));
+        (likeliest.choices[other].clone(), sum.as_slice().to_vec())
+    };
+    (0..likeliest.choices.len()).filter(|other| *other != place).map(variances).collect()
+}
+
+/// Each choice's test beside the others, and by how much what is not known of shapes and names widens its sizes.
+pub(crate) fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
+    let test = |(choice, wider): (usize, &Vec<f64>)| {
+        let (mut test, _) = examine(model, choice)?;
+        let evidence = total(&model.fit.fit.pass.runs)?;
+        // As wide as Student's quantile is where looks are few.
+        let few = student_95(freedom(&model.fit, &evidence)) / 1.96;
+        test.sizes.iter_mut().for_each(|(_, sigma)| *sigma *= few);
+        // Where runs differ more than looks say, a size is known no better than by the runs.
+        if let Some(over_runs) = over_runs(model, choice) {
+            test.sizes.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
+        }
+        for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
+            *sigma = sigma.hypot(*wider);
+        }
+        Some(test)
+    };
+    wider.iter().enumerate().filter_map(test).collect()
+}
