@@ -443,6 +443,9 @@ mod tests {
                     _ => {}
                 }
                 pose = pose * Increment::from_travel(ground, SEPARATION_M).arc();
+                if cause == "kicked aside" && chance < 0.02 {
+                    pose = pose * Pose::new(0.0, 0.03 * (amount - 0.5), 0.0);
+                }
                 angles.left.push(angles.left[row as usize] + tread.left / 0.08);
                 angles.right.push(angles.right[row as usize] + tread.right / 0.08);
             }
@@ -503,5 +506,11 @@ mod tests {
             assert!(order[0].1 > order[1].1 + 3.0, "{cause} {displaced}: {order:?} {any}");
             assert!(order[0].1 > any - 3.0, "{cause} {displaced}: {order:?} {any}");
         }
+    }
+
+    #[test]
+    fn what_no_name_does_is_likelier_by_any_cause() {
+        let (order, any) = order(&driven("kicked aside", false));
+        assert!(any > order[0].1 + 3.0, "{order:?} {any}");
     }
 }
