@@ -12,6 +12,7 @@ mod diagnosis;
 mod document;
 mod gain;
 mod gross;
+mod jumps;
 mod log_rows;
 mod naming;
 mod plan;

@@ -11,7 +11,7 @@ use crate::checks::Checked;
 use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
 use crate::gross::Fault;
-use crate::search::{FORM_ERROR, Found, Name, chance};
+use crate::search::{FORM_ERROR, Found, LEAST_REACH, Name, chance};
 use crate::sizes::Test;
 use crate::statistics::{of_trials, z_of_p};
 
@@ -303,4 +303,28 @@ pub(crate) fn of_scatter(
         sentence,
         unlisted_term: None,
     })
+}
+
+/// A finding of what only scatters, by names each with the log of its chance of the data: the likeliest first, without those that cannot be it, as another of them or `any`
+/// cause does better. What has no name may be anything, and is as likely as they are on average.
+pub(crate) fn of_likely_scatter(
+    mut likely: Vec<(&'static str, f64)>,
+    any: f64,
+    or_unlisted: bool,
+    p_value: f64,
+    what: &str,
+) -> Option<Finding> {
+    likely.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let best = likely.first().map_or(0.0, |(_, log)| *log);
+    let weights: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
+    #[allow(clippy::cast_precision_loss)] // a handful
+    let named = if or_unlisted { likely.len() as f64 / (likely.len() + 1) as f64 } else { 1.0 };
+    likely.retain(|(_, log)| *log > best.max(any) - LEAST_REACH);
+    let mut ids: Vec<&'static str> = likely.into_iter().map(|(id, _)| id).collect();
+    if or_unlisted {
+        ids.push("unlisted");
+    }
+    let finding = of_scatter(&ids, p_value, BTreeMap::new(), what)?;
+    let probability = if finding.id == "unlisted" { 1.0 } else { (1.0 - UNWRITTEN) * named / weights };
+    Some(Finding { probability, ..finding })
 }

@@ -5,15 +5,14 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::{Chain, Column, NoiseComponent};
-use calib::methods::joint::JointFit;
+use calib::likelihood::{Column, NoiseComponent};
 use effects::Sign;
-use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::candidate::terms;
 use crate::checks::{Follows, what_follows};
 use crate::diagnosis::{Asked, Options, is_covariate};
 use crate::document::{Finding, Value};
+use crate::jumps::{Whose, log_likelihoods};
 use crate::naming;
 use crate::scan::{Projection, total};
 use crate::search::{Extended, cost, count};
@@ -77,11 +76,10 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             Some((p_value, what_follows(&asked.found.model.fit, component), sign))
         });
         if let Some((p_value, follows, sign)) = jump {
-            let ramps = ramps(&asked.found.model.fit);
             let named = |signs: &[Sign]| {
                 let mut ids: Vec<&'static str> = Vec::new();
                 for id in signs.iter().flat_map(|sign| naming::with_sign(*sign, &options.without)) {
-                    if ramps.allow(id) && !ids.contains(&id) {
+                    if !ids.contains(&id) {
                         ids.push(id);
                     }
                 }
@@ -91,16 +89,23 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             let jumps: &[Sign] =
                 if sign == Sign::WayJumps { &[Sign::HeadingJumps, Sign::WayJumps] } else { &[Sign::HeadingJumps] };
             let (stays, errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
-            let (ids, what) = match follows {
-                Follows::TheSame => (stays, "single large errors that stay: the robot jumped"),
-                Follows::TheOpposite => (errs, "single large errors of the instrument, undone in the next look"),
-                // Tails have many causes.
+            let (ids, any, what): (_, &[Whose], _) = match follows {
+                Follows::TheSame => (stays, &[Whose::Robot], "single large errors that stay: the robot jumped"),
+                Follows::TheOpposite => {
+                    (errs, &[Whose::Instrument], "single large errors of the instrument, undone in the next look")
+                }
                 Follows::Nothing => (
-                    [&stays[..], &errs, &["unlisted"]].concat(),
+                    [&stays[..], &errs].concat(),
+                    &[Whose::Robot, Whose::Instrument],
                     "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
                 ),
             };
-            findings.extend(naming::of_scatter(&ids, p_value, BTreeMap::new(), what));
+            // Tails have many causes.
+            let or_unlisted = follows == Follows::Nothing;
+            let likelihoods = log_likelihoods(asked.model(), &ids, any);
+            let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
+            let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
+            findings.extend(naming::of_likely_scatter(likely, any, or_unlisted, p_value, what));
         }
     }
     if let Some((coefficient, sigmas)) = asked.correlated
@@ -118,62 +123,6 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
     }
     findings.extend(turns);
     findings
-}
-
-/// Where large errors lie: at starts and stops, or anywhere.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ramps {
-    /// At starts and stops, far more often than looks do.
-    Mostly,
-    /// As often as looks do, and too many to be there by chance.
-    Anywhere,
-    /// They are too few to tell, or all looks have a start or a stop before them.
-    CannotBeTold,
-}
-
-impl Ramps {
-    /// Whether an effect's errors may lie so: wheels stick and slide where they change their speed, and cables and markers lie anywhere.
-    fn allow(self, id: &str) -> bool {
-        let at_ramps = ["traction_loss", "stick_slip"].contains(&id);
-        match self {
-            Self::Mostly => at_ramps,
-            Self::Anywhere => !at_ramps,
-            Self::CannotBeTold => true,
-        }
-    }
-}
-
-/// An innovation this large, in standard deviations, is one that the tails are made of.
-const LARGE: f64 = 3.5;
-/// Chance at which where large errors lie is told.
-const RAMPS_LEVEL: f64 = 1e-3;
-
-/// Where the large errors of a fit lie, by a binomial test against where its looks are.
-fn ramps(fit: &JointFit<'_>) -> Ramps {
-    let Some(phase) = fit.fit.pass.innovations.first() else { return Ramps::CannotBeTold };
-    let at_ramp: Vec<Vec<bool>> = fit.records.chains.iter().map(Chain::changes_of_speed).collect();
-    let mut all: Vec<(usize, usize)> = phase.iter().map(|innovation| (innovation.chain, innovation.look)).collect();
-    let large = phase.iter().filter(|innovation| innovation.z.abs() > LARGE);
-    let mut large: Vec<(usize, usize)> = large.map(|innovation| (innovation.chain, innovation.look)).collect();
-    large.extend(&fit.fit.pass.outliers);
-    all.extend(&fit.fit.pass.outliers);
-    for looks in [&mut all, &mut large] {
-        looks.sort_unstable();
-        looks.dedup();
-    }
-    let count = |looks: &[(usize, usize)]| looks.iter().filter(|(chain, look)| at_ramp[*chain][*look]).count();
-    #[allow(clippy::cast_precision_loss)]
-    let share = count(&all) as f64 / all.len().max(1) as f64;
-    let (found, of) = (count(&large) as u64, large.len() as u64);
-    let Ok(binomial) = Binomial::new(share, of) else { return Ramps::CannotBeTold };
-    // As many or more by chance; and, were nine of ten of them there, as few or fewer.
-    if found > 0 && binomial.sf(found - 1) < RAMPS_LEVEL {
-        Ramps::Mostly
-    } else if Binomial::new(share.max(0.9), of).is_ok_and(|mostly| mostly.cdf(found) < RAMPS_LEVEL) {
-        Ramps::Anywhere
-    } else {
-        Ramps::CannotBeTold
-    }
 }
 
 /// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.

@@ -78,15 +78,35 @@ impl Chain<'_> {
         self.is_displacement() && next.is_displacement() && self.run == next.run
     }
 
-    /// For each look, whether a wheel changed its speed in the half second before it, by more than a fifth of the fastest that either went in the chain.
+    /// For each look, when the look before was and how far each wheel turned since, radians; for a first look that nothing leads to, nothing.
+    #[must_use]
+    pub fn since_look_before(&self) -> Vec<(f64, Wheels<f64>)> {
+        let start_s = match self.start {
+            Start::Seen => self.looks.first().map(|look| look.t_s),
+            Start::Origin => self.pieces.first().map(|piece| piece.t_s),
+        };
+        let (mut before_s, mut after) = (start_s.unwrap_or(0.0), 0);
+        let of = |look: &Seen| {
+            let turned = self.pieces[after..look.after].iter();
+            let turned = turned.fold(Wheels::both(0.0), |sum, piece| sum.zip_with(piece.wheel_rad, |a, b| a + b));
+            let since = (before_s, turned);
+            (before_s, after) = (look.t_s, look.after);
+            since
+        };
+        self.looks.iter().map(of).collect()
+    }
+
+    /// For each look, whether a wheel changed its speed since the look before, or in the half second before this one where that is longer, by more than a fifth of the
+    /// fastest that either went in the chain.
     #[must_use]
     pub fn changes_of_speed(&self) -> Vec<bool> {
         const BEFORE_S: f64 = 0.5;
         const SHARE: f64 = 0.2;
         let speed = |piece: &Piece| piece.wheel_rad.map(|rad| if piece.dt_s > 0.0 { rad / piece.dt_s } else { 0.0 });
         let fastest = self.pieces.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
-        let changes = |look: &Seen| {
-            let near = self.pieces[..look.after].iter().rev().take_while(|piece| piece.t_s > look.t_s - BEFORE_S);
+        let changes = |(look, (before_s, _)): (&Seen, (f64, Wheels<f64>))| {
+            let from_s = (look.t_s - BEFORE_S).min(before_s);
+            let near = self.pieces[..look.after].iter().rev().take_while(|piece| piece.t_s + piece.dt_s > from_s);
             let (mut low, mut high) = (Wheels::both(f64::INFINITY), Wheels::both(f64::NEG_INFINITY));
             for of in near.map(speed) {
                 low = low.zip_with(of, f64::min);
@@ -95,7 +115,7 @@ impl Chain<'_> {
             let change = high.zip_with(low, |high, low| high - low);
             change.left.max(change.right) > SHARE * fastest
         };
-        self.looks.iter().map(changes).collect()
+        self.looks.iter().zip(self.since_look_before()).map(changes).collect()
     }
 
     /// The pose of the first look, with its time and the pieces before it, and the time and the pose of the last; `None` where a look has no heading.

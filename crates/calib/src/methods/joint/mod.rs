@@ -324,6 +324,13 @@ impl JointFit<'_> {
         Ok(open)
     }
 
+    /// The values found, on every look of the first phase, those that lie far off too; nothing is fitted again.
+    #[must_use]
+    pub fn at_every_look(&self) -> Self {
+        let first = self.selections.iter().take(1).cloned().collect();
+        Self { every_look: true, selections: Arc::new(first), ..self.clone() }
+    }
+
     /// The same fit, looks that lie far off by it left out. `terms` are those of the fit.
     ///
     /// # Errors
