@@ -242,6 +242,14 @@ fn ask<'a>(datasets: &'a [Dataset], base: JointFit<'a>, catalogue: &[Choice], re
         asked.checked = check(&found.model);
         asked.found = found;
     }
+    if asked.lie_far_off()
+        && asked.found.model.choices.is_empty()
+        && asked.goes_with_something()
+        && let Some(unlisted) = Unlisted::among_every_look(&asked.base)
+    {
+        asked.keep(unlisted);
+        return asked;
+    }
     if asked.hold_against_sparse() {
         return asked;
     }

@@ -158,6 +158,16 @@ impl<'a> Extended<'a> {
         self.range(place).map(|k| Column::Term(k).index()).collect()
     }
 
+    /// A model of all looks, without those that lie far off by it. `None` unless by it fewer do than by what was found without it, and what is left out as much as what is
+    /// not is likelier by it, what its trials cost paid.
+    pub(crate) fn closed_again(self, base: &JointFit<'a>, found: &Self, paid: f64) -> Option<Self> {
+        let fit = self.fit.without_outliers(&mut terms(&self.choices)).ok()?;
+        let model = Self { fit, ..self };
+        let outliers = |model: &Self| model.fit.fit.pass.outliers.len();
+        let (before, after) = (evidence(base, found), evidence(base, &model) - paid);
+        (outliers(&model) < outliers(found) && after > before + reach(before)).then_some(model)
+    }
+
     /// A choice's sizes.
     pub(crate) fn sizes(&self, place: usize) -> DVector<f64> {
         DVector::from_column_slice(&self.fit.fit.model.sizes[self.range(place)])
@@ -475,21 +485,23 @@ pub(crate) fn search<'a>(base: &JointFit<'a>, catalogue: &[Choice], level: f64, 
 }
 
 /// What a search among all looks finds, those too that lie far off by the model that was found: a large effect that shows in few looks makes them lie far off, and among
-/// the others it is not seen. It holds if by it they do not lie far off any more, and what is left out as much as what is not is likelier by it.
+/// the others it is not seen.
 pub(crate) fn search_every_look<'a>(base: &JointFit<'a>, found: &Found<'a>, catalogue: &[Choice]) -> Option<Found<'a>> {
     let open = base.with_every_look().ok()?;
     let bold = search(&open, catalogue, SCAN_LEVEL, Known::default());
     if bold.model.choices.is_empty() {
         return None;
     }
-    let fit = bold.model.fit.without_outliers(&mut terms(&bold.model.choices)).ok()?;
-    let model = Extended { fit, choices: bold.model.choices };
-    let outliers = |model: &Extended<'_>| model.fit.fit.pass.outliers.len();
-    let (before, after) = (evidence(base, &found.model), evidence(base, &model));
+    let model = bold.model.closed_again(base, &found.model, 0.0)?;
     let tests = tests_of(&model, &bold.wider);
     let trials = tests_in(&bold.first_scan);
     let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
     let predicts = gain(&Extended::alone(base), &model).map_or(true, |gain| !gain.drifts_more_by(NAMES_DRIFT));
-    let holds = outliers(&model) < outliers(&found.model) && after > before + reach(before) && stands && predicts;
-    holds.then(|| Found { model, tests, first_scan: found.first_scan.clone(), known: found.known.clone(), ..bold })
+    (stands && predicts).then(|| Found {
+        model,
+        tests,
+        first_scan: found.first_scan.clone(),
+        known: found.known.clone(),
+        ..bold
+    })
 }

@@ -58,6 +58,15 @@ impl<'a> Unlisted<'a> {
         all
     }
 
+    /// What is there among all looks, those too that lie far off by a model without anything: what is large in few looks hides them.
+    pub(crate) fn among_every_look(base: &JointFit<'a>) -> Option<Self> {
+        let open = base.with_every_look().ok()?;
+        let first = sparse(&open, &Extended::alone(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
+        let Self { model, tried } = Self::from(&open, first);
+        let paid = tried.iter().map(|(_, trials)| paid(*trials)).sum();
+        Some(Self { model: model.closed_again(base, &Extended::alone(base), paid)?, tried })
+    }
+
     /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
     pub(crate) fn evidence(&self, alone: &JointFit<'a>) -> f64 {
         evidence(alone, &self.model) - self.tried.iter().map(|(_, trials)| paid(*trials)).sum::<f64>()
