@@ -215,18 +215,28 @@ impl Term {
         self.holds_m_s2 * left * (gap_m_s / TREMBLES_M_S).clamp(-1.0, 1.0)
     }
 
-    /// The way that a wheel loses in some time, its tread's mean speed being what it is at each instant of it.
-    fn slide(&mut self, side: Side, time_s: f64, tread_m_s: impl Fn(f64) -> f64) -> f64 {
+    /// The way that a wheel loses in some time, from its tread's mean speed on, which changes steadily.
+    fn slide(&mut self, side: Side, time_s: f64, speed_m_s: f64, acceleration_m_s2: f64) -> f64 {
+        let gap_m_s = speed_m_s - self.ground_m_s[side];
+        // While the gap stays within what the tread trembles by, the ground lags it by a time constant: in closed form, and the friction as at rest.
+        let lag_s = TREMBLES_M_S / self.holds_m_s2;
+        let steady_m_s = acceleration_m_s2 * lag_s;
+        if gap_m_s.abs() <= TREMBLES_M_S && steady_m_s.abs() <= TREMBLES_M_S {
+            let left = (-time_s / lag_s).exp();
+            let more_m_s = gap_m_s - steady_m_s;
+            self.ground_m_s[side] = speed_m_s + acceleration_m_s2 * time_s - steady_m_s - more_m_s * left;
+            return steady_m_s * time_s + more_m_s * lag_s * (1.0 - left);
+        }
         let steps = (time_s / STEP_S).ceil().clamp(1.0, MOST_STEPS);
         let step_s = time_s / steps;
         let (mut lost_m, mut passed_s) = (0.0, 0.5 * step_s);
         while passed_s < time_s {
-            let (speed_m_s, before_m_s) = (tread_m_s(passed_s), self.ground_m_s[side]);
-            let gap_m_s = speed_m_s - before_m_s;
+            let (now_m_s, before_m_s) = (speed_m_s + acceleration_m_s2 * passed_s, self.ground_m_s[side]);
+            let gap_m_s = now_m_s - before_m_s;
             let gain_m_s = self.pull_m_s2(gap_m_s) * step_s;
             // In long steps the ground does not overtake the tread.
-            let after_m_s = if gain_m_s.abs() < gap_m_s.abs() { before_m_s + gain_m_s } else { speed_m_s };
-            lost_m += (speed_m_s - 0.5 * (before_m_s + after_m_s)) * step_s;
+            let after_m_s = if gain_m_s.abs() < gap_m_s.abs() { before_m_s + gain_m_s } else { now_m_s };
+            lost_m += (now_m_s - 0.5 * (before_m_s + after_m_s)) * step_s;
             self.ground_m_s[side] = after_m_s;
             passed_s += step_s;
         }
@@ -251,7 +261,8 @@ impl ModelTerm for Term {
         };
         self.row = Some(row);
         let lost_m = Wheels::from_sides(|side| {
-            self.slide(side, interval.dt_s, |t_s| row.speed_at_m_s(side, interval.t_s + t_s))
+            let speed_m_s = row.speed_at_m_s(side, interval.t_s);
+            self.slide(side, interval.dt_s, speed_m_s, row.acceleration_m_s2[side])
         });
         gradient[0] = interval.change(lost_m.map(|lost_m| -lost_m));
     }
