@@ -403,95 +403,6 @@ impl Moment<'_> {
     }
 }
 
-/// The side to which a value that drifts last went: it is held within a band, which it must cross to go to the other side.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LastSide {
-    half_width: f64,
-    within: f64,
-    sense: f64,
-}
-
-impl LastSide {
-    /// Neither yet.
-    pub(crate) const fn beyond(half_width: f64) -> Self {
-        Self { half_width, within: 0.0, sense: 0.0 }
-    }
-
-    /// 1 or −1, once the value has gone this far on, or back where that is negative; 0 before it has first left the band's middle.
-    pub(crate) fn after(&mut self, by: f64) -> f64 {
-        self.within = (self.within + by).clamp(-self.half_width, self.half_width);
-        if self.within.abs() >= self.half_width {
-            self.sense = self.within.signum();
-        }
-        self.sense
-    }
-}
-
-/// Way back that counts as a reversal, metres: more than the counts of a standstill.
-pub(crate) const REVERSAL_M: f64 = 1e-3;
-
-/// A turn that counts, radians: what straight driving wanders by is far less.
-pub(crate) const TURN_RAD: f64 = 0.03;
-
-/// The way since something last went the other way.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Reversals {
-    went: LastSide,
-    since_m: f64,
-}
-
-impl Reversals {
-    /// None yet.
-    pub(crate) const NONE: Self = Self { went: LastSide::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
-
-    /// The way since the last one, after going this far on, or back where that is negative.
-    pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
-        let before = self.went.sense;
-        if self.went.after(distance_m) * before < 0.0 {
-            self.since_m = 0.0;
-        }
-        self.since_m += distance_m.abs();
-        self.since_m
-    }
-}
-
-/// What moments remember of a run.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Memory {
-    centre: Reversals,
-    wheels: Wheels<Reversals>,
-    turned: LastSide,
-}
-
-/// What is remembered at a moment: ways since reversals, and the sense of the last turn.
-pub(crate) struct Remembered {
-    pub(crate) since_reversal_m: f64,
-    pub(crate) wheel_since_reversal_m: Wheels<[f64; 2]>,
-    pub(crate) last_turn: f64,
-}
-
-impl Memory {
-    /// Of a run that begins.
-    pub(crate) const NONE: Self = Self {
-        centre: Reversals::NONE,
-        wheels: Wheels { left: Reversals::NONE, right: Reversals::NONE },
-        turned: LastSide::beyond(TURN_RAD),
-    };
-
-    /// What is remembered once the wheels and the robot have gone on.
-    pub(crate) fn after(&mut self, travel_m: Wheels<f64>, distance_m: f64, turn_rad: f64) -> Remembered {
-        let since_m = Wheels::from_sides(|side| {
-            let to_m = self.wheels[side].after(travel_m[side]);
-            [to_m - travel_m[side].abs(), to_m]
-        });
-        Remembered {
-            since_reversal_m: self.centre.after(distance_m),
-            wheel_since_reversal_m: since_m,
-            last_turn: self.turned.after(turn_rad),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -589,14 +500,5 @@ mod tests {
         assert_eq!((key.as_str(), mean, sd), ("load", 3.0, 2.0));
         assert_eq!(Covariate::of_run("load", &[5.0, 5.0]), None);
         assert_eq!(Covariate::of_run("load", &[]), None);
-    }
-
-    #[test]
-    fn a_reversal_takes_more_than_the_counts_of_a_standstill() {
-        let mut reversals = Reversals::NONE;
-        assert_eq!(reversals.after(0.5), f64::INFINITY);
-        assert_eq!(reversals.after(-0.9 * REVERSAL_M), f64::INFINITY);
-        assert_eq!(reversals.after(-0.2 * REVERSAL_M), 0.2 * REVERSAL_M);
-        assert_eq!(reversals.after(-0.1), 0.2 * REVERSAL_M + 0.1);
     }
 }

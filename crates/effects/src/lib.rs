@@ -12,6 +12,7 @@ mod covariate;
 mod effect;
 mod forward;
 mod hypothesis;
+mod memory;
 mod stream;
 mod term;
 

@@ -15,10 +15,11 @@ use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, Memory, Moment, Remembered};
+use crate::covariate::{Channel, Covariate, Moment};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
+use crate::memory::{Memory, Remembered};
 use together::Together;
 
 mod together;

@@ -9,10 +9,10 @@ use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::covariate::{LastSide, Reversals, TURN_RAD};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::memory::{LastSide, Reversals, TURN_RAD};
 use crate::stream::Stream;
 
 /// Ways that are tried for a flip, metres: 2 to 4 trails of 15 to 60 mm.
