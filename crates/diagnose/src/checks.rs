@@ -71,7 +71,6 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
         ("yaw_rate", vec![vec![AbsYawRate], vec![YawRate, AbsYawRate]]),
         ("speed_times_yaw_rate", vec![vec![Speed, YawRate], vec![AbsSpeed, YawRate]]),
-        ("bend", vec![vec![AbsSpeed, Bend], vec![AbsYawRate, Bend]]),
         ("acceleration", vec![vec![Acceleration], vec![YawAcceleration]]),
         ("heading_in_the_room", vec![vec![AbsSpeed, CosHeading], vec![AbsSpeed, SinHeading]]),
         ("left_wheel_phase", vec![vec![CosPhase(Side::Left, 1)], vec![SinPhase(Side::Left, 1)]]),
@@ -103,6 +102,8 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         }
         Question { name, groups }
     });
+    let bends = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Bend])).to_vec();
+    let of_bends = Question { name: "bend".to_owned(), groups: vec![bends] };
     // A row that is longer than usual by its stamps, and not in truth.
     let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Choice::Sparse(Sparse::of_rows())]] };
     // A cosine and a sine for each number of cycles in a turn.
@@ -111,7 +112,7 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Choice::Sparse).collect()).collect(),
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
-    of_motion.chain([of_rows]).chain(of_wheels).collect()
+    of_motion.chain([of_bends, of_rows]).chain(of_wheels).collect()
 }
 
 /// The covariates of runs that differ between runs.

@@ -97,9 +97,6 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         vec![SessionTime],
         vec![Way],
         vec![SinceReversal],
-        vec![SinceReversal, LastTurn],
-        vec![LastTurn],
-        vec![Bend],
         vec![X],
         vec![Y],
         vec![AbsSpeed, AbsSpeed],
@@ -113,6 +110,11 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         for modulator in modulators.iter().cloned().chain(of_runs(fit).into_iter().map(|covariate| vec![covariate])) {
             products.push(rate.iter().cloned().chain(modulator).collect());
         }
+    }
+    // A turn has the sense of the last one itself.
+    for rate in [Speed, AbsSpeed] {
+        products.push(vec![rate.clone(), LastTurn]);
+        products.push(vec![rate, SinceReversal, LastTurn]);
     }
     for alone in [Acceleration, YawAcceleration] {
         products.push(vec![alone.clone()]);
@@ -129,12 +131,15 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
     let moved = products.into_iter().flat_map(|covariates| {
         Channel::MOTION.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
+    // On a spin a bend is the sense of the turn: of the yaw alone it says what speeds do not.
+    let bends = [AbsSpeed, AbsYawRate]
+        .map(|rate| Choice::Sparse(Sparse { channel: Channel::Yaw, covariates: vec![rate, Bend] }));
     let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
     let seen = seen.into_iter().flat_map(|covariates| {
         Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Choice::Sparse);
-    moved.chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(Sparse::of_rows())]).collect()
+    moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(Sparse::of_rows())]).collect()
 }
 
 /// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.

@@ -174,6 +174,8 @@ struct Term {
     holds_m_s2: f64,
     ground_m_s: Wheels<f64>,
     row: Option<Row>,
+    /// Way that each wheel has lost while the floor had not given way yet: a floor that holds all that is asked of it is none of this effect. `None` once it has.
+    held_m: Option<Wheels<f64>>,
 }
 
 /// The logged interval in force.
@@ -206,7 +208,7 @@ impl Row {
 
 impl Term {
     fn new(holds_m_s2: f64) -> Self {
-        Self { holds_m_s2, ground_m_s: Wheels::both(0.0), row: None }
+        Self { holds_m_s2, ground_m_s: Wheels::both(0.0), row: None, held_m: Some(Wheels::both(0.0)) }
     }
 
     /// How fast the ground gains on a tread that is so much faster, m/s².
@@ -260,10 +262,20 @@ impl ModelTerm for Term {
             last => Row::after(last, interval.row_s, interval.speed_m_s()),
         };
         self.row = Some(row);
-        let lost_m = Wheels::from_sides(|side| {
+        let mut lost_m = Wheels::from_sides(|side| {
             let speed_m_s = row.speed_at_m_s(side, interval.t_s);
             self.slide(side, interval.dt_s, speed_m_s, row.acceleration_m_s2[side])
         });
+        if let Some(held_m) = self.held_m {
+            lost_m = lost_m.zip_with(held_m, |lost_m, held_m| lost_m + held_m);
+            let end_s = interval.t_s + interval.dt_s;
+            let gives_way = |side| (row.speed_at_m_s(side, end_s) - self.ground_m_s[side]).abs() > TREMBLES_M_S;
+            if !Side::BOTH.into_iter().any(gives_way) {
+                self.held_m = Some(lost_m);
+                return;
+            }
+            self.held_m = None;
+        }
         gradient[0] = interval.change(lost_m.map(|lost_m| -lost_m));
     }
 }
