@@ -60,8 +60,6 @@ struct Question {
     groups: Vec<Vec<Choice>>,
 }
 
-const SINCE_REVERSAL: &str = "distance_since_reversal";
-
 fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     use Covariate::{
         AbsSpeed, AbsYawRate, Acceleration, Bend, CosHeading, CosPhase, LastTurn, RunTime, SessionTime, SinHeading,
@@ -78,7 +76,6 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         ("time_in_run", vec![vec![RunTime, Speed], vec![RunTime, YawRate]]),
         ("time_in_session", vec![vec![SessionTime, Speed], vec![SessionTime, YawRate]]),
         ("distance", vec![vec![Way, Speed], vec![Way, YawRate]]),
-        (SINCE_REVERSAL, vec![vec![SinceReversal, Speed], vec![SinceReversal, AbsSpeed]]),
         ("position", vec![vec![X, Speed], vec![Y, Speed], vec![X, YawRate], vec![Y, YawRate]]),
     ]
     .map(|(name, products)| (name.to_owned(), products))
@@ -89,19 +86,20 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     }
     let on = |channel, covariates: &[Covariate]| Choice::Sparse(Sparse { channel, covariates: covariates.to_vec() });
     let on_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
-    // To the side of the last turn, and of each wheel for itself.
-    let of_reversals = || {
-        let of_wheel = [WheelSpeed, WheelSinceReversal];
-        let wheels = [Channel::LeftWheel, Channel::RightWheel].map(|channel| on(channel, &of_wheel));
-        [vec![on(Channel::Yaw, &[SinceReversal, AbsSpeed, LastTurn])], wheels.to_vec()]
+    let of_motion = questions
+        .into_iter()
+        .map(|(name, products)| Question { name, groups: vec![products.iter().flat_map(on_motion).collect()] });
+    // Of the body either way, to the side of the last turn, and of each wheel for itself.
+    let since = [Speed, AbsSpeed].map(|speed| vec![SinceReversal, speed]);
+    let of_wheel = [WheelSpeed, WheelSinceReversal];
+    let of_reversals = Question {
+        name: "distance_since_reversal".to_owned(),
+        groups: vec![
+            since.iter().flat_map(on_motion).collect(),
+            vec![on(Channel::Yaw, &[SinceReversal, AbsSpeed, LastTurn])],
+            [Channel::LeftWheel, Channel::RightWheel].map(|channel| on(channel, &of_wheel)).to_vec(),
+        ],
     };
-    let of_motion = questions.into_iter().map(|(name, products)| {
-        let mut groups = vec![products.iter().flat_map(on_motion).collect()];
-        if name == SINCE_REVERSAL {
-            groups.extend(of_reversals());
-        }
-        Question { name, groups }
-    });
     let bends = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Bend])).to_vec();
     let of_bends = Question { name: "bend".to_owned(), groups: vec![bends] };
     // A row that is longer than usual by its stamps, and not in truth.
@@ -112,7 +110,7 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Choice::Sparse).collect()).collect(),
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
-    of_motion.chain([of_bends, of_rows]).chain(of_wheels).collect()
+    of_motion.chain([of_reversals, of_bends, of_rows]).chain(of_wheels).collect()
 }
 
 /// The covariates of runs that differ between runs.

@@ -116,11 +116,11 @@ pub(crate) fn over_names(place: usize, names: &[(Name, Extended<'_>)]) -> Vec<(C
 
 /// Each choice's test beside the others, and by how much what is not known of shapes and names widens its sizes.
 pub(crate) fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
+    // As wide as Student's quantile is where looks are few.
+    let Some(evidence) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
+    let few = student_95(freedom(&model.fit, &evidence)) / 1.96;
     let test = |(choice, wider): (usize, &Vec<f64>)| {
         let (mut test, _) = examine(model, choice)?;
-        let evidence = total(&model.fit.fit.pass.runs)?;
-        // As wide as Student's quantile is where looks are few.
-        let few = student_95(freedom(&model.fit, &evidence)) / 1.96;
         test.sizes.iter_mut().for_each(|(_, sigma)| *sigma *= few);
         // Where runs differ more than looks say, a size is known no better than by the runs.
         if let Some(over_runs) = over_runs(model, choice) {

@@ -62,14 +62,19 @@ impl<'a> Unlisted<'a> {
     pub(crate) fn among_every_look(base: &JointFit<'a>) -> Option<Self> {
         let open = base.with_every_look().ok()?;
         let first = sparse(&open, &Extended::alone(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
-        let Self { model, tried } = Self::from(&open, first);
-        let paid = tried.iter().map(|(_, trials)| paid(*trials)).sum();
-        Some(Self { model: model.closed_again(base, &Extended::alone(base), paid)?, tried })
+        let all = Self::from(&open, first);
+        let paid = all.paid();
+        Some(Self { model: all.model.closed_again(base, &Extended::alone(base), paid)?, tried: all.tried })
     }
 
     /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
     pub(crate) fn evidence(&self, alone: &JointFit<'a>) -> f64 {
-        evidence(alone, &self.model) - self.tried.iter().map(|(_, trials)| paid(*trials)).sum::<f64>()
+        evidence(alone, &self.model) - self.paid()
+    }
+
+    /// Log of the trials that its sparse terms have to pay for.
+    fn paid(&self) -> f64 {
+        self.tried.iter().map(|(_, trials)| paid(*trials)).sum()
     }
 
     /// The places of its sparse terms among the model's choices, each with its chance and how many were tried.
