@@ -24,13 +24,17 @@ pub(crate) const SCAN_LEVEL: f64 = 0.05 - CHECKS_LEVEL - UNLISTED_LEVEL;
 pub(crate) const MOST_EFFECTS: usize = 3;
 /// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
 const RIVAL_SHARE: f64 = 0.5;
+/// Where that is little, one that explains by less than this less may be: the log of its odds is off by half of it, and the refit may find that much again.
+const RIVAL_DEFICIT: f64 = 12.0;
 /// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
 const MOST_TRIED: usize = 3;
 /// Odometry must drift more with a name by so many times what the 95 % interval reaches before the name is none: within one of it an effect that is there, and does
 /// nothing to the drift, would be refused once in forty times.
 const NAMES_DRIFT: f64 = 2.0;
 /// Most rivals that are refitted.
-const MOST_RIVALS: usize = 6;
+const MOST_RIVALS: usize = 10;
+/// Most further shapes of an effect that are tried where the best one's size is none that it can have.
+const MOST_SHAPES: usize = 3;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
 pub(crate) const LEAST_REACH: f64 = 3.0;
 /// A hypothesis describes its effect to a tenth of its size or so, and errs by the square of that in what it explains.
@@ -101,6 +105,17 @@ pub(crate) struct Entry {
     pub(crate) scored: Scored,
     pub(crate) p_value: f64,
     pub(crate) shapes: usize,
+    /// Each shape that can be seen, with its statistic, that which explains most first.
+    all: Vec<(Choice, f64)>,
+}
+
+impl Entry {
+    /// The shapes beside the best that explain enough, best first.
+    fn others(&self, least: f64) -> impl Iterator<Item = &Choice> {
+        let enough =
+            self.all.iter().filter(move |(choice, statistic)| *choice != self.scored.choice && *statistic >= least);
+        enough.map(|(choice, _)| choice)
+    }
 }
 
 /// The best shape of every effect.
@@ -108,21 +123,24 @@ pub(crate) fn best_shapes(scored: &[Scored]) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     for scored in scored {
         let id = scored.choice.id();
+        let known = entries.iter().position(|entry| entry.scored.choice.id() == id);
+        let at = known.unwrap_or(entries.len());
+        if known.is_none() {
+            entries.push(Entry { p_value: scored.p_value, shapes: 0, scored: scored.clone(), all: Vec::new() });
+        }
+        let entry = &mut entries[at];
+        let best = &entry.scored;
+        if scored.p_value < best.p_value || (scored.p_value == best.p_value && scored.statistic > best.statistic) {
+            entry.scored = scored.clone();
+        }
         // A shape that cannot be seen is no trial.
-        let shown = usize::from(scored.dimensions > 0);
-        match entries.iter_mut().find(|entry| entry.scored.choice.id() == id) {
-            Some(entry) => {
-                entry.shapes += shown;
-                if scored.p_value < entry.scored.p_value
-                    || (scored.p_value == entry.scored.p_value && scored.statistic > entry.scored.statistic)
-                {
-                    entry.scored = scored.clone();
-                }
-            }
-            None => entries.push(Entry { p_value: scored.p_value, shapes: shown, scored: scored.clone() }),
+        if scored.dimensions > 0 {
+            entry.shapes += 1;
+            entry.all.push((scored.choice.clone(), scored.statistic));
         }
     }
     for entry in &mut entries {
+        entry.all.sort_by(|a, b| b.1.total_cmp(&a.1));
         entry.p_value = of_trials(entry.scored.p_value, entry.shapes.max(1));
     }
     entries
@@ -179,7 +197,7 @@ impl<'a> Extended<'a> {
 pub(crate) struct Name {
     pub(crate) choice: Choice,
     pub(crate) log_odds: f64,
-    /// Log likelihood at its best, less what its freedom gains by chance, half of a χ² for each direction.
+    /// Log likelihood at its best, less what its freedom gains by chance: half of a χ² for each direction, and the trials of shapes.
     pub(crate) explains: f64,
     /// Sizes that no effect can have explain more: something is there that looks like this one, and is none of the names.
     pub(crate) outdone: bool,
@@ -323,14 +341,23 @@ fn rivals<'a>(
     entries: &[Entry],
     best: f64,
 ) -> Vec<(Name, Extended<'a>)> {
-    let mut contenders: Vec<&Entry> = entries
-        .iter()
-        .filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= RIVAL_SHARE * best)
-        .collect();
+    let least = (RIVAL_SHARE * best).min(best - RIVAL_DEFICIT);
+    let mut contenders: Vec<&Entry> =
+        entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
     contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
     contenders.truncate(MOST_RIVALS);
-    let contenders: Vec<Choice> = contenders.into_iter().map(|entry| entry.scored.choice.clone()).collect();
-    let fits = known.with_each(base, without, place, &contenders);
+    let best_shapes: Vec<Choice> = contenders.iter().map(|entry| entry.scored.choice.clone()).collect();
+    let mut fits = known.with_each(base, without, place, &best_shapes);
+    // With another shape, about as good, an effect may have a size that can be.
+    let of_id = |fits: &[Extended<'_>], id| {
+        fits.iter().any(|extended| extended.choices[place].id() == id && is_physical(extended, place))
+    };
+    contenders.retain(|entry| !of_id(&fits, entry.scored.choice.id()));
+    for shape in 0..MOST_SHAPES {
+        let next: Vec<Choice> = contenders.iter().filter_map(|entry| entry.others(least).nth(shape)).cloned().collect();
+        fits.extend(known.with_each(base, without, place, &next));
+        contenders.retain(|entry| !of_id(&fits, entry.scored.choice.id()));
+    }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
     let mut named: Vec<(Name, Extended<'a>)> = fits
@@ -346,7 +373,7 @@ fn rivals<'a>(
             let log_odds =
                 directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + weight(directions)) - trials;
             #[allow(clippy::cast_precision_loss)] // a handful
-            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
+            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64 - trials;
             (Name { choice, log_odds, explains, outdone: false }, extended)
         })
         .collect();

@@ -28,7 +28,6 @@ pub(super) fn tell_apart(
     place: usize,
     setting: &Setting,
     manoeuvres: &[Manoeuvre],
-    sure: Sure,
 ) -> Result<NextExperiment, String> {
     let without = without(base, &found.model, place).ok_or("the model without this finding has no fit")?;
     let names: Vec<Choice> = found.names[place].iter().map(|name| name.choice.clone()).collect();
@@ -42,47 +41,14 @@ pub(super) fn tell_apart(
     let candidates: Vec<Candidate> = candidates.collect();
     let before = total(&without.fit.scan(&mut terms(&all)).runs).ok_or("no run has looks")?;
     let frame = Frame::of(&without.fit, &all);
-    let rivals = Rivals::new(frame, candidates, &before, sure).ok_or("the data do not determine the names' sizes")?;
+    let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
     let options = evidences(&without.fit, &all, setting, manoeuvres);
     let id = |k: usize| rivals.candidates[k].choice.id();
 
-    // A pair that nothing tells apart, however long it is driven, must not hide what tells the others apart.
-    let (tellable, never): (Vec<_>, Vec<_>) = rivals.pairs().into_iter().partition(|pair| {
-        options
-            .iter()
-            .any(|option| least_pairs(&rivals, &before, &[*pair], &[option], (setting, setting.minutes)).is_some())
-    });
-    if tellable.is_empty() {
-        let best = options.iter().filter_map(|option| {
-            let most = most_pairs(&[option], setting, setting.minutes);
-            let evidence = with_runs(&before, &[(&option.1, f64::from(most))]);
-            let worst = never.iter().filter_map(|pair| rivals.apart(&evidence, *pair)).map(|apart| apart.sigmas);
-            Some((option.0, worst.min_by(f64::total_cmp)?))
-        });
-        let best = best.max_by(|a, b| a.1.total_cmp(&b.1));
-        let names = listed(&names);
-        return Err(match best {
-            Some((manoeuvre, sigmas)) => format!(
-                "nothing that can be driven {} tells {names} apart: the best, {}, leaves them {sigmas:.1} standard deviations from each other",
-                setting.within,
-                words::manoeuvre(&manoeuvre)
-            ),
-            None => format!("nothing that can be driven {} tells {names} apart", setting.within),
-        });
-    }
-    let (told, (mut parts, mut minutes)) = match quickest(&rivals, &before, &tellable, &options, setting) {
-        Some(plan) => (tellable, plan),
-        None => {
-            let most = most_told(&rivals, &before, &tellable, &options, setting);
-            let plan = quickest(&rivals, &before, &most, &options, setting);
-            (
-                most,
-                plan.ok_or_else(|| {
-                    format!("nothing that can be driven {} tells {} apart", setting.within, listed(&names))
-                })?,
-            )
-        }
-    };
+    let asked = Asked { rivals: &rivals, before: &before, options: &options, setting };
+    // What tells them as likely as not is worth driving where nothing tells them for certain.
+    let plan = [Sure::Certain, Sure::AsNot].into_iter().find_map(|sure| asked.plan(sure));
+    let Plan { sure, told, mut parts, mut minutes } = plan.ok_or_else(|| asked.why_nothing(&names))?;
     let never: Vec<_> = rivals.pairs().into_iter().filter(|pair| !told.contains(pair)).collect();
     if parts.iter().all(|part| part.pairs == 1) && 2.0 * minutes <= setting.minutes {
         // A single run each way leaves nothing to compare it with.
@@ -124,95 +90,155 @@ fn listed(names: &[Choice]) -> String {
     }
 }
 
-/// The pairs of names that the one kind of run tells apart that tells most.
-fn most_told(
-    rivals: &Rivals,
-    before: &Evidence,
-    names: &[(usize, usize)],
-    options: &[Driven],
-    setting: &Setting,
-) -> Vec<(usize, usize)> {
-    let told = |option: &Driven| -> Vec<(usize, usize)> {
-        let pairs = f64::from(most_pairs(&[option], setting, setting.minutes));
-        let evidence = with_runs(before, &[(&option.1, pairs)]);
-        let tells = |pair: &&(usize, usize)| rivals.apart(&evidence, **pair).is_some_and(|apart| apart.margin >= 0.0);
-        names.iter().filter(tells).copied().collect()
-    };
-    // The most probable name counts for more than the others among themselves.
-    options
-        .iter()
-        .map(told)
-        .max_by_key(|told| (told.iter().filter(|(a, _)| *a == 0).count(), told.len()))
-        .unwrap_or_default()
-}
+/// A pair of names, by their places.
+type Pair = (usize, usize);
 
+/// Kinds of run, each with the evidence of a pair of them.
 type Driven = (Manoeuvre, Evidence);
 
-/// How many pairs of runs of each of some kinds the time allows.
-fn most_pairs(kinds: &[&Driven], setting: &Setting, within_min: f64) -> u32 {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
-    let pairs = (within_min / minutes(kinds, setting)).floor() as u32;
-    pairs.min(MOST_PAIRS)
+/// What pairs of names are told apart, how surely, and by what.
+struct Plan {
+    sure: Sure,
+    told: Vec<Pair>,
+    parts: Vec<Part>,
+    minutes: f64,
 }
 
-/// What a pair of runs of each kind takes.
-fn minutes(kinds: &[&Driven], setting: &Setting) -> f64 {
-    kinds.iter().map(|(manoeuvre, _)| manoeuvre.cost(setting).minutes).sum()
+/// Names, what is known of them, and what can be driven.
+struct Asked<'a> {
+    rivals: &'a Rivals,
+    before: &'a Evidence,
+    options: &'a [Driven],
+    setting: &'a Setting,
 }
 
-/// The least number of pairs of runs of each of some kinds that tells all given pairs of names apart.
-fn least_pairs(
-    rivals: &Rivals,
-    before: &Evidence,
-    names: &[(usize, usize)],
-    kinds: &[&Driven],
-    (setting, within_min): (&Setting, f64),
-) -> Option<u32> {
-    let tells = |pairs: u32| {
+impl Asked<'_> {
+    /// For certain, what takes the least time; else what tells them farthest apart within the time.
+    fn plan(&self, sure: Sure) -> Option<Plan> {
+        // A pair that nothing tells apart, however long it is driven, must not hide what tells the others apart.
+        let tellable: Vec<Pair> = self
+            .rivals
+            .pairs()
+            .into_iter()
+            .filter(|pair| {
+                let tells = |option| self.least_pairs(&[*pair], &[option], sure, self.setting.minutes).is_some();
+                self.options.iter().any(tells)
+            })
+            .collect();
+        if tellable.is_empty() {
+            return None;
+        }
+        let of = |told: Vec<Pair>| {
+            let (parts, minutes) = match sure {
+                Sure::Certain => self.quickest(&told)?,
+                Sure::AsNot => self.farthest(&told)?,
+            };
+            Some(Plan { sure, told, parts, minutes })
+        };
+        of(tellable.clone()).or_else(|| of(self.most_told(&tellable, sure)))
+    }
+
+    /// Says that nothing tells names apart, and how far apart the best leaves them.
+    fn why_nothing(&self, names: &[Choice]) -> String {
+        let pairs = self.rivals.pairs();
+        let best = self.options.iter().filter_map(|option| {
+            let evidence = self.after(&[option], self.most_pairs(&[option], self.setting.minutes));
+            let worst = pairs.iter().filter_map(|pair| self.rivals.apart(&evidence, *pair)).map(|apart| apart.sigmas);
+            Some((option.0, worst.min_by(f64::total_cmp)?))
+        });
+        let what = format!("nothing that can be driven {} tells {} apart", self.setting.within, listed(names));
+        match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((manoeuvre, sigmas)) => format!(
+                "{what}: the best, {}, leaves them {sigmas:.1} standard deviations from each other",
+                words::manoeuvre(&manoeuvre)
+            ),
+            None => what,
+        }
+    }
+
+    /// The evidence with so many pairs of runs of each of some kinds.
+    fn after(&self, kinds: &[&Driven], pairs: u32) -> Evidence {
         let added: Vec<(&Evidence, f64)> = kinds.iter().map(|(_, of)| (of, f64::from(pairs))).collect();
-        let evidence = with_runs(before, &added);
-        names.iter().all(|pair| rivals.apart(&evidence, *pair).is_some_and(|apart| apart.margin >= 0.0))
-    };
-    let most = most_pairs(kinds, setting, within_min);
-    // More runs can make a name whose form is not known well enough harder to drop: the margin is not monotonous, and all are tried.
-    (1..=most).find(|pairs| tells(*pairs))
-}
+        with_runs(self.before, &added)
+    }
 
-/// The kind of run, or two kinds at one speed, that takes the least time.
-fn quickest(
-    rivals: &Rivals,
-    before: &Evidence,
-    names: &[(usize, usize)],
-    options: &[Driven],
-    setting: &Setting,
-) -> Option<(Vec<Part>, f64)> {
-    let of = |kinds: &[&Driven], within_min: f64| {
-        let pairs = least_pairs(rivals, before, names, kinds, (setting, within_min))?;
-        let parts = kinds.iter().map(|(manoeuvre, _)| Part { manoeuvre: *manoeuvre, pairs }).collect::<Vec<_>>();
-        Some((parts, f64::from(pairs) * minutes(kinds, setting)))
-    };
-    let mut best: Option<(Vec<Part>, f64)> = None;
-    let mut within_min = setting.minutes;
-    for option in options {
-        if let Some(found) = of(&[option], within_min)
-            && best.as_ref().is_none_or(|best| found.1 < best.1)
-        {
-            within_min = found.1;
-            best = Some(found);
-        }
+    /// How well so many pairs of runs of each of some kinds tell the worst told of some names.
+    fn margin(&self, names: &[Pair], kinds: &[&Driven], pairs: u32, sure: Sure) -> f64 {
+        let evidence = self.after(kinds, pairs);
+        let margin =
+            |pair: &Pair| self.rivals.apart(&evidence, *pair).map_or(f64::NEG_INFINITY, |apart| apart.margin(sure));
+        names.iter().map(margin).fold(f64::INFINITY, f64::min)
     }
-    if best.is_some() {
-        within_min *= WORTH_TWO_KINDS;
+
+    /// The pairs of names that the one kind of run tells apart that tells most.
+    fn most_told(&self, names: &[Pair], sure: Sure) -> Vec<Pair> {
+        let told = |option: &Driven| -> Vec<Pair> {
+            let pairs = self.most_pairs(&[option], self.setting.minutes);
+            names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, sure) >= 0.0).copied().collect()
+        };
+        // The most probable name counts for more than the others among themselves.
+        self.options
+            .iter()
+            .map(told)
+            .max_by_key(|told| (told.iter().filter(|(a, _)| *a == 0).count(), told.len()))
+            .unwrap_or_default()
     }
-    for (k, first) in options.iter().enumerate() {
-        for second in options[k + 1..].iter().filter(|second| second.0.speed_m_s == first.0.speed_m_s) {
-            if let Some(found) = of(&[first, second], within_min)
-                && best.as_ref().is_none_or(|best| found.1 < best.1)
-            {
-                within_min = found.1;
-                best = Some(found);
-            }
-        }
+
+    /// How many pairs of runs of each of some kinds the time allows.
+    fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
+        let pairs = (within_min / self.minutes(kinds)).floor() as u32;
+        pairs.min(MOST_PAIRS)
     }
-    best
+
+    /// What a pair of runs of each kind takes.
+    fn minutes(&self, kinds: &[&Driven]) -> f64 {
+        kinds.iter().map(|(manoeuvre, _)| manoeuvre.cost(self.setting).minutes).sum()
+    }
+
+    /// The least number of pairs of runs of each of some kinds that tells all given pairs of names apart.
+    fn least_pairs(&self, names: &[Pair], kinds: &[&Driven], sure: Sure, within_min: f64) -> Option<u32> {
+        let most = self.most_pairs(kinds, within_min);
+        // More runs can make a name whose form is not known well enough harder to drop: the margin is not monotonous, and all are tried.
+        (1..=most).find(|pairs| self.margin(names, kinds, *pairs, sure) >= 0.0)
+    }
+
+    fn parts(&self, kinds: &[&Driven], pairs: u32) -> (Vec<Part>, f64) {
+        let parts = kinds.iter().map(|(manoeuvre, _)| Part { manoeuvre: *manoeuvre, pairs }).collect();
+        (parts, f64::from(pairs) * self.minutes(kinds))
+    }
+
+    /// Every two kinds at one speed.
+    fn twos(&self) -> impl Iterator<Item = [&Driven; 2]> {
+        self.options.iter().enumerate().flat_map(|(k, first)| {
+            let at_its_speed = |second: &&Driven| second.0.speed_m_s == first.0.speed_m_s;
+            self.options[k + 1..].iter().filter(at_its_speed).map(move |second| [first, second])
+        })
+    }
+
+    /// The kind of run, or two kinds at one speed, that takes the least time.
+    fn quickest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
+        let quicker = |best: Option<(Vec<Part>, f64)>, kinds: &[&Driven], within_min: f64| {
+            let least = best.as_ref().map_or(f64::INFINITY, |(_, minutes)| *minutes);
+            let pairs = self.least_pairs(names, kinds, Sure::Certain, within_min.min(least));
+            pairs.map(|pairs| self.parts(kinds, pairs)).filter(|(_, minutes)| *minutes < least).or(best)
+        };
+        let one = self.options.iter().fold(None, |best, option| quicker(best, &[option], self.setting.minutes));
+        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| WORTH_TWO_KINDS * minutes);
+        self.twos().fold(one, |best, two| quicker(best, &two, within_min))
+    }
+
+    /// The kind of run, or two kinds at one speed, that tells names farthest apart within the time, with even chances at least.
+    fn farthest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
+        let singles = self.options.iter().map(|option| vec![option]);
+        let kinds = singles.chain(self.twos().map(|two| two.to_vec()));
+        let most = |kinds: Vec<&Driven>| {
+            let all = self.most_pairs(&kinds, self.setting.minutes);
+            let of = |pairs: u32| (self.margin(names, &kinds, pairs, Sure::AsNot), pairs);
+            let (margin, pairs) = (1..=all).map(of).max_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some((margin, self.parts(&kinds, pairs)))
+        };
+        let (margin, plan) = kinds.filter_map(most).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (margin >= 0.0).then_some(plan)
+    }
 }

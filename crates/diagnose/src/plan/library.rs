@@ -7,7 +7,7 @@ use dataset::{Cost, Dataset, Displacement, Motion, MotionProgram, Odometry, Prov
 use dataset::{TruthNoise, TruthSample, WheelLog};
 use kinematics::{Increment, Pose, Wheels};
 
-use super::setting::Setting;
+use super::setting::{Reading, Setting};
 
 /// Shares of the largest size and of the top speed that are tried.
 const SIZES: [f64; 2] = [1.0, 0.5];
@@ -93,7 +93,7 @@ struct Stretch {
 fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wheels<f64>) -> Option<Log> {
     let geometry = setting.robot.geometry().ok()?;
     let m_per_rad = geometry.m_per_rad();
-    let even = setting.between_looks_s.is_some();
+    let even = matches!(setting.reading, Reading::Even(_));
     let stands_s = if even { STANDS_S } else { 0.0 };
     let (mut t_s, mut angle_rad) = (stands_s, phase_rad);
     let (mut stretches, mut read_s): (Vec<Stretch>, Vec<f64>) = (Vec::new(), vec![0.0]);
@@ -198,10 +198,11 @@ pub(crate) fn foreseen_run(
 ) -> Option<Run> {
     let log = log(program, setting, speed_m_s, phase_rad)?;
     let end_s = *log.t_s.last()?;
-    let times: Vec<f64> = match (looks, setting.between_looks_s) {
+    let times: Vec<f64> = match (looks, setting.reading) {
         (Looks::At(share), _) => vec![0.0, share * end_s],
-        (Looks::AsSoFar, None) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
-        (Looks::AsSoFar, Some(between_s)) => {
+        (Looks::AsSoFar, Reading::AtEnds) => vec![0.0, end_s],
+        (Looks::AsSoFar, Reading::Standing) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
+        (Looks::AsSoFar, Reading::Even(between_s)) => {
             let mut times: Vec<f64> = std::iter::successors(Some(0.0), |t_s| Some(t_s + between_s))
                 .take_while(|t_s| *t_s < end_s - 0.5 * between_s)
                 .collect();
@@ -318,7 +319,7 @@ mod tests {
             top_speed_m_s: 0.25,
             acceleration_m_s2: 0.5,
             between_rows_s: 0.05,
-            between_looks_s: Some(0.1),
+            reading: Reading::Even(0.1),
             sees_heading: true,
             relative: false,
             twist: false,
@@ -391,12 +392,16 @@ mod tests {
 
     #[test]
     fn what_is_read_standing_is_read_where_the_program_says() {
-        let setting = Setting { between_rows_s: f64::INFINITY, between_looks_s: None, ..setting() };
+        let setting = Setting { between_rows_s: f64::INFINITY, reading: Reading::Standing, ..setting() };
         let circle = &Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 }.programs()[1];
         let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
         let seen: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
         assert_eq!(seen.len(), 3);
         // Counter-clockwise from the origin along x: half a turn later the robot is a diameter to the left.
         assert!(seen[1].0.abs() < 1e-9 && (seen[1].1 - 1.0).abs() < 1e-9, "{seen:?}");
+        // An instrument that saw no more than starts and ends so far sees no more of this run.
+        let setting = Setting { reading: Reading::AtEnds, ..setting };
+        let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
+        assert_eq!(run.truth.len(), 2);
     }
 }

@@ -24,7 +24,6 @@ use library::{Manoeuvre, foreseen, library};
 use setting::Setting;
 pub use setting::{HANDLING_S, Limits, MINUTES, moved_over_m};
 pub use show::{PlanError, ScenarioPlan, plan_scenario};
-use weigh::Sure;
 
 /// Runs of one manoeuvre.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,9 +55,7 @@ pub(crate) fn next_experiment(
     }
     let mut why = None;
     for place in (0..found.names.len()).filter(|place| found.names[*place].len() > 1) {
-        // What tells them as likely as not is worth driving where nothing tells them for certain.
-        let plan = |sure| apart::tell_apart(base, found, place, &setting, &manoeuvres, sure);
-        match plan(Sure::Certain).or_else(|reason| plan(Sure::AsNot).map_err(|_| reason)) {
+        match apart::tell_apart(base, found, place, &setting, &manoeuvres) {
             Ok(next) => return Ok(next),
             Err(reason) => why = Some(reason),
         }

@@ -1,6 +1,6 @@
 //! Within what a next experiment is sought: the robot's pace, how it is logged and seen, the floor, the time.
 
-use dataset::{Dataset, NominalRobot, WheelLog};
+use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Point, Pose, Rule};
 use scenario::{Budget, Instrument, Scenario};
 
@@ -27,6 +27,17 @@ const CLEARANCE: f64 = 1.5;
 /// Time where nobody says how much, minutes.
 pub const MINUTES: f64 = 10.0;
 
+/// When the instrument looks at a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Reading {
+    /// At even intervals of so many seconds.
+    Even(f64),
+    /// The standing robot is read, at the start, where a program says and at the end.
+    Standing,
+    /// The same, at the start and at the end alone.
+    AtEnds,
+}
+
 /// The setting of an experiment.
 #[derive(Debug, Clone)]
 pub(crate) struct Setting {
@@ -34,8 +45,7 @@ pub(crate) struct Setting {
     pub(crate) top_speed_m_s: f64,
     pub(crate) acceleration_m_s2: f64,
     pub(crate) between_rows_s: f64,
-    /// `None`: the standing robot is read, at the start, where a program says and at the end.
-    pub(crate) between_looks_s: Option<f64>,
+    pub(crate) reading: Reading,
     pub(crate) sees_heading: bool,
     /// The instrument sees displacements.
     pub(crate) relative: bool,
@@ -64,13 +74,20 @@ impl Setting {
         };
         let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
         let (minutes, time) = minutes(limits, MINUTES);
-        let looks_s = Some(pace.between_looks_s).filter(|between_s| *between_s <= READ_STANDING_S);
+        let between = |run: &Run| run.truth.len() > 2 || run.displacements.len() > 1 || !run.point_readings.is_empty();
+        let reading = if pace.between_looks_s <= READ_STANDING_S {
+            Reading::Even(pace.between_looks_s)
+        } else if runs().any(between) {
+            Reading::Standing
+        } else {
+            Reading::AtEnds
+        };
         Some(Self {
             robot: first.robot,
             top_speed_m_s: limits.top_speed_m_s.unwrap_or(pace.speed_m_s),
             acceleration_m_s2: ACCELERATION_M_S2,
             between_rows_s: pace.between_rows_s,
-            between_looks_s: looks_s,
+            reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),
             relative: runs().all(|run| run.truth.is_empty() && run.point_readings.is_empty()),
             twist: runs().any(|run| matches!(run.odometry.wheels, WheelLog::Twist { .. })),
@@ -100,7 +117,7 @@ impl Setting {
             acceleration_m_s2: scenario.robot.acceleration_m_s2,
             // Where only looks come at intervals, a row stands beside each.
             between_rows_s: scenario.log.map_or(between_looks_s.unwrap_or(f64::INFINITY), |log| log.interval_s),
-            between_looks_s,
+            reading: between_looks_s.map_or(Reading::Standing, Reading::Even),
             sees_heading: true,
             relative: false,
             twist: false,

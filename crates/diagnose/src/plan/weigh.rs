@@ -29,14 +29,19 @@ pub(crate) enum Sure {
     AsNot,
 }
 
-impl Sure {
-    /// With its chance the log of the odds is not lower than so many standard deviations below its mean.
-    const fn sigmas(self) -> f64 {
-        match self {
-            Self::Certain => 1.645,
-            Self::AsNot => 0.0,
-        }
-    }
+/// With 19 chances in 20 a normal variable is not lower than so many standard deviations below its mean.
+const CERTAIN_SIGMAS: f64 = 1.645;
+
+/// The log of the odds that holds with 19 chances in 20: λ/2 − e√λ at the likeliest of those errors e of the new looks and of √λ, a size not being known
+/// better than by the old data, that are as unlikely as that (the design point of first-order reliability, Hasofer & Lind 1974).
+fn certain_log_odds(root: f64, root_sigma: f64) -> f64 {
+    const STEPS: u32 = 32;
+    let at = |step: u32| {
+        let (looks, size) = (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(STEPS)).sin_cos();
+        let root = (root - CERTAIN_SIGMAS * size * root_sigma).max(0.0);
+        0.5 * root * root - CERTAIN_SIGMAS * looks * root
+    };
+    (0..=STEPS).map(at).fold(f64::INFINITY, f64::min)
 }
 
 /// One of several names, with its columns of the normal equation.
@@ -95,33 +100,51 @@ impl Frame {
     }
 }
 
-/// How well two names are told apart.
+/// How well two names are told apart, of the name that is harder to tell from the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Apart {
-    /// √λ: in standard deviations, of the name that is harder to tell from the other.
+    /// √λ: in standard deviations.
     pub(crate) sigmas: f64,
-    /// By how much the log of the odds, at worst, exceeds what diagnosis asks before it drops a name.
-    pub(crate) margin: f64,
+    /// By how much the log of the odds exceeds what diagnosis asks before it drops a name, with even chances.
+    even: f64,
+    /// The same with 19 chances in 20.
+    certain: f64,
 }
 
-/// Names with the sizes that the old data give them.
+impl Apart {
+    pub(crate) fn margin(&self, sure: Sure) -> f64 {
+        match sure {
+            Sure::Certain => self.certain,
+            Sure::AsNot => self.even,
+        }
+    }
+
+    fn or_worse(self, other: Self) -> Self {
+        Self {
+            sigmas: self.sigmas.min(other.sigmas),
+            even: self.even.min(other.even),
+            certain: self.certain.min(other.certain),
+        }
+    }
+}
+
+/// Names with the sizes that the old data give them, and their covariances.
 pub(crate) struct Rivals {
     pub(crate) frame: Frame,
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) sizes: Vec<DVector<f64>>,
-    pub(crate) sure: Sure,
+    covariances: Vec<DMatrix<f64>>,
 }
 
 impl Rivals {
-    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence, sure: Sure) -> Option<Self> {
-        let sizes = candidates
-            .iter()
-            .map(|candidate| {
-                let (step, _) = frame.estimate(before, &frame.with(candidate))?;
-                Some(step.rows(frame.free.len(), candidate.columns.len()).into_owned())
-            })
-            .collect::<Option<_>>()?;
-        Some(Self { frame, candidates, sizes, sure })
+    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence) -> Option<Self> {
+        let estimate = |candidate: &Candidate| {
+            let (step, covariance) = frame.estimate(before, &frame.with(candidate))?;
+            let (first, own) = (frame.free.len(), candidate.columns.len());
+            Some((step.rows(first, own).into_owned(), covariance.view((first, first), (own, own)).into_owned()))
+        };
+        let (sizes, covariances) = candidates.iter().map(estimate).collect::<Option<_>>()?;
+        Some(Self { frame, candidates, sizes, covariances })
     }
 
     /// Every pair of names.
@@ -136,13 +159,16 @@ impl Rivals {
             let (own, size) = (&self.candidates[a].columns, &self.sizes[a]);
             let left = self.frame.information(evidence, own, &self.frame.with(&self.candidates[b]))?;
             let alone = self.frame.information(evidence, own, &self.frame.free)?;
-            let lambda = (size.transpose() * left * size)[0].max(0.0);
-            let explained = 0.5 * (size.transpose() * alone * size)[0].max(0.0);
-            let margin = 0.5 * lambda - self.sure.sigmas() * lambda.sqrt() - reach(explained);
-            Some(Apart { sigmas: lambda.sqrt(), margin })
+            let gradient = left * size;
+            let lambda = size.dot(&gradient).max(0.0);
+            let root = lambda.sqrt();
+            // √λ = √(sᵀ L s) has the gradient L s / √λ.
+            let root_sigma = (gradient.transpose() * &self.covariances[a] * &gradient)[0].max(0.0).sqrt() / root;
+            let asked = reach(0.5 * (size.transpose() * alone * size)[0].max(0.0));
+            let certain = if root > 0.0 { certain_log_odds(root, root_sigma) } else { 0.0 };
+            Some(Apart { sigmas: root, even: 0.5 * lambda - asked, certain: certain - asked })
         };
-        let (there, back) = (one_way(a, b)?, one_way(b, a)?);
-        Some(if there.margin < back.margin { there } else { back })
+        Some(one_way(a, b)?.or_worse(one_way(b, a)?))
     }
 }
 
@@ -168,6 +194,7 @@ pub(crate) fn with_parts(before: &Evidence, parts: &[Part], options: &[(Manoeuvr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::p_of_z;
 
     /// Evidence of looks whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
     fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
@@ -187,7 +214,7 @@ mod tests {
             columns: vec![column],
         };
         let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
-        Rivals::new(frame, vec![candidate(1), candidate(2)], before, Sure::Certain).expect("determined")
+        Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
     }
 
     /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
@@ -199,13 +226,37 @@ mod tests {
         // Both names say 10, and nothing tells them apart.
         assert!(rivals.sizes.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.sizes);
         let apart = rivals.apart(&before, (0, 1)).expect("determined");
-        assert!(apart.sigmas < 1e-3 && apart.margin < 0.0, "{apart:?}");
+        assert!(apart.sigmas < 1e-3 && apart.margin(Sure::AsNot) < 0.0, "{apart:?}");
         // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
         let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
         let apart = rivals.apart(&after, (0, 1)).expect("determined");
         // To the size of the priors. Without the other name at its best both would leave 100 or more.
         assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
-        assert!((apart.margin - (25.0 - 1.645 * 50_f64.sqrt() - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((apart.margin(Sure::AsNot) - (25.0 - 3.0)).abs() < 1e-3, "{apart:?}");
+        // A size of 10 ± 1 makes √λ uncertain by a tenth.
+        let certain = certain_log_odds(50_f64.sqrt(), 0.1 * 50_f64.sqrt());
+        assert!((apart.margin(Sure::Certain) - (certain - 3.0)).abs() < 1e-3, "{apart:?}");
+    }
+
+    /// The log of the odds, drawn with all that is not known of it, is lower than what holds for certain in one of twenty: integrated over the size. The bound is of first order:
+    /// a third of that either way.
+    #[test]
+    fn what_holds_for_certain_fails_once_in_twenty() {
+        for (root, sigma) in [(4.6, 0.0), (6.0, 0.5), (7.0, 1.5), (12.0, 3.0)] {
+            let bound = certain_log_odds(root, sigma);
+            let steps = (-400..=400).map(|k| f64::from(k) * 0.0125);
+            let (mut below, mut all) = (0.0, 0.0);
+            for z in steps {
+                let (weight, root) = ((-0.5 * z * z).exp(), root + sigma * z);
+                // ½ r² + r e is below the bound where e is below this.
+                let error = (bound - 0.5 * root * root) / root;
+                let chance = if error > 0.0 { 1.0 - 0.5 * p_of_z(error) } else { 0.5 * p_of_z(error) };
+                below += weight * chance;
+                all += weight;
+            }
+            let share = below / all;
+            assert!((0.033..0.067).contains(&share), "{root} ± {sigma}: {share}");
+        }
     }
 }
