@@ -30,6 +30,8 @@ pub(crate) struct Scored {
     pub(crate) dimensions: usize,
     pub(crate) statistic: f64,
     pub(crate) p_value: f64,
+    /// Its sizes as one step of the fit finds them, and their standard deviations; none where they cannot be told from each other.
+    pub(crate) sizes: Vec<(f64, f64)>,
     /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
     pub(crate) log_odds: f64,
 }
@@ -240,6 +242,10 @@ pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice])
         let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
         let log_odds = 0.5 * statistic + log_weight(&explained);
         let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
-        Scored { choice, parameters, information: information.clone(), dimensions, statistic, p_value, log_odds }
+        let sizes = inverse(information).map_or(Vec::new(), |covariance| {
+            let step = -(&covariance * gradient);
+            step.iter().zip(covariance.diagonal().iter()).map(|(size, var)| (*size, var.sqrt())).collect()
+        });
+        Scored { choice, parameters, information: information.clone(), dimensions, statistic, p_value, sizes, log_odds }
     })
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use calib::likelihood::{Column, Evidence, NoiseComponent};
 use calib::methods::joint::JointFit;
+use effects::{Effect, effect_of_sizes};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -24,15 +25,17 @@ pub(crate) const SCAN_LEVEL: f64 = 0.05 - CHECKS_LEVEL - UNLISTED_LEVEL;
 pub(crate) const MOST_EFFECTS: usize = 3;
 /// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
 const RIVAL_SHARE: f64 = 0.5;
-/// Where that is little, one that explains by less than this less may be: the log of its odds is off by half of it, and the refit may find that much again.
-const RIVAL_DEFICIT: f64 = 12.0;
+/// One that explains less by no more than this, or by this share of the best, may come near it: the log of its odds is off by half of it, and the refit may find that much again.
+const NEAR: f64 = 12.0;
+const NEAR_SHARE: f64 = 0.1;
 /// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
 const MOST_TRIED: usize = 3;
 /// Odometry must drift more with a name by so many times what the 95 % interval reaches before the name is none: within one of it an effect that is there, and does
 /// nothing to the drift, would be refused once in forty times.
 const NAMES_DRIFT: f64 = 2.0;
-/// Most rivals that are refitted.
-const MOST_RIVALS: usize = 10;
+/// Most rivals that are refitted, and most with those that may come near the best.
+const MOST_RIVALS: usize = 6;
+const MOST_NEAR: usize = 10;
 /// Most further shapes of an effect that are tried where the best one's size is none that it can have.
 const MOST_SHAPES: usize = 3;
 /// Names within this of the best, in log chance of the data, cannot be told apart: one in twenty.
@@ -63,20 +66,24 @@ fn weight(directions: &[(f64, f64)]) -> f64 {
     log_weight(&directions.iter().map(|(value, size)| (*value, size * size * value)).collect::<Vec<_>>())
 }
 
-/// Whether a choice's sizes make an effect that can be: a share that is lost is no gain. What is within its error of nothing counts as nothing.
+/// Whether a choice's sizes make an effect that can be: a share that is lost is no gain.
 fn is_physical(extended: &Extended<'_>, place: usize) -> bool {
-    let Choice::Effect { id, .. } = &extended.choices[place] else { return true };
-    let Some((test, _)) = examine(extended, place) else { return false };
     let choice = &extended.choices[place];
+    let Choice::Effect { .. } = choice else { return true };
+    let Some((test, _)) = examine(extended, place) else { return false };
+    let scatters = |effect: Effect| scatters_enough(extended, effect.physical().scatter_of_contact_m());
+    effect_of(choice, &test.sizes).is_some_and(scatters)
+}
+
+/// The effect that a choice is with some sizes, each with its standard deviation, if there can be one. What is within its error of nothing counts as nothing.
+fn effect_of(choice: &Choice, sizes: &[(f64, f64)]) -> Option<Effect> {
     let parameters = choice.parameters();
-    let fitted = parameters.iter().zip(&test.sizes);
+    let fitted = parameters.iter().zip(sizes);
     let sizes: Vec<(&str, f64)> = fitted
         .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
         .chain(choice.held())
         .collect();
-    effects::effect_of_sizes(id, &sizes).is_some_and(|effect| {
-        effect.physical().check().is_ok() && scatters_enough(extended, effect.physical().scatter_of_contact_m())
-    })
+    effect_of_sizes(choice.id(), &sizes).filter(|effect| effect.physical().check().is_ok())
 }
 
 /// A scatter of more than so many times a look's variance would be seen in the noise, though it be there in some looks only: a robot creeps or stands in a fourth of them at
@@ -105,16 +112,15 @@ pub(crate) struct Entry {
     pub(crate) scored: Scored,
     pub(crate) p_value: f64,
     pub(crate) shapes: usize,
-    /// Each shape that can be seen, with its statistic, that which explains most first.
-    all: Vec<(Choice, f64)>,
+    /// Shapes that can be seen and that the scan gives a size that can be, with their statistics, that which explains most first.
+    possible: Vec<(Choice, f64)>,
 }
 
 impl Entry {
-    /// The shapes beside the best that explain enough, best first.
+    /// Those of them beside the best shape that explain enough.
     fn others(&self, least: f64) -> impl Iterator<Item = &Choice> {
-        let enough =
-            self.all.iter().filter(move |(choice, statistic)| *choice != self.scored.choice && *statistic >= least);
-        enough.map(|(choice, _)| choice)
+        let is_other = move |(choice, statistic): &&(Choice, f64)| *choice != self.scored.choice && *statistic >= least;
+        self.possible.iter().filter(is_other).map(|(choice, _)| choice)
     }
 }
 
@@ -126,7 +132,7 @@ pub(crate) fn best_shapes(scored: &[Scored]) -> Vec<Entry> {
         let known = entries.iter().position(|entry| entry.scored.choice.id() == id);
         let at = known.unwrap_or(entries.len());
         if known.is_none() {
-            entries.push(Entry { p_value: scored.p_value, shapes: 0, scored: scored.clone(), all: Vec::new() });
+            entries.push(Entry { p_value: scored.p_value, shapes: 0, scored: scored.clone(), possible: Vec::new() });
         }
         let entry = &mut entries[at];
         let best = &entry.scored;
@@ -136,11 +142,13 @@ pub(crate) fn best_shapes(scored: &[Scored]) -> Vec<Entry> {
         // A shape that cannot be seen is no trial.
         if scored.dimensions > 0 {
             entry.shapes += 1;
-            entry.all.push((scored.choice.clone(), scored.statistic));
+            if scored.sizes.is_empty() || effect_of(&scored.choice, &scored.sizes).is_some() {
+                entry.possible.push((scored.choice.clone(), scored.statistic));
+            }
         }
     }
     for entry in &mut entries {
-        entry.all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        entry.possible.sort_by(|a, b| b.1.total_cmp(&a.1));
         entry.p_value = of_trials(entry.scored.p_value, entry.shapes.max(1));
     }
     entries
@@ -197,7 +205,7 @@ impl<'a> Extended<'a> {
 pub(crate) struct Name {
     pub(crate) choice: Choice,
     pub(crate) log_odds: f64,
-    /// Log likelihood at its best, less what its freedom gains by chance: half of a χ² for each direction, and the trials of shapes.
+    /// Log likelihood at its best, less what its freedom gains by chance: half of a χ² for each direction.
     pub(crate) explains: f64,
     /// Sizes that no effect can have explain more: something is there that looks like this one, and is none of the names.
     pub(crate) outdone: bool,
@@ -341,22 +349,29 @@ fn rivals<'a>(
     entries: &[Entry],
     best: f64,
 ) -> Vec<(Name, Extended<'a>)> {
-    let least = (RIVAL_SHARE * best).min(best - RIVAL_DEFICIT);
+    let near = best - NEAR.max(NEAR_SHARE * best);
+    let least = near.min(RIVAL_SHARE * best);
     let mut contenders: Vec<&Entry> =
         entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
     contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
-    contenders.truncate(MOST_RIVALS);
+    let ranked = contenders.into_iter().enumerate();
+    let mut contenders: Vec<&Entry> = ranked
+        .filter(|(rank, entry)| *rank < MOST_RIVALS || entry.scored.statistic >= near)
+        .map(|(_, entry)| entry)
+        .take(MOST_NEAR)
+        .collect();
     let best_shapes: Vec<Choice> = contenders.iter().map(|entry| entry.scored.choice.clone()).collect();
     let mut fits = known.with_each(base, without, place, &best_shapes);
     // With another shape, about as good, an effect may have a size that can be.
-    let of_id = |fits: &[Extended<'_>], id| {
-        fits.iter().any(|extended| extended.choices[place].id() == id && is_physical(extended, place))
+    let can_be = |fits: &[Extended<'_>], entry: &Entry| {
+        let is_its = |extended: &&Extended<'_>| extended.choices[place].id() == entry.scored.choice.id();
+        fits.iter().filter(is_its).any(|extended| is_physical(extended, place))
     };
-    contenders.retain(|entry| !of_id(&fits, entry.scored.choice.id()));
+    contenders.retain(|entry| entry.scored.statistic >= near && !can_be(&fits, entry));
     for shape in 0..MOST_SHAPES {
-        let next: Vec<Choice> = contenders.iter().filter_map(|entry| entry.others(least).nth(shape)).cloned().collect();
+        let next: Vec<Choice> = contenders.iter().filter_map(|entry| entry.others(near).nth(shape)).cloned().collect();
         fits.extend(known.with_each(base, without, place, &next));
-        contenders.retain(|entry| !of_id(&fits, entry.scored.choice.id()));
+        contenders.retain(|entry| !can_be(&fits, entry));
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
@@ -373,7 +388,7 @@ fn rivals<'a>(
             let log_odds =
                 directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + weight(directions)) - trials;
             #[allow(clippy::cast_precision_loss)] // a handful
-            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64 - trials;
+            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
             (Name { choice, log_odds, explains, outdone: false }, extended)
         })
         .collect();

@@ -50,8 +50,6 @@ pub(super) fn predictions(
     parts: &[Part],
     setting: &Setting,
 ) -> Option<(String, Predicted)> {
-    let all: Vec<Choice> =
-        without.choices.iter().cloned().chain(rivals.candidates.iter().map(|name| name.choice.clone())).collect();
     let mut best: Option<(f64, Part, Where, Vec<Seen>)> = None;
     for part in parts {
         let run = Foreseen::new(base, part, setting)?;
@@ -59,8 +57,12 @@ pub(super) fn predictions(
             .candidates
             .iter()
             .map(|candidate| {
-                let columns = rivals.frame.with(candidate);
-                let (step, covariance) = rivals.frame.estimate(before, &columns)?;
+                let (step, covariance) = rivals.frame.estimate(before, &rivals.frame.with(candidate))?;
+                // The other names, which are not there under this one, need not be driven.
+                let all: Vec<Choice> = without.choices.iter().chain([&candidate.choice]).cloned().collect();
+                let own =
+                    (0..candidate.columns.len()).map(|k| Column::Term(without.fit.fit.model.sizes.len() + k).index());
+                let columns: Vec<usize> = rivals.frame.free.iter().copied().chain(own).collect();
                 run.of(&without.fit.fit.model, &all, &columns, (&step, &covariance))
             })
             .collect::<Option<_>>()?;
