@@ -6,6 +6,7 @@
 use calib::likelihood::{Column, Evidence, Model};
 use calib::methods::joint::JointFit;
 use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
 
 use super::library::{Looks, foreseen_run, of_runs, phase_rad};
 use super::setting::Setting;
@@ -162,13 +163,13 @@ impl Foreseen {
             (ends.len() == self.dataset.runs.len()).then(|| ends.iter().map(vector).collect())
         };
         let here = ends(&named)?;
-        let mut slopes: Vec<Vec<Vector3<f64>>> = Vec::new();
-        for (k, column) in columns.iter().enumerate() {
+        let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
             let by = 0.1 * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
-            slopes.push(ends(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect());
-        }
+            Some(ends(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
+        };
+        let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
         let group = PHASES as usize;
         #[allow(clippy::cast_precision_loss)]
         let n = group as f64;
