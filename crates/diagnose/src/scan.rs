@@ -180,8 +180,9 @@ pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
     (evidence.count - columns).max(1.0)
 }
 
-/// Most columns of a pass over a scan's candidates: a whole number of products on three channels. A normal equation grows with the square of the columns.
-const MOST_COLUMNS: usize = 63;
+/// Most columns of a pass over a scan's candidates: a whole number of products on three channels. What every pass does for itself, the filter and the model's own terms, is done
+/// again for so many, and a state of so many stays near the processor.
+const MOST_COLUMNS: usize = 126;
 
 /// Asks something of parts of a scan, each of candidates that are tested as a whole beside the choices that the fit already has: of its candidates, what the fit leaves of
 /// their columns, and the evidence. Nothing where the fit's own columns are not determined.
