@@ -170,15 +170,16 @@ impl Asked<'_> {
         names.iter().map(margin).fold(f64::INFINITY, f64::min)
     }
 
-    /// The pairs of names that the one kind of run tells apart that tells most.
+    /// The pairs of names that the one kind of run, driven so many times, tells apart that tells most. Of names that some kind tells apart, at least one.
     fn most_told(&self, names: &[Pair], sure: Sure) -> Vec<Pair> {
-        let told = |option: &Driven| -> Vec<Pair> {
-            let pairs = self.most_pairs(&[option], self.setting.minutes);
+        let told = |(option, pairs): (&Driven, u32)| -> Vec<Pair> {
             names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, sure) >= 0.0).copied().collect()
         };
+        let runs = |option| (1..=self.most_pairs(&[option], self.setting.minutes)).map(move |pairs| (option, pairs));
         // The most probable name counts for more than the others among themselves.
         self.options
             .iter()
+            .flat_map(runs)
             .map(told)
             .max_by_key(|told| (told.iter().filter(|(a, _)| *a == 0).count(), told.len()))
             .unwrap_or_default()
@@ -240,5 +241,35 @@ impl Asked<'_> {
         };
         let (margin, plan) = kinds.filter_map(most).max_by(|a, b| a.0.total_cmp(&b.0))?;
         (margin >= 0.0).then_some(plan)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::plan::library::library;
+    use crate::plan::library::tests::setting;
+    use crate::plan::weigh::tests::{evidence, rivals};
+
+    /// Where a kind of run says much of what both names have in common, each run raises what is asked of them by more than it tells them apart: few runs tell, many do not.
+    #[test]
+    fn what_few_runs_tell_and_many_do_not_is_told() {
+        // Both names say 10, and differ by λ/2 = 2.5.
+        let apart = 0.05_f64.sqrt();
+        let old = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, apart, 0.0]);
+        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 10.0, 10.0 * apart]));
+        let rivals = rivals(&before);
+        // A pair of runs adds 1 to that, of 3 at least that are asked, and 150 to what both explain, of which a hundredth is asked.
+        let (common, apart) = (3.0_f64.sqrt(), 0.02_f64.sqrt());
+        let new = evidence(&DMatrix::from_row_slice(2, 3, &[0.0, common, common, 0.0, apart, 0.0]), &DVector::zeros(2));
+        let setting = Setting { minutes: 1e4, ..setting() };
+        let options = [(library(&setting)[0], new)];
+        let asked = Asked { rivals: &rivals, before: &before, options: &options, setting: &setting };
+        let margin = |pairs| asked.margin(&[(0, 1)], &[&options[0]], pairs, Sure::AsNot);
+        assert!(margin(1) > 0.0 && margin(MOST_PAIRS) < 0.0, "{} {}", margin(1), margin(MOST_PAIRS));
+        assert_eq!(asked.most_told(&[(0, 1)], Sure::AsNot), [(0, 1)]);
+        assert_eq!(asked.plan(Sure::AsNot).map(|plan| plan.told), Some(vec![(0, 1)]));
     }
 }

@@ -304,10 +304,10 @@ pub(crate) fn of_runs(setting: &Setting, runs: Vec<Run>) -> Dataset {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn setting() -> Setting {
+    pub(in crate::plan) fn setting() -> Setting {
         Setting {
             robot: dataset::NominalRobot {
                 left_wheel_diameter_m: 0.16,

@@ -192,12 +192,12 @@ pub(crate) fn with_parts(before: &Evidence, parts: &[Part], options: &[(Manoeuvr
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::statistics::p_of_z;
 
     /// Evidence of looks whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
-    fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
+    pub(in crate::plan) fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
         Evidence {
             run: (0, 0),
             information: slopes.transpose() * slopes,
@@ -208,7 +208,8 @@ mod tests {
         }
     }
 
-    fn rivals(before: &Evidence) -> Rivals {
+    /// Of two names, columns 1 and 2, beside a nuisance, column 0.
+    pub(in crate::plan) fn rivals(before: &Evidence) -> Rivals {
         let candidate = |column| Candidate {
             choice: Choice::Effect { id: "slip_speed", shape: 0, at: None },
             columns: vec![column],
