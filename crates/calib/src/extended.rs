@@ -4,7 +4,9 @@ use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
 
 use crate::estimate::CalibError;
-use crate::likelihood::{Evidence, Fit, Gate, Instrument, LEAST_SIGMA, Model, NoiseComponent, Piece, Want, pass};
+use crate::likelihood::{
+    Chain, Evidence, Fit, Gate, Instrument, LEAST_SIGMA, Model, NoiseComponent, Piece, Seen, Want, pass,
+};
 use crate::methods::joint::JointFit;
 
 /// How far off dead reckoning ends.
@@ -97,13 +99,29 @@ impl JointFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
         asked: impl Fn((usize, usize)) -> bool,
     ) -> Vec<EndError> {
+        self.reckoned_to(model, terms, asked, |chain| &chain.looks[chain.looks.len() - 1..])
+    }
+
+    /// Dead reckoning of every chain from its first look to each one after it.
+    #[must_use]
+    pub fn reckoned_looks(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+        self.reckoned_to(model, terms, |_| true, |chain| &chain.looks[usize::from(!chain.is_displacement())..])
+    }
+
+    fn reckoned_to<'b>(
+        &'b self,
+        model: &Model,
+        terms: &mut [Box<dyn ModelTerm>],
+        asked: impl Fn((usize, usize)) -> bool,
+        looks: impl Fn(&'b Chain<'b>) -> &'b [Seen],
+    ) -> Vec<EndError> {
         let parameters: usize = terms.iter().map(|term| term.parameters().len()).sum();
         let mut gradient = vec![Pose::IDENTITY; parameters];
         let mut found = Vec::new();
         // Where the displacements of a run have led, the last piece, and the way of the session.
         let mut trail: Option<(Pose, Option<Piece>, f64)> = None;
         for chain in self.records.chains.iter().filter(|chain| asked(chain.run)) {
-            let Some((start, first, last)) = chain.ends() else { continue };
+            let Some((start, first, _)) = chain.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
             let (run_from_chain, mut previous, mut session_m) =
                 trail.take().filter(|_| chain.goes_on).unwrap_or((Pose::IDENTITY, None, chain.session_m));
@@ -135,47 +153,53 @@ impl JointFit<'_> {
             let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
             let mut pose = mounted * add(off, late).inverse();
             let (mut wheel_rad, mut length_m) = (chain.wheel_rad, 0.0);
-            for piece in &chain.pieces[first.1..] {
-                let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                let mut increment = Increment::from_travel(travel_m, model.separation_m);
-                let before = previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
-                let interval = Interval {
-                    t_s: piece.t_s,
-                    dt_s: piece.dt_s,
-                    row_s: piece.row_s,
-                    travel_m,
-                    previous_m: model.m_per_rad.zip_with(before.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
-                    previous_dt_s: before.dt_s,
-                    wheel_separation_m: model.separation_m,
-                    wheel_rad,
-                    turned_rad: piece.wheel_rad,
-                    world_from_body: run_from_chain * pose,
-                    session_m,
-                    run: chain.info,
-                };
-                gradient.fill(Pose::IDENTITY);
-                each(terms, &mut gradient, |term, own| term.motion(&interval, own));
-                let change = weighed(&gradient, &model.sizes);
-                session_m += increment.distance_m.abs();
-                length_m += increment.distance_m.abs();
-                wheel_rad = wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
-                increment.distance_m += change.x_m;
-                increment.turn_rad += change.theta_rad;
-                pose = pose * increment.arc() * Pose::new(0.0, change.y_m, 0.0);
-                previous = Some(*piece);
+            let mut at = first.1;
+            for look in looks(chain) {
+                for piece in &chain.pieces[at..look.after] {
+                    let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+                    let mut increment = Increment::from_travel(travel_m, model.separation_m);
+                    let before = previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
+                    let interval = Interval {
+                        t_s: piece.t_s,
+                        dt_s: piece.dt_s,
+                        row_s: piece.row_s,
+                        travel_m,
+                        previous_m: model.m_per_rad.zip_with(before.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
+                        previous_dt_s: before.dt_s,
+                        wheel_separation_m: model.separation_m,
+                        wheel_rad,
+                        turned_rad: piece.wheel_rad,
+                        world_from_body: run_from_chain * pose,
+                        session_m,
+                        run: chain.info,
+                    };
+                    gradient.fill(Pose::IDENTITY);
+                    each(terms, &mut gradient, |term, own| term.motion(&interval, own));
+                    let change = weighed(&gradient, &model.sizes);
+                    session_m += increment.distance_m.abs();
+                    length_m += increment.distance_m.abs();
+                    wheel_rad = wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
+                    increment.distance_m += change.x_m;
+                    increment.turn_rad += change.theta_rad;
+                    pose = pose * increment.arc() * Pose::new(0.0, change.y_m, 0.0);
+                    previous = Some(*piece);
+                }
+                at = look.after;
+                let Some(theta_rad) = look.theta_rad else { continue };
+                let (off, late) = seen_from(terms, look.t_s, pose, chain.pieces[..at].last(), &mut gradient);
+                let seen = pose * add(off, late) * body_from_sensor;
+                let there = Pose::new(look.x_m, look.y_m, theta_rad);
+                let off_rad = wrap_to_pi(seen.theta_rad - theta_rad);
+                found.push(EndError {
+                    run: chain.run,
+                    position_m: seen.position().distance_m(there.position()),
+                    heading_rad: off_rad.abs(),
+                    length_m,
+                    off: Pose { theta_rad: off_rad, ..there.to(seen) },
+                });
             }
-            let (off, late) = seen_from(terms, last.0, pose, chain.pieces.last(), &mut gradient);
-            let seen = pose * add(off, late) * body_from_sensor;
             trail = Some((run_from_chain * pose * body_from_sensor, previous, session_m));
-            found.push(EndError {
-                run: chain.run,
-                position_m: seen.position().distance_m(last.1.position()),
-                heading_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad).abs(),
-                length_m,
-                off: Pose { theta_rad: wrap_to_pi(seen.theta_rad - last.1.theta_rad), ..last.1.to(seen) },
-            });
         }
-        found.retain(|end| asked(end.run));
         found
     }
 

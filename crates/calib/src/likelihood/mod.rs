@@ -37,6 +37,6 @@ pub(crate) use noise::{LEAST_SIGMA, NoisePrior};
 pub use noise::{Noise, NoiseComponent};
 pub use pass::Pass;
 pub(crate) use pass::pass;
-pub(crate) use records::Piece;
 pub use records::{Chain, Records};
+pub(crate) use records::{Piece, Seen};
 pub use thinning::{Selection, Thinning};

@@ -406,3 +406,23 @@ fn kept_legs_follow_the_model_to_first_order() {
     assert!((ratio / 4.0 - 1.0).abs() < 0.1, "{ratio}");
     assert!(off(1e-3) < 1e-4, "{}", off(1e-3));
 }
+
+#[test]
+fn dead_reckoning_to_every_look_ends_where_a_run_cut_there_ends() {
+    let dataset = dataset_of(1, true);
+    let fit = |dataset: &Dataset| -> Vec<(Pose, f64)> {
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
+        let fit = Joint::unfitted(MODEL, NOISE, &[dataset.session()]);
+        fit.reckoned(&model(), &mut terms).iter().map(|end| (end.off, end.length_m)).collect()
+    };
+    let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
+    let whole = Joint::unfitted(MODEL, NOISE, &[dataset.session()]);
+    let looks = whole.reckoned_looks(&model(), &mut terms);
+    assert_eq!(looks.len(), dataset.runs[0].truth.len() - 1);
+    for (k, look) in looks.iter().enumerate() {
+        let mut cut = dataset.clone();
+        cut.runs[0].truth.truncate(k + 2);
+        // The same steps in the same order: to the last bit.
+        assert_eq!(fit(&cut), [(look.off, look.length_m)], "look {k}");
+    }
+}

@@ -180,11 +180,11 @@ impl Trapezoid {
 
 /// When a run that is not driven yet is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Looks {
+pub(crate) enum Looks<'a> {
     /// As the data's instrument looks.
     AsSoFar,
-    /// At the start and at a share of the run's duration.
-    At(f64),
+    /// At the start and at shares of the run's duration.
+    At(&'a [f64]),
 }
 
 /// A run as it would be recorded if the robot were as the model says and nothing had noise.
@@ -194,12 +194,12 @@ pub(crate) fn foreseen_run(
     speed_m_s: f64,
     model: &Model,
     phase_rad: Wheels<f64>,
-    looks: Looks,
+    looks: Looks<'_>,
 ) -> Option<Run> {
     let log = log(program, setting, speed_m_s, phase_rad)?;
     let end_s = *log.t_s.last()?;
     let times: Vec<f64> = match (looks, setting.reading) {
-        (Looks::At(share), _) => vec![0.0, share * end_s],
+        (Looks::At(shares), _) => std::iter::once(0.0).chain(shares.iter().map(|share| share * end_s)).collect(),
         (Looks::AsSoFar, Reading::AtEnds) => vec![0.0, end_s],
         (Looks::AsSoFar, Reading::Standing) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
         (Looks::AsSoFar, Reading::Even(between_s)) => {

@@ -17,9 +17,9 @@ use crate::document::{Predicted, Value};
 use crate::search::Extended;
 
 /// Instants of a run at which a prediction is made: shares of its duration.
-const INSTANTS: u32 = 12;
+const INSTANTS: usize = 12;
 /// How the wheels stand at the start is not known: so many ways are averaged.
-const PHASES: u32 = 4;
+const PHASES: usize = 4;
 /// A difference of so many standard deviations shows in a single kind of look; with less, only all looks together tell.
 const SHOWS: f64 = 2.0;
 
@@ -78,7 +78,7 @@ pub(super) fn predictions(
                 };
                 let sigmas = told.iter().map(apart).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
-                    let at = Where { direction: place / INSTANTS as usize, share: share(place), component };
+                    let at = Where { direction: place / INSTANTS, share: shares()[place % INSTANTS], component };
                     best = Some((sigmas, *part, at, seen));
                 }
             }
@@ -103,15 +103,23 @@ pub(super) fn predictions(
     Some((sentence, predicted))
 }
 
+/// The instants, as shares of a run's duration.
 #[allow(clippy::cast_precision_loss)] // a dozen
-fn share(place: usize) -> f64 {
-    (place % INSTANTS as usize + 1) as f64 / f64::from(INSTANTS)
+fn shares() -> [f64; INSTANTS] {
+    std::array::from_fn(|instant| (instant + 1) as f64 / INSTANTS as f64)
 }
 
-/// Runs of a part, each seen at its start and at one instant, by direction, instant and phase.
+/// Where the looks of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
+fn looks_at(place: usize) -> impl Iterator<Item = usize> {
+    let (direction, instant) = (place / INSTANTS, place % INSTANTS);
+    (0..PHASES).map(move |phase| (direction * PHASES + phase) * INSTANTS + instant)
+}
+
+/// Runs of a part, each seen at its start and at every instant, by direction and phase.
 struct Foreseen {
     dataset: dataset::Dataset,
     reference: Model,
+    /// What the noise makes of each look after the start.
     noise: Vec<Vector3<f64>>,
     runs: f64,
 }
@@ -119,24 +127,29 @@ struct Foreseen {
 impl Foreseen {
     fn new(base: &JointFit<'_>, part: &Part, setting: &Setting) -> Option<Self> {
         let programs = part.manoeuvre.schedule.with_pairs(1).programs();
-        let mut runs = Vec::new();
-        for program in &programs {
-            for instant in 1..=INSTANTS {
-                for phase in 0..PHASES {
-                    let at = Looks::At(f64::from(instant) / f64::from(INSTANTS));
-                    let model = &base.fit.model;
-                    let phase = phase_rad(phase);
-                    let mut run = foreseen_run(program, setting, part.manoeuvre.speed_m_s, model, phase, at)?;
+        let model = &base.fit.model;
+        let driven = |looks: &[f64]| -> Option<dataset::Dataset> {
+            let mut runs = Vec::new();
+            for program in &programs {
+                for phase in (0..).take(PHASES).map(phase_rad) {
+                    let speed_m_s = part.manoeuvre.speed_m_s;
+                    let mut run = foreseen_run(program, setting, speed_m_s, model, phase, Looks::At(looks))?;
                     run.info.id = format!("{}_{}", program.id, runs.len());
                     runs.push(run);
                 }
             }
-        }
-        let dataset = of_runs(setting, runs);
-        let noise = base.foreseeing(&[dataset.session()]).end_variances();
-        (noise.len() == dataset.runs.len()).then(|| Self {
-            reference: base.fit.model.clone(),
-            noise,
+            Some(of_runs(setting, runs))
+        };
+        // Each look by itself: one before it, which also errs, would say where the robot was.
+        let of_instants: Vec<Vec<Vector3<f64>>> = shares()
+            .iter()
+            .map(|share| Some(base.foreseeing(&[driven(&[*share])?.session()]).end_variances()))
+            .collect::<Option<_>>()?;
+        let dataset = driven(&shares())?;
+        let noise = (0..dataset.runs.len()).flat_map(|run| of_instants.iter().map(move |of| of.get(run).copied()));
+        Some(Self {
+            reference: model.clone(),
+            noise: noise.collect::<Option<_>>()?,
             runs: f64::from(part.pairs),
             dataset,
         })
@@ -157,35 +170,32 @@ impl Foreseen {
         let noise = calib::likelihood::Noise { variance: [1.0; 4] };
         // Only the records matter here: dead reckoning takes the model that it is given.
         let fit = calib::methods::joint::Joint::unfitted(self.reference.clone(), noise, &[self.dataset.session()]);
-        let ends = |model: &Model| -> Option<Vec<Vector3<f64>>> {
-            let ends = fit.reckoned(model, &mut terms(all));
+        let looks = |model: &Model| -> Option<Vec<Vector3<f64>>> {
+            let ends = fit.reckoned_looks(model, &mut terms(all));
             let vector = |end: &calib::EndError| Vector3::new(end.off.x_m, end.off.y_m, end.off.theta_rad);
-            (ends.len() == self.dataset.runs.len()).then(|| ends.iter().map(vector).collect())
+            (ends.len() == self.noise.len()).then(|| ends.iter().map(vector).collect())
         };
-        let here = ends(&named)?;
+        let here = looks(&named)?;
         let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
             let by = 0.1 * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
-            Some(ends(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
+            Some(looks(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
-        let group = PHASES as usize;
         #[allow(clippy::cast_precision_loss)]
-        let n = group as f64;
-        let seen = (0..here.len() / group).map(|place| {
-            let own = place * group..(place + 1) * group;
-            let mean = here[own.clone()].iter().sum::<Vector3<f64>>() / n;
-            let spread =
-                here[own.clone()].iter().map(|end| (end - mean).component_mul(&(end - mean))).sum::<Vector3<f64>>() / n;
-            let noise = self.noise[own.clone()].iter().sum::<Vector3<f64>>() / n;
-            let slope: Vec<Vector3<f64>> =
-                slopes.iter().map(|of| of[own.clone()].iter().sum::<Vector3<f64>>() / n).collect();
+        let mean =
+            |of: &[Vector3<f64>], place| looks_at(place).map(|look| of[look]).sum::<Vector3<f64>>() / PHASES as f64;
+        let seen = (0..here.len() / PHASES).map(|place| {
+            let (own, noise) = (mean(&here, place), mean(&self.noise, place));
+            let square = |end: &Vector3<f64>| (end - own).component_mul(&(end - own));
+            let spread = mean(&here.iter().map(square).collect::<Vec<_>>(), place);
+            let slope: Vec<Vector3<f64>> = slopes.iter().map(|of| mean(of, place)).collect();
             let known_var = Vector3::from_fn(|component, _| {
                 let slope = DVector::from_fn(slope.len(), |k, _| slope[k][component]);
                 (slope.transpose() * covariance * &slope)[0].max(0.0)
             });
-            Seen { mean, known_var, noise_var: (noise + spread) / self.runs }
+            Seen { mean: own, known_var, noise_var: (noise + spread) / self.runs }
         });
         Some(seen.collect())
     }
