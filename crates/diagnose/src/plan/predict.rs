@@ -183,14 +183,15 @@ impl Foreseen {
             Some(looks(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
-        #[allow(clippy::cast_precision_loss)]
-        let mean =
-            |of: &[Vector3<f64>], place| looks_at(place).map(|look| of[look]).sum::<Vector3<f64>>() / PHASES as f64;
+        #[allow(clippy::cast_precision_loss)] // four
+        let mean = |place, of: &dyn Fn(usize) -> Vector3<f64>| {
+            looks_at(place).map(of).sum::<Vector3<f64>>() / PHASES as f64
+        };
         let seen = (0..here.len() / PHASES).map(|place| {
-            let (own, noise) = (mean(&here, place), mean(&self.noise, place));
-            let square = |end: &Vector3<f64>| (end - own).component_mul(&(end - own));
-            let spread = mean(&here.iter().map(square).collect::<Vec<_>>(), place);
-            let slope: Vec<Vector3<f64>> = slopes.iter().map(|of| mean(of, place)).collect();
+            let own = mean(place, &|look| here[look]);
+            let noise = mean(place, &|look| self.noise[look]);
+            let spread = mean(place, &|look| (here[look] - own).component_mul(&(here[look] - own)));
+            let slope: Vec<Vector3<f64>> = slopes.iter().map(|of| mean(place, &|look| of[look])).collect();
             let known_var = Vector3::from_fn(|component, _| {
                 let slope = DVector::from_fn(slope.len(), |k, _| slope[k][component]);
                 (slope.transpose() * covariance * &slope)[0].max(0.0)
