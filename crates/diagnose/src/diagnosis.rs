@@ -361,6 +361,7 @@ fn continued(
     {
         naming::or_incomplete(&mut findings, left);
     }
+    naming::or_faint(&mut findings);
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     let (gain, gain_why_null) = gain_of(&asked.base, model);

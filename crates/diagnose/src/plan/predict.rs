@@ -184,9 +184,8 @@ impl Foreseen {
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
         #[allow(clippy::cast_precision_loss)] // four
-        let mean = |place, of: &dyn Fn(usize) -> Vector3<f64>| {
-            looks_at(place).map(of).sum::<Vector3<f64>>() / PHASES as f64
-        };
+        let mean =
+            |place, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(place).map(of).sum::<Vector3<f64>>() / PHASES as f64;
         let seen = (0..here.len() / PHASES).map(|place| {
             let own = mean(place, &|look| here[look]);
             let noise = mean(place, &|look| self.noise[look]);
