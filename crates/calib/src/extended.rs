@@ -1,11 +1,13 @@
 //! What whoever extends `joint`'s model needs beside the fit: evidence in blocks, and dead reckoning with terms.
 
+use std::sync::Arc;
+
 use dataset::{Interval, Look, ModelTerm};
 use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
 
 use crate::estimate::CalibError;
 use crate::likelihood::{
-    Chain, Evidence, Fit, Gate, Instrument, LEAST_SIGMA, Model, NoiseComponent, Piece, Seen, Want, pass,
+    Chain, Coarse, Evidence, Fit, Gate, Instrument, LEAST_SIGMA, Model, NoiseComponent, Piece, Seen, Want, pass,
 };
 use crate::methods::joint::JointFit;
 
@@ -42,6 +44,25 @@ impl JointFit<'_> {
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
+    }
+
+    /// The same fit on counts put together in steps of up to so long, for scans: what they ask goes over fewer pieces. `terms` are those of the fit. `None` where that
+    /// would leave more than half of the pieces, or by longer steps the fit is another one: looks then lie elsewhere, or a term goes with single rows.
+    #[must_use]
+    pub fn in_longer_steps(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
+        /// Looks that lie elsewhere by δ of their standard deviations make Σδ² at the most of what is not there: less than chance does.
+        const SAME: f64 = 1.0;
+        let Coarse { records, selections } = Coarse::of(&self.records, &self.selections, longest_s)?;
+        let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
+        let of_all = |runs: &[Evidence]| runs.iter().map(|run| (run.count, run.chi_square)).collect::<Vec<_>>();
+        let runs = of_all(&coarse.scan_parts(terms, &[])).into_iter().zip(of_all(&self.fit.pass.runs));
+        let (mut same_looks, mut squares) = (true, 0.0);
+        for ((count, chi_square), (own_count, own_chi_square)) in runs {
+            same_looks &= count == own_count;
+            // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
+            squares += (0.5 * (chi_square - own_chi_square)).powi(2);
+        }
+        (same_looks && squares < SAME).then_some(coarse)
     }
 
     /// How far displacements that follow each other, taken together, lie from dead reckoning with the lengths found, in standard deviations of a look; `None` where

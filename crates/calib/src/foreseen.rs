@@ -6,7 +6,9 @@
 use dataset::Session;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::likelihood::{Column, Fit, Model, NOISE_SETTLED, Noise, NoisePrior, Pass, Records, Selection, Thinning};
+use crate::likelihood::{
+    Column, Ends, Fit, Model, NOISE_SETTLED, Noise, NoisePrior, Pass, Records, Selection, Thinning,
+};
 use crate::methods::joint::{Joint, JointFit};
 
 impl Joint {
@@ -25,7 +27,7 @@ impl Joint {
             unseen: Vec::new(),
             prior: NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default()),
             records: records.into(),
-            noise_settled: NOISE_SETTLED,
+            ends: Ends::NoiseShare(NOISE_SETTLED),
             parts: Vec::new(),
             displacements_follow: false,
             every_look: false,

@@ -37,6 +37,14 @@ impl Choice {
         matches!((self, other), (Self::Effect { id, .. }, Self::Effect { id: of, .. }) if id == of)
     }
 
+    /// Whether it goes by the single rows of the log.
+    pub(crate) fn goes_by_rows(&self) -> bool {
+        match self {
+            Self::Effect { id, .. } => *id == "interval_error",
+            Self::Sparse(sparse) => *sparse == Sparse::of_rows(),
+        }
+    }
+
     /// Its held shape parameters.
     pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
         match self {

@@ -184,6 +184,9 @@ pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
 /// again for so many, and a state of so many stays near the processor.
 const MOST_COLUMNS: usize = 126;
 
+/// What candidates go with hardly changes within such a time, seconds: rows of a fast log are taken together.
+const STEP_S: f64 = 0.05;
+
 /// Asks something of parts of a scan, each of candidates that are tested as a whole beside the choices that the fit already has: of its candidates, what the fit leaves of
 /// their columns, and the evidence. Nothing where the fit's own columns are not determined.
 pub(crate) fn ask<T: Send>(
@@ -191,6 +194,23 @@ pub(crate) fn ask<T: Send>(
     chosen: &[Choice],
     parts: &[&[Choice]],
     answer: impl Fn(&[Choice], &Projected, &Evidence) -> T + Sync,
+) -> Vec<T> {
+    let Some(coarse) = fit.in_longer_steps(&mut terms(chosen), STEP_S) else {
+        return ask_row_by_row(fit, chosen, parts, &answer);
+    };
+    let goes_by_rows = |part: &&[Choice]| part.iter().any(Choice::goes_by_rows);
+    let (by_rows, others): (Vec<&[Choice]>, Vec<&[Choice]>) = parts.iter().partition(|part| goes_by_rows(part));
+    let mut by_rows = ask_row_by_row(fit, chosen, &by_rows, &answer).into_iter();
+    let mut others = ask_row_by_row(&coarse, chosen, &others, &answer).into_iter();
+    parts.iter().filter_map(|part| if goes_by_rows(part) { by_rows.next() } else { others.next() }).collect()
+}
+
+/// The same, all of it by what the fit takes for the log's rows.
+fn ask_row_by_row<T: Send>(
+    fit: &JointFit<'_>,
+    chosen: &[Choice],
+    parts: &[&[Choice]],
+    answer: &(impl Fn(&[Choice], &Projected, &Evidence) -> T + Sync),
 ) -> Vec<T> {
     let mut passes: Vec<Vec<(usize, &[Choice])>> = Vec::new();
     let mut columns = 0;

@@ -17,12 +17,19 @@ use super::thinning::Selection;
 const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 /// A step this small, squared and over its variance, changes nothing that a print shows.
 const SETTLED: f64 = 1e-8;
+/// Nor does one of the noise by less than this share of a variance.
 pub(crate) const NOISE_SETTLED: f64 = 1e-4;
+/// Where models are compared by their likelihoods, steps of the mean and of the noise may end that are this small, squared and over their variance: they change its
+/// logarithm by half of it.
+const MEAN_COST: f64 = 1e-4;
+const NOISE_COST: f64 = 1e-2;
 const LARGEST_NOISE_STEP: f64 = 1.5;
 /// After a step of less than a standard deviation, legs need not be driven again for the next: they follow it to first order.
 const NEAR: f64 = 1.0;
 /// Where steps by kept legs have settled, one by driven legs that is this small, squared and over its variance, is the last: the next would be less by orders.
 const CONFIRMED: f64 = 1e-4;
+/// So near to where they were driven, squared and over the variance, legs are what they would be if they were driven again: at 0.02, driven legs made a step of 5e-8.
+const STILL: f64 = 0.1;
 /// Steps before outliers are told: at least, and at most.
 const LEAST_STARTS: usize = 3;
 const MOST_STARTS: usize = 20;
@@ -31,6 +38,15 @@ const FAR: f64 = 100.0;
 /// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
 const DAMPING: f64 = 1e-7;
 const LEAST_INFORMATION: f64 = 1e-9;
+
+/// Where the steps of a fit end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ends {
+    /// Where they are less than 1e-4 of a standard deviation of the mean, and this share of each variance.
+    NoiseShare(f64),
+    /// Where they change the log of the likelihood by less than 0.005: a variance that hardly matters may be anything.
+    Likelihood,
+}
 
 /// What to fit.
 #[derive(Debug, Clone)]
@@ -41,8 +57,8 @@ pub struct FitOptions {
     pub held: Vec<DVector<f64>>,
     /// The noise stays as it is.
     pub noise_held: bool,
-    /// Steps of the noise end below this share of a variance.
-    pub noise_settled: f64,
+    /// Where steps end.
+    pub ends: Ends,
     /// Most steps.
     pub max_steps: usize,
     /// Looks that lie far off are taken like the others.
@@ -57,7 +73,7 @@ impl FitOptions {
             columns: columns.to_vec(),
             held: Vec::new(),
             noise_held: false,
-            noise_settled: NOISE_SETTLED,
+            ends: Ends::NoiseShare(NOISE_SETTLED),
             max_steps: 60,
             every_look: false,
         }
@@ -181,6 +197,8 @@ pub(crate) fn fit_from(
     let (mut pace, mut acceleration) = (Pace::default(), Acceleration::default());
     let keep = Selection::has_long_legs(selections);
     let (mut kept, mut confirms): (Option<Kept>, bool) = (None, false);
+    // How far the model has come from where legs were kept: squares of its steps.
+    let mut strolled = 0.0;
     for _ in 0..options.max_steps {
         let by_kept = Want { keep: keep && kept.is_none(), by: kept.as_ref(), ..want };
         let mut found = pass(records, selections, &model, &noise, &headings, terms, by_kept);
@@ -201,14 +219,19 @@ pub(crate) fn fit_from(
         };
         let moved = mean.squared + own;
         strayed |= moved > FAR.max(*first.get_or_insert(moved));
-        // By kept legs steps only seem to settle: driven ones have the last word.
-        let settled = if confirms { CONFIRMED } else { SETTLED };
-        confirms = moved < settled && of_noise.by.amax() < options.noise_settled;
-        if confirms && kept.is_none() {
-            (converged, kept) = (true, found.kept.take());
+        // By kept legs steps only seem to settle: driven ones have the last word, where the model has gone on since.
+        strolled = if kept.is_none() { moved } else { strolled + moved };
+        let mean_settled = if confirms { CONFIRMED } else { SETTLED };
+        let settles = match options.ends {
+            Ends::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
+            Ends::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
+        };
+        if settles && (kept.is_none() || strolled < STILL) {
+            (converged, kept) = (true, kept.or(found.kept.take()));
             break;
         }
-        kept = if confirms { None } else { kept.or(found.kept.take()).filter(|_| moved < NEAR) };
+        kept = if settles { None } else { kept.or(found.kept.take()).filter(|_| moved < NEAR) };
+        confirms = settles;
     }
     // The last step was so small that legs follow it as if they were driven.
     let by = kept.as_ref().filter(|_| converged);
@@ -366,6 +389,11 @@ impl NoiseStep {
             }
         }
         Self { by, information }
+    }
+
+    /// Squared length over its variance.
+    fn squared(&self) -> f64 {
+        self.by.dot(&(self.information * self.by))
     }
 }
 

@@ -11,6 +11,7 @@
 
 mod acceleration;
 mod apart;
+mod coarse;
 mod covariances;
 mod derivatives;
 mod evidence;
@@ -26,11 +27,12 @@ mod tests;
 mod thinning;
 
 pub use apart::{Apart, Instrument, Own};
+pub(crate) use coarse::Coarse;
 pub(crate) use evidence::total;
 pub use evidence::{Evidence, Information};
 pub use filter::Innovation;
 pub(crate) use filter::{Gate, Want};
-pub use fit::{Fit, FitError, FitOptions, fit, pass_with_innovations};
+pub use fit::{Ends, Fit, FitError, FitOptions, fit, pass_with_innovations};
 pub(crate) use fit::{From, NOISE_SETTLED, basis, fit_from, pass_settled, start_heading};
 pub use model::{Column, Model};
 pub(crate) use noise::{LEAST_SIGMA, NoisePrior};

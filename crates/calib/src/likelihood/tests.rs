@@ -8,8 +8,8 @@ use kinematics::{Increment, Pose, Wheels};
 
 use super::filter::{Gate, Want};
 use super::pass::{LEGS_AT_ONCE, pass};
-use super::{Column, Model, Noise, Pass, Records, Selection, Thinning};
-use crate::methods::joint::Joint;
+use super::{Coarse, Column, Model, Noise, Pass, Records, Selection, Thinning};
+use crate::methods::joint::{Joint, JointFit};
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
 const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];
@@ -425,4 +425,65 @@ fn dead_reckoning_to_every_look_ends_where_a_run_cut_there_ends() {
         // The same steps in the same order: to the last bit.
         assert_eq!(fit(&cut), [(look.off, look.length_m)], "look {k}");
     }
+}
+
+/// The same drive, logged so many times as often.
+fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
+    let mut finer = dataset.clone();
+    for run in &mut finer.runs {
+        let WheelLog::Angles(angles) = &run.odometry.wheels else { unreachable!("the helper logs angles") };
+        let between = |of: &[f64]| -> Vec<f64> {
+            let steps = of.windows(2).flat_map(|pair| {
+                (0..times).map(|part| pair[0] + (pair[1] - pair[0]) * part as f64 / times as f64).collect::<Vec<_>>()
+            });
+            steps.chain(of.last().copied()).collect()
+        };
+        let (t_s, angles) = (between(&run.odometry.t_s), angles.as_ref().map(|of| between(of)));
+        (run.odometry.t_s, run.odometry.wheels) = (t_s, WheelLog::Angles(angles));
+    }
+    finer
+}
+
+/// Adds way in proportion to the square of an interval's length.
+#[derive(Clone)]
+struct OfRows;
+
+impl ModelTerm for OfRows {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const WAY: TermParameter = TermParameter { name: "way_per_s2", unit: "m/s²", plausible: 1.0 };
+        &[WAY]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(interval.dt_s * interval.dt_s, 0.0, 0.0);
+    }
+}
+
+#[test]
+fn rows_of_one_speed_taken_together_say_what_they_say_one_by_one() {
+    // Ten rows a second, looks every two: five pieces make half a second.
+    let finer = logged_finer(&dataset(true), 10);
+    let session = [finer.session()];
+    let mut fit = Joint::unfitted(MODEL, NOISE, &session);
+    fit.fit.pass = fit.scan(&mut []);
+    let coarse = fit.in_longer_steps(&mut [], 0.5).expect("a fifth of the pieces");
+    let pieces = |fit: &JointFit<'_>| fit.records.chains.iter().map(|chain| chain.pieces.len()).collect::<Vec<_>>();
+    assert_eq!((pieces(&fit), pieces(&coarse)), (vec![120; 2], vec![24; 2]));
+    let close = |a: &Pass, b: &Pass| {
+        let both = a.runs.iter().zip(&b.runs);
+        // Arcs put together from five of a tenth, to rounding.
+        both.map(|(a, b)| (&a.gradient - &b.gradient).norm() / a.gradient.norm()).fold(0.0, f64::max) < 1e-9
+    };
+    assert!(close(&coarse.scan(&mut []), &fit.scan(&mut [])));
+    // Rows of several speeds lead elsewhere.
+    assert!(fit.in_longer_steps(&mut [], 3.0).is_none());
+    // Wheels that turn back, stand or begin are no part of what went before, nor is what comes after a look: of twelve rows three go with the one before.
+    let longest = Coarse::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
+    assert_eq!(longest.chains.iter().map(|chain| chain.pieces.len()).collect::<Vec<_>>(), [9; 2]);
+    assert!(fit.in_longer_steps(&mut [], 0.15).is_none(), "nothing to put together");
+    // A fit with what goes by single rows is another one by longer ones.
+    let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(OfRows)];
+    fit.fit.model.sizes = vec![0.01];
+    fit.fit.pass = fit.scan(&mut by_rows);
+    assert!(fit.in_longer_steps(&mut by_rows, 0.5).is_none());
 }

@@ -20,7 +20,7 @@ use crate::estimate::{
     CalibError, Calibration, Covariance, Method, Mounting, Rejected, drive, nominal, refuse_wrapped_counters,
 };
 use crate::likelihood::{
-    Chain, Column, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning,
+    Chain, Column, Ends, Evidence, Fit, FitError, FitOptions, Gate, Model, Pass, Records, Selection, Thinning,
 };
 use crate::likelihood::{From, NOISE_SETTLED, NoisePrior, Want, basis, fit_from, pass};
 
@@ -45,9 +45,6 @@ pub struct Joint {
 pub const WHITE_BELOW: f64 = 2.935;
 /// How many before an innovation it may resemble.
 const LAGS: i32 = 5;
-/// Steps of a fit's noise end below this share of a variance where models with terms are compared: with a million innovations that is less than one in the log of the
-/// likelihood, and half of the steps.
-const EXTENDED_NOISE_SETTLED: f64 = 1e-3;
 /// In how many phases thinned looks are taken.
 const PHASES: usize = 4;
 /// Thinned further, a run would be little more than its ends.
@@ -82,8 +79,8 @@ pub struct JointFit<'a> {
     /// Directions of the three lengths that the data do not determine, and that stay nominal: rows left, right, separation.
     pub unseen: Vec<DVector<f64>>,
     pub(crate) prior: NoisePrior,
-    /// Steps of the noise end below this share of a variance.
-    pub(crate) noise_settled: f64,
+    /// Where steps of its fits end.
+    pub(crate) ends: Ends,
     /// The evidence of parts, where there are no records to make it of.
     pub(crate) parts: Vec<Evidence>,
     /// Displacements count as neighbours when it is asked whether looks are white.
@@ -103,11 +100,11 @@ impl Joint {
     /// # Errors
     /// [`CalibError`] when the sessions hold no looks, or the fit diverges.
     pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
-        self.fit_until(NOISE_SETTLED, sessions)
+        self.fit_until(Ends::NoiseShare(NOISE_SETTLED), sessions)
     }
 
-    /// The fit, its noise followed until no step of a variance is a larger share of it.
-    fn fit_until<'a>(&self, noise_settled: f64, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
+    /// The fit, its steps followed so far.
+    fn fit_until<'a>(&self, ends: Ends, sessions: &[Session<'a>]) -> Result<JointFit<'a>, CalibError> {
         refuse_wrapped_counters(sessions)?;
         let (_, geometry) = nominal(Self::NAME, sessions)?;
         let records = Records::of(sessions);
@@ -123,7 +120,7 @@ impl Joint {
             start: nominal.clone(),
             nominal,
             prior,
-            noise_settled,
+            ends,
             parts: Vec::new(),
             displacements_follow: self.thin_displacements,
             every_look: false,
@@ -170,9 +167,8 @@ impl JointFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), CalibError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
-        let noise_settled = self.noise_settled;
-        let every_look = self.every_look;
-        let options = FitOptions { held: self.held(), noise_settled, every_look, ..FitOptions::of(&self.columns) };
+        let Self { ends, every_look, .. } = *self;
+        let options = FitOptions { held: self.held(), ends, every_look, ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options).map_err(refused)?;
         Ok(())
     }
@@ -371,8 +367,8 @@ impl JointFit<'_> {
         columns.extend((0..sizes.len()).map(Column::Term));
         let mut from = self.here();
         from.model.sizes = sizes;
-        let noise_settled = self.noise_settled.max(EXTENDED_NOISE_SETTLED);
-        let mut extended = Self { columns, noise_settled, ..self.clone() };
+        // Models with terms are compared by their likelihoods.
+        let mut extended = Self { columns, ends: Ends::Likelihood, ..self.clone() };
         extended.refit_with(Some(from), terms)?;
         Ok(extended)
     }

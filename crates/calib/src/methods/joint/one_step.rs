@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Joint, JointFit, refused};
 use crate::estimate::{CalibError, Calibration, nominal, refuse_wrapped_counters};
-use crate::likelihood::{Apart, Column, Evidence, Instrument, Model, Records, Selection, pass_settled, total};
+use crate::likelihood::{Apart, Column, Ends, Evidence, Instrument, Model, Records, Selection, pass_settled, total};
 
 /// With more rows of odometry and looks together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
 pub const LARGE_ROWS: usize = 500_000;
@@ -109,8 +109,8 @@ impl Joint {
         let pieces = pieces(datasets)?;
         let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
         let (robot, _) = nominal(Self::NAME, &sessions)?;
-        let mut found = self.fit_until(FIRST_NOISE_SETTLED, &sessions)?;
-        found.noise_settled = LAST_NOISE_SETTLED;
+        let mut found = self.fit_until(Ends::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
+        found.ends = Ends::NoiseShare(LAST_NOISE_SETTLED);
         found.refit(Some(found.here()))?;
         let first_looks = found.records.looks();
         let part_blocks = part_blocks(&found, datasets);

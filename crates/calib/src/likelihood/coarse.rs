@@ -1,0 +1,75 @@
+//! Records in longer pieces, for whoever asks what hardly changes from one row of a fast log to the next.
+//!
+//! Rows a hundred times a second are ten to a look that comes ten times a second. A covariate that is a matter of tenths of a second is as well asked of five of
+//! them together; wheels that turn on, each at its own speed, go the same arc but for the square of what their speeds change by in the meantime.
+
+use kinematics::Wheels;
+
+use super::records::{Chain, Piece, Records};
+use super::thinning::{Leg, Selection};
+
+/// Records whose pieces have been put together, and the same looks taken of them.
+pub(crate) struct Coarse<'a> {
+    pub(crate) records: Records<'a>,
+    pub(crate) selections: Vec<Selection>,
+}
+
+impl<'a> Coarse<'a> {
+    /// Pieces of one way of turning put together, up to so long; looks stay where they are. `None` where that leaves more than half of them.
+    pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
+        let mut coarse = records.clone();
+        let (mut before, mut after) = (0, 0);
+        let mut ends = Vec::with_capacity(coarse.chains.len());
+        for chain in &mut coarse.chains {
+            before += chain.pieces.len();
+            ends.push(put_together(chain, longest_s));
+            after += chain.pieces.len();
+        }
+        if 2 * after > before {
+            return None;
+        }
+        let of_chain = |(legs, ends): (&Vec<Leg>, &Vec<usize>)| {
+            let of_leg = |leg: &Leg| Leg { pieces: ends[leg.pieces.start]..ends[leg.pieces.end], ..leg.clone() };
+            legs.iter().map(of_leg).collect()
+        };
+        let selections =
+            selections.iter().map(|of| Selection { legs: of.legs.iter().zip(&ends).map(of_chain).collect() }).collect();
+        Some(Self { records: coarse, selections })
+    }
+}
+
+/// Puts the pieces of a chain together between its looks. How many come to each number of them now: it is told where a look is, and means nothing elsewhere.
+fn put_together(chain: &mut Chain<'_>, longest_s: f64) -> Vec<usize> {
+    let mut ends = Vec::with_capacity(chain.pieces.len() + 1);
+    let mut together: Vec<Piece> = Vec::new();
+    let mut ends_at_look = vec![false; chain.pieces.len() + 1];
+    chain.looks.iter().for_each(|look| ends_at_look[look.after] = true);
+    for (piece, look_before) in chain.pieces.iter().zip(ends_at_look) {
+        ends.push(together.len());
+        match together.last_mut() {
+            Some(last)
+                if !look_before
+                    && last.dt_s + piece.dt_s <= longest_s * (1.0 + 1e-9)
+                    && turns_on(last.wheel_rad, piece.wheel_rad) =>
+            {
+                last.dt_s += piece.dt_s;
+                last.wheel_rad = last.wheel_rad.zip_with(piece.wheel_rad, |last, rad| last + rad);
+                last.row_s[1] = piece.row_s[1];
+            }
+            _ => together.push(*piece),
+        }
+    }
+    ends.push(together.len());
+    together.shrink_to_fit();
+    chain.pieces = together;
+    for look in &mut chain.looks {
+        look.after = ends[look.after];
+    }
+    ends
+}
+
+/// Whether both wheels turn on as they did: neither turns back, begins or stands still.
+fn turns_on(last: Wheels<f64>, next: Wheels<f64>) -> bool {
+    let as_before = last.zip_with(next, |last, next| last * next > 0.0 || (last == 0.0 && next == 0.0));
+    as_before.left && as_before.right
+}
