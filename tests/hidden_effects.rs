@@ -79,6 +79,21 @@ fn a_hidden_effect_is_named() {
     }
 }
 
+#[test]
+fn counts_of_another_number_a_turn_are_named_where_only_the_ends_of_bent_paths_are_seen() {
+    // From end to end it is half as far as the way between.
+    let mut scenario = case("wrong_counts_per_turn", "factor = 4.0");
+    scenario.protocols = vec![Schedule::Circles { radius_m: 0.6, turns: Some(0.6), runs_each_way: 4 }];
+    let mut dataset = simulated(&scenario, 9_100);
+    for run in &mut dataset.runs {
+        let within = 1..run.truth.len() - 1;
+        run.truth.drain(within);
+    }
+    let document = diagnosed(&dataset, &[]);
+    assert_eq!(shown(&document)[0], "wrong_counts_per_turn", "{:?}", shown(&document));
+    assert!((document.findings[0].parameters["factor"].value - 4.0).abs() < 1e-9);
+}
+
 /// Family-wise over all gates at most 5 %. As many nulls as YAIR_NULLS says, 40 without; the test fails where so many alarms have a chance of 1e-3 at 5 %.
 #[test]
 fn nulls_are_consistent() {

@@ -197,6 +197,8 @@ impl<'a> Asked<'a> {
         let finding = sought.finding(UNLISTED_LEVEL);
         let unnamed = finding.as_ref().map_or_else(|| sought.evidence(), |sparse| sought.evidence_of(&sparse.model));
         let Some(sparse) = finding.filter(|_| unnamed > named + reach(named)) else {
+            // A cause that nobody wrote down is less likely before any data.
+            let unnamed = unnamed + naming::unwritten_log_odds();
             self.rivalled = Some(chance(unnamed, named)).filter(|_| unnamed > named - LEAST_REACH);
             return false;
         };

@@ -43,17 +43,28 @@ fn listed(values: &BTreeMap<String, Value>) -> String {
 /// The findings of a search over the catalogue.
 pub(crate) fn of_search(found: &Found<'_>) -> Vec<Finding> {
     let places = found.model.choices.iter().zip(&found.names).zip(&found.tests);
-    places
-        .map(|((choice, names), test)| {
-            let shapes = found.first_scan.iter().find(|entry| entry.scored.choice.id() == choice.id());
-            let trials = shapes.map_or(1, |entry| entry.shapes.max(1));
-            of_choice(choice, names, test, trials)
-        })
-        .collect()
+    places.map(|((choice, names), test)| of_choice(choice, names, test, trials(found, choice))).collect()
+}
+
+/// How many shapes of an effect were tried.
+fn trials(found: &Found<'_>, choice: &Choice) -> usize {
+    let entry = found.first_scan.iter().find(|entry| entry.scored.choice.id() == choice.id());
+    entry.map_or(1, |entry| entry.shapes.max(1))
+}
+
+/// Whether an effect that a search found hardly stands out.
+pub(crate) fn is_faint(found: &Found<'_>, place: usize) -> bool {
+    let (choice, test) = (&found.model.choices[place], &found.tests[place]);
+    z(test, of_trials(test.p_value, trials(found, choice))) < FAINT
 }
 
 /// Chance that a finding has a cause that nobody wrote down and that looks like a name of the catalogue: one in twenty, as the blind benchmark finds.
 const UNWRITTEN: f64 = 0.05;
+
+/// The log of that chance over that of a cause that is written down.
+pub(crate) fn unwritten_log_odds() -> f64 {
+    (UNWRITTEN / (1.0 - UNWRITTEN)).ln()
+}
 
 fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
@@ -164,7 +175,7 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
 }
 
 /// What stands out by less than so many standard deviations, after its own trials, may be an accident of the whole catalogue's, or the shadow of something else.
-const FAINT: f64 = 4.5;
+pub(crate) const FAINT: f64 = 4.5;
 
 /// Chance that then none of the names is right over that one of them is: of such findings of the blind benchmark seven of ten have the right name among theirs, of others
 /// forty-nine of fifty.

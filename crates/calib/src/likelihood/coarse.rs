@@ -5,7 +5,7 @@
 
 use kinematics::Wheels;
 
-use super::records::{Chain, Piece, Records};
+use super::records::{Chain, Piece, Records, Seen};
 use super::thinning::{Leg, Selection};
 
 /// Records whose pieces have been put together, and the same looks taken of them.
@@ -17,15 +17,10 @@ pub(crate) struct Coarse<'a> {
 impl<'a> Coarse<'a> {
     /// Pieces of one way of turning put together, up to so long; looks stay where they are. `None` where that leaves more than half of them.
     pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
-        let mut coarse = records.clone();
-        let (mut before, mut after) = (0, 0);
-        let mut ends = Vec::with_capacity(coarse.chains.len());
-        for chain in &mut coarse.chains {
-            before += chain.pieces.len();
-            ends.push(put_together(chain, longest_s));
-            after += chain.pieces.len();
-        }
-        if 2 * after > before {
+        let (chains, ends): (Vec<_>, Vec<_>) =
+            records.chains.iter().map(|chain| put_together(chain, longest_s)).unzip();
+        let pieces = |chains: &[Chain<'_>]| chains.iter().map(|chain| chain.pieces.len()).sum::<usize>();
+        if 2 * pieces(&chains) > pieces(&records.chains) {
             return None;
         }
         let of_chain = |(legs, ends): (&Vec<Leg>, &Vec<usize>)| {
@@ -34,21 +29,22 @@ impl<'a> Coarse<'a> {
         };
         let selections =
             selections.iter().map(|of| Selection { legs: of.legs.iter().zip(&ends).map(of_chain).collect() }).collect();
-        Some(Self { records: coarse, selections })
+        let records = Records { chains, unused: records.unused.clone(), ids: records.ids.clone() };
+        Some(Self { records, selections })
     }
 }
 
-/// Puts the pieces of a chain together between its looks. How many come to each number of them now: it is told where a look is, and means nothing elsewhere.
-fn put_together(chain: &mut Chain<'_>, longest_s: f64) -> Vec<usize> {
+/// A chain with its pieces put together between its looks, and how many there are now for each number of them before: it is told where a look is, and means nothing elsewhere.
+fn put_together<'a>(chain: &Chain<'a>, longest_s: f64) -> (Chain<'a>, Vec<usize>) {
     let mut ends = Vec::with_capacity(chain.pieces.len() + 1);
     let mut together: Vec<Piece> = Vec::new();
-    let mut ends_at_look = vec![false; chain.pieces.len() + 1];
-    chain.looks.iter().for_each(|look| ends_at_look[look.after] = true);
-    for (piece, look_before) in chain.pieces.iter().zip(ends_at_look) {
+    let mut seen_before = vec![false; chain.pieces.len() + 1];
+    chain.looks.iter().for_each(|look| seen_before[look.after] = true);
+    for (piece, seen_before) in chain.pieces.iter().zip(seen_before) {
         ends.push(together.len());
         match together.last_mut() {
             Some(last)
-                if !look_before
+                if !seen_before
                     && last.dt_s + piece.dt_s <= longest_s * (1.0 + 1e-9)
                     && turns_on(last.wheel_rad, piece.wheel_rad) =>
             {
@@ -61,11 +57,8 @@ fn put_together(chain: &mut Chain<'_>, longest_s: f64) -> Vec<usize> {
     }
     ends.push(together.len());
     together.shrink_to_fit();
-    chain.pieces = together;
-    for look in &mut chain.looks {
-        look.after = ends[look.after];
-    }
-    ends
+    let looks = chain.looks.iter().map(|look| Seen { after: ends[look.after], ..*look }).collect();
+    (Chain { pieces: together, looks, ..*chain }, ends)
 }
 
 /// Whether both wheels turn on as they did: neither turns back, begins or stands still.

@@ -13,6 +13,7 @@ use super::words::Predictions;
 use super::{Part, evidences, words};
 use crate::candidate::{Choice, terms};
 use crate::document::NextExperiment;
+use crate::naming::{FAINT, is_faint};
 use crate::scan::total;
 use crate::search::{Found, without};
 
@@ -43,12 +44,15 @@ pub(super) fn tell_apart(
     let frame = Frame::of(&without.fit, &all);
     let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
     let options = evidences(&without.fit, &all, setting, manoeuvres);
+    // What hardly stands out is to stand out as well, where that can be.
+    let both = is_faint(found, place).then(|| rivals.clone().standing_out(FAINT));
     let id = |k: usize| rivals.candidates[k].choice.id();
 
-    let asked = Asked { rivals: &rivals, before: &before, options: &options, setting };
+    let asked = |rivals| Asked { rivals, before: &before, options: &options, setting };
     // What tells them as likely as not is worth driving where nothing tells them for certain.
-    let plan = [Sure::Certain, Sure::AsNot].into_iter().find_map(|sure| asked.plan(sure));
-    let Plan { sure, told, mut parts, mut minutes } = plan.ok_or_else(|| asked.why_nothing(&names))?;
+    let ways = both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Sure::Certain), (rivals, Sure::AsNot)]);
+    let plan = ways.into_iter().find_map(|(rivals, sure)| asked(rivals).plan(sure));
+    let Plan { sure, told, mut parts, mut minutes } = plan.ok_or_else(|| asked(&rivals).why_nothing(&names))?;
     let never: Vec<_> = rivals.pairs().into_iter().filter(|pair| !told.contains(pair)).collect();
     if parts.iter().all(|part| part.pairs == 1) && 2.0 * minutes <= setting.minutes {
         // A single run each way leaves nothing to compare it with.

@@ -105,7 +105,7 @@ impl Frame {
 pub(crate) struct Apart {
     /// √λ: in standard deviations.
     pub(crate) sigmas: f64,
-    /// By how much the log of the odds exceeds what diagnosis asks before it drops a name, with even chances.
+    /// By how much the log of the odds exceeds what diagnosis asks before it drops a name, with even chances; where names must stand out, at most by how much they do.
     even: f64,
     /// The same with 19 chances in 20.
     certain: f64,
@@ -129,11 +129,14 @@ impl Apart {
 }
 
 /// Names with the sizes that the old data give them, and their covariances.
+#[derive(Debug, Clone)]
 pub(crate) struct Rivals {
     pub(crate) frame: Frame,
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) sizes: Vec<DVector<f64>>,
     covariances: Vec<DMatrix<f64>>,
+    /// By how much the log of the odds against nothing at all must speak for a name as well.
+    stands_out: f64,
 }
 
 impl Rivals {
@@ -144,7 +147,12 @@ impl Rivals {
             Some((step.rows(first, own).into_owned(), covariance.view((first, first), (own, own)).into_owned()))
         };
         let (sizes, covariances) = candidates.iter().map(estimate).collect::<Option<_>>()?;
-        Some(Self { frame, candidates, sizes, covariances })
+        Some(Self { frame, candidates, sizes, covariances, stands_out: f64::NEG_INFINITY })
+    }
+
+    /// The same names, which must stand out from nothing by so many standard deviations too.
+    pub(crate) fn standing_out(self, sigmas: f64) -> Self {
+        Self { stands_out: 0.5 * sigmas * sigmas, ..self }
     }
 
     /// Every pair of names.
@@ -159,14 +167,21 @@ impl Rivals {
             let (own, size) = (&self.candidates[a].columns, &self.sizes[a]);
             let left = self.frame.information(evidence, own, &self.frame.with(&self.candidates[b]))?;
             let alone = self.frame.information(evidence, own, &self.frame.free)?;
-            let gradient = left * size;
-            let lambda = size.dot(&gradient).max(0.0);
-            let root = lambda.sqrt();
+            let asked = reach(0.5 * (size.transpose() * &alone * size)[0].max(0.0));
             // √λ = √(sᵀ L s) has the gradient L s / √λ.
-            let root_sigma = (gradient.transpose() * &self.covariances[a] * &gradient)[0].max(0.0).sqrt() / root;
-            let asked = reach(0.5 * (size.transpose() * alone * size)[0].max(0.0));
-            let certain = if root > 0.0 { certain_log_odds(root, root_sigma) } else { 0.0 };
-            Some(Apart { sigmas: root, even: 0.5 * lambda - asked, certain: certain - asked })
+            let root_of = |information: &DMatrix<f64>| {
+                let gradient = information * size;
+                let root = size.dot(&gradient).max(0.0).sqrt();
+                let sigma = (gradient.transpose() * &self.covariances[a] * &gradient)[0].max(0.0).sqrt() / root;
+                (root, if root > 0.0 { certain_log_odds(root, sigma) } else { 0.0 })
+            };
+            let ((root, certain), (alone, certain_alone)) = (root_of(&left), root_of(&alone));
+            let (even, even_alone) = (0.5 * root * root, 0.5 * alone * alone);
+            Some(Apart {
+                sigmas: root,
+                even: (even - asked).min(even_alone - self.stands_out),
+                certain: (certain - asked).min(certain_alone - self.stands_out),
+            })
         };
         Some(one_way(a, b)?.or_worse(one_way(b, a)?))
     }

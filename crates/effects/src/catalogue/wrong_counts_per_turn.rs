@@ -2,7 +2,8 @@
 //!
 //! Model: logged = factor × counts: two or four of one edge, a gear left out, radians for turns, millimetres for inches. Signature: every way and every
 //! turn is off by that factor. A gross fault, tried before any fit: the records without it believe the factor that the ways measured outside show,
-//! where that is far from one. Observability: any way measured outside, or turns. Alias: `wheel_scale`, whose sizes are per cents.
+//! where that is far from one; of runs seen at their ends alone, each factor by which people err is tried.
+//! Observability: any way measured outside, or turns. Alias: `wheel_scale`, whose sizes are per cents.
 //! Reference: quadrature decoding ×1, ×2, ×4; the units that people mix.
 
 use dataset::{Dataset, RunView, WheelLog};
@@ -162,12 +163,39 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
     (factor.ln().abs() > INNOCENT.ln_1p()).then_some(factor)
 }
 
+/// With fewer looks a run, what lies between two of them is no way that could be measured: paths turn, and may lead back.
+const WAYS_SEEN: usize = 4;
+
+/// Whether the runs are seen at their ends alone.
+fn is_seen_at_ends(dataset: &Dataset) -> bool {
+    let looks = |run: &RunView<'_>| seen(run).iter().map(Vec::len).sum::<usize>();
+    let session = dataset.session();
+    let (runs, looks) = session
+        .runs
+        .iter()
+        .map(looks)
+        .filter(|looks| *looks > 0)
+        .fold((0, 0), |(runs, all), own| (runs + 1, all + own));
+    looks < WAYS_SEEN * runs
+}
+
+/// The factors that may be: that of the ways that were seen and, where hardly any was, all that people err by.
+fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
+    let of_ways = estimate(dataset).map(|estimate| {
+        let off = |factor: f64| (estimate / factor).ln().abs();
+        let nearest = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
+        nearest.filter(|(factor, _)| off(*factor) < SNAPS_WITHIN).copied().unwrap_or((estimate, "a gear?"))
+    });
+    let all = if is_seen_at_ends(dataset) { &FACTORS[..] } else { &[] };
+    let others = all.iter().copied().filter(|known| Some(*known) != of_ways);
+    of_ways.into_iter().chain(others).collect()
+}
+
 fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
-    let Some(estimate) = estimate(dataset) else { return Vec::new() };
-    let off = |factor: f64| (estimate / factor).ln().abs();
-    let known =
-        FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).filter(|(factor, _)| off(*factor) < SNAPS_WITHIN);
-    let (factor, reason) = known.map_or((estimate, "a gear?"), |(factor, reason)| (*factor, *reason));
+    factors(dataset).into_iter().map(|(factor, reason)| rewriting(dataset, factor, reason)).collect()
+}
+
+fn rewriting(dataset: &Dataset, factor: f64, reason: &str) -> Rewriting {
     let scaled = |wheels: &mut WheelLog| {
         if let WheelLog::Angles(Wheels { left, right }) = wheels {
             left.iter_mut().chain(right).for_each(|angle| *angle /= factor);
@@ -178,10 +206,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     if let Some(ticks_per_rev) = &mut records.robot.ticks_per_rev {
         *ticks_per_rev *= factor;
     }
-    vec![Rewriting {
+    Rewriting {
         sizes: vec![("factor", factor)],
         sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
         evident: false,
         records,
-    }]
+    }
 }
