@@ -81,20 +81,22 @@ impl<'p> Sums<'p> {
                 *out += scaled * b;
             }
         }
-        let mut own = &mut self.own[..];
-        for (further, &first) in self.products.first.iter().enumerate() {
-            let column = self.products.common + further;
-            let (out, rest) = own.split_at_mut(column + 1 - first);
-            let scaled = j[column] * per_s;
-            if let [out] = out {
-                // Most parts are of one column: no loop.
-                *out += scaled * j[column];
-            } else {
+        if self.own.len() == self.products.first.len() {
+            // All parts are of one column, as they mostly are: many at a time.
+            for (out, j) in self.own.iter_mut().zip(&j[self.products.common..]) {
+                *out += j * per_s * j;
+            }
+        } else {
+            let mut own = &mut self.own[..];
+            for (further, &first) in self.products.first.iter().enumerate() {
+                let column = self.products.common + further;
+                let (out, rest) = own.split_at_mut(column + 1 - first);
+                let scaled = j[column] * per_s;
                 for (out, b) in out.iter_mut().zip(&j[first..]) {
                     *out += scaled * b;
                 }
+                own = rest;
             }
-            own = rest;
         }
         self.chi_square += v * v * per_s;
         self.det *= s;
