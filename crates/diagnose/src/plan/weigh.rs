@@ -255,6 +255,21 @@ pub(super) mod tests {
         assert!((apart.margin(Sure::Certain) - (certain - 3.0)).abs() < 1e-3, "{apart:?}");
     }
 
+    #[test]
+    fn names_that_must_stand_out_are_told_only_where_they_do() {
+        let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 4.0]));
+        // Four looks see name 1 alone, and tell it from name 2: to 4² · (5 − 1) and 4² · (1 − 1/5) of λ.
+        let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
+        let after = with_runs(&before, &[(&new, 1.0)]);
+        let margin = |rivals: &Rivals| rivals.apart(&after, (0, 1)).expect("determined").margin(Sure::AsNot);
+        let plain = rivals(&before);
+        assert!((margin(&plain) - (6.4 - 3.0)).abs() < 1e-3, "{}", margin(&plain));
+        // Name 2 stands out as before, by 4 standard deviations.
+        let both = plain.clone().standing_out(4.5);
+        assert!((margin(&both) - 0.5 * (16.0 - 4.5 * 4.5)).abs() < 1e-3, "{}", margin(&both));
+    }
+
     /// The log of the odds, drawn with all that is not known of it, is lower than what holds for certain in one of twenty: integrated over the size. The bound is of first order:
     /// a third of that either way.
     #[test]
