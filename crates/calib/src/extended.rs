@@ -54,14 +54,11 @@ impl JointFit<'_> {
         const SAME: f64 = 1.0;
         let Coarse { records, selections } = Coarse::of(&self.records, &self.selections, longest_s)?;
         let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
-        let of_all = |runs: &[Evidence]| runs.iter().map(|run| (run.count, run.chi_square)).collect::<Vec<_>>();
-        let runs = of_all(&coarse.scan_parts(terms, &[])).into_iter().zip(of_all(&self.fit.pass.runs));
-        let (mut same_looks, mut squares) = (true, 0.0);
-        for ((count, chi_square), (own_count, own_chi_square)) in runs {
-            same_looks &= count == own_count;
-            // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
-            squares += (0.5 * (chi_square - own_chi_square)).powi(2);
-        }
+        let runs = coarse.scan_parts(terms, &[]);
+        let both = runs.iter().zip(&self.fit.pass.runs);
+        let same_looks = both.clone().all(|(run, own)| run.count == own.count);
+        // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
+        let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
         (same_looks && squares < SAME).then_some(coarse)
     }
 
