@@ -167,18 +167,18 @@ impl Rivals {
             let (own, size) = (&self.candidates[a].columns, &self.sizes[a]);
             let left = self.frame.information(evidence, own, &self.frame.with(&self.candidates[b]))?;
             let alone = self.frame.information(evidence, own, &self.frame.free)?;
-            let asked = reach(0.5 * (size.transpose() * &alone * size)[0].max(0.0));
             // √λ = √(sᵀ L s) has the gradient L s / √λ.
-            let root_of = |information: &DMatrix<f64>| {
+            let odds = |information: &DMatrix<f64>| {
                 let gradient = information * size;
-                let root = size.dot(&gradient).max(0.0).sqrt();
+                let lambda = size.dot(&gradient).max(0.0);
+                let root = lambda.sqrt();
                 let sigma = (gradient.transpose() * &self.covariances[a] * &gradient)[0].max(0.0).sqrt() / root;
-                (root, if root > 0.0 { certain_log_odds(root, sigma) } else { 0.0 })
+                (root, 0.5 * lambda, if root > 0.0 { certain_log_odds(root, sigma) } else { 0.0 })
             };
-            let ((root, certain), (alone, certain_alone)) = (root_of(&left), root_of(&alone));
-            let (even, even_alone) = (0.5 * root * root, 0.5 * alone * alone);
+            let ((sigmas, even, certain), (_, even_alone, certain_alone)) = (odds(&left), odds(&alone));
+            let asked = reach(even_alone);
             Some(Apart {
-                sigmas: root,
+                sigmas,
                 even: (even - asked).min(even_alone - self.stands_out),
                 certain: (certain - asked).min(certain_alone - self.stands_out),
             })
