@@ -2,7 +2,8 @@
 //! diagnosed with a slip and an eccentric wheel in it.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use dataset::{Dataset, Schedule};
+use dataset::Dataset;
+use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Scenario};
 
 /// Squares of 4 m with wheels of other sizes and some more effects: 48 runs, an hour less five minutes.

@@ -10,8 +10,9 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
-use calib::methods::joint::{Joint, is_large};
+use calib::methods::joint::Joint;
 use dataset::{Blocks, Existing, RunByRun, Writer, import, read_ahead};
+use estimation::is_large;
 use peak_alloc::PeakAlloc;
 use rand::{RngExt, SeedableRng};
 

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use dataset::Schedule;
+use motion_programs::Schedule;
 use scenario::{Engine, Scenario};
 
 fn paper(engine: Engine) -> Scenario {

@@ -5,14 +5,13 @@ mod follow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::likelihood::Column;
-use calib::methods::joint::{Joint, OneStep, OneStepError, RISE_95, is_large};
-use calib::{
-    CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names, refuse_wrapped_counters,
-};
+use calib::methods::joint::{Joint, LargeCalibrationError};
+use calib::{CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::{Blocks, NominalRobot, Session, Warning};
+use estimation::Column;
+use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
@@ -128,7 +127,7 @@ fn calibrate_large(
     }
     match Joint::DEFAULT.calibrate_large(datasets, remark) {
         Ok(found) => Ok(Ok(found)),
-        Err(OneStepError::Calib(error)) => Ok(Err(error)),
+        Err(LargeCalibrationError::Calib(error)) => Ok(Err(error)),
         Err(error) => Err(error.into()),
     }
 }
@@ -140,7 +139,7 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
     let Some(joint) = joint else {
         return Err("--profile needs the method joint (or all), and that it applies".to_owned().into());
     };
-    let found = Joint::DEFAULT.fit(sessions).map_err(|error| error.to_string())?;
+    let found = Joint::DEFAULT.settings.fit(sessions).map_err(|error| error.to_string())?;
     for (column, keys) in [
         (Column::LeftWheel, &["left_wheel_diameter_m", "left_m_per_tick"][..]),
         (Column::RightWheel, &["right_wheel_diameter_m", "right_m_per_tick"]),

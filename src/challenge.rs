@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bench::{CaseResult, ChallengeResult, Measure, challenge, challenge_case, challenge_datasets};
+use blind_benchmark::{CaseResult, ChallengeResult, Measure, challenge, challenge_case, challenge_datasets};
 use clap::Args;
 use dataset::Existing;
 

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::{ComparedMethod, Comparison, KindMean, METHODS, Method, refuse_wrapped_counters};
+use calib::{ComparedMethod, Comparison, KindMean, METHODS, Method};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::Session;
+use estimation::refuse_wrapped_counters;
 
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 

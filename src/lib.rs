@@ -17,10 +17,15 @@
 
 pub use ::bench;
 pub use ::diagnose;
+pub use blind_benchmark;
 pub use calib;
 pub use dataset;
 pub use effects;
+pub use estimation;
 pub use kinematics;
+pub use model_term;
+pub use motion_programs;
+pub use paper_reproduction;
 pub use report;
 pub use scenario;
 pub use sim_yair;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bench::paper;
 use clap::Args;
+use paper_reproduction as paper;
 
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal};

@@ -180,5 +180,5 @@ fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
     }
     // The temporary file's random name would tell the user nothing: only the kind of the error is shown.
     let failed = |error: io::Error| format!("{}: {}", path.display(), error.kind());
-    Ok(report::stage(path, bytes).map_err(failed)?)
+    Ok(atomic_file::stage(path, bytes).map_err(failed)?)
 }

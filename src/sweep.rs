@@ -185,7 +185,7 @@ fn conclude(
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         }
-        report::write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        atomic_file::write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
         terminal.remark(&format!("baseline {} is written", path.display()));
         return Ok(ExitCode::SUCCESS);
     }

@@ -6,8 +6,9 @@ use std::sync::LazyLock;
 use bench::{AccuracyCheck, Moments, SweepOptions, SweepPlan, SweepResult};
 use calib::methods::direct::Direct;
 use calib::{CalibError, Calibration, MedianMad, Method};
-use dataset::{Schedule, Session};
+use dataset::Session;
 use kinematics::{DriveGeometry, Wheels};
+use motion_programs::Schedule;
 use scenario::Scenario;
 
 fn root() -> PathBuf {

@@ -10,23 +10,96 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use dataset::Schedule;
+use motion_programs::Schedule;
 use scenario::Scenario;
 use sim_yair::SimulatedRobot;
 use support::{real_data, succeed};
 
-/// Who may use whom, dev- and build-dependencies too. `calib` never links what could tell it the truth.
+/// Who may use whom, dev- and build-dependencies too. `estimation` and `calib` never link what could tell them the truth.
 const ARROWS: &[(&str, &[&str])] = &[
     ("kinematics", &[]),
+    ("atomic-file", &[]),
     ("dataset", &["kinematics"]),
-    ("effects", &["kinematics", "dataset"]),
-    ("scenario", &["kinematics", "dataset", "effects"]),
-    ("sim-yair", &["kinematics", "dataset", "effects", "scenario"]),
-    ("calib", &["kinematics", "dataset"]),
-    ("diagnose", &["kinematics", "dataset", "effects", "scenario", "calib"]),
-    ("report", &[]),
-    ("bench", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "report"]),
-    ("yair", &["kinematics", "dataset", "effects", "scenario", "sim-yair", "calib", "diagnose", "bench", "report"]),
+    ("motion-programs", &["kinematics", "dataset"]),
+    ("model-term", &["kinematics", "dataset"]),
+    ("effects", &["kinematics", "dataset", "model-term"]),
+    ("scenario", &["kinematics", "dataset", "motion-programs", "model-term", "effects"]),
+    ("sim-yair", &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario"]),
+    ("estimation", &["kinematics", "dataset", "model-term"]),
+    ("calib", &["kinematics", "dataset", "motion-programs", "model-term", "estimation"]),
+    (
+        "diagnose",
+        &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario", "estimation", "calib"],
+    ),
+    ("report", &["atomic-file"]),
+    (
+        "bench",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "report",
+        ],
+    ),
+    (
+        "blind-benchmark",
+        &[
+            "kinematics",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "diagnose",
+        ],
+    ),
+    (
+        "paper-reproduction",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "report",
+            "bench",
+        ],
+    ),
+    (
+        "yair",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "diagnose",
+            "report",
+            "bench",
+            "blind-benchmark",
+            "paper-reproduction",
+        ],
+    ),
 ];
 
 /// Names that say nothing of what is inside.
@@ -115,9 +188,12 @@ fn the_arrows_between_crates_hold() {
 #[test]
 fn the_arrows_reject_an_estimator_that_links_the_truth_and_a_room_that_nobody_knows() {
     let edge = |user: &str, used: &str| BTreeMap::from([(user.to_owned(), BTreeSet::from([used.to_owned()]))]);
-    for truth in ["effects", "scenario", "sim-yair", "bench"] {
-        assert_eq!(complaints(&edge("calib", truth)).len(), 1, "{truth}");
+    for estimator in ["estimation", "calib"] {
+        for truth in ["effects", "scenario", "sim-yair", "bench"] {
+            assert_eq!(complaints(&edge(estimator, truth)).len(), 1, "{estimator} {truth}");
+        }
     }
+    assert_eq!(complaints(&edge("diagnose", "sim-yair")).len(), 1);
     assert_eq!(complaints(&edge("kinematics", "dataset")).len(), 1);
     assert_eq!(complaints(&edge("calib", "dataset")).len(), 0);
     let unknown = complaints(&edge("attic", "kinematics"));

@@ -6,7 +6,7 @@
 
 mod support;
 
-use bench::{CaseResult, ChallengeResult, EffectKind, NoiseClass, Round, challenge};
+use blind_benchmark::{CaseResult, ChallengeResult, EffectKind, NoiseClass, Round, challenge};
 use statrs::distribution::{Binomial, DiscreteCDF};
 use support::{document, succeed, usage};
 

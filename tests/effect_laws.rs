@@ -1,10 +1,11 @@
 //! Laws that every effect of the catalogue keeps, each with a specimen that breaks it. What its hypothesis says of data stands in effect_hypotheses/.
 
-use dataset::{Dataset, Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run};
+use dataset::{Dataset, Protocol, ProtocolSettings, Run};
 use effects::{
     CATALOGUE, Command, Effect, Forward, Hooks, Hypothesis, Readout, RunStart, SampleClock, Sighting, Step, Stream,
 };
 use kinematics::{Pose, Rule};
+use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::{SimulatedRobot, SimulationError};
 

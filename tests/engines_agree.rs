@@ -4,8 +4,9 @@
 //! by z tests at 4.5 standard errors, a false alarm of 7e-6 each. Every comparison is also made against a closed form without the noise inside an arc
 //! (the L²/12 term), which must be told apart: it was.
 
-use dataset::{Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, RunView};
+use dataset::{Protocol, ProtocolSettings, Run, RunView};
 use kinematics::{ArcScatter, Increment, Pose, Rule, Wheels};
+use motion_programs::{Motion, MotionProgram, Platform};
 use rayon::prelude::*;
 use scenario::{Engine, Scenario};
 use sim_yair::SimulatedRobot;

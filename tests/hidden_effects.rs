@@ -4,9 +4,10 @@
 //! Seen to fail when the scan forgets to project the calibration out, and when wheel phases start anew in every run.
 #![allow(clippy::print_stdout)] // every case with its seed
 
-use dataset::{Dataset, Schedule};
+use dataset::Dataset;
 use diagnose::{Document, Options, UnlistedTerm, Verdict, diagnose};
 use effects::Effect;
+use motion_programs::Schedule;
 use scenario::Scenario;
 use statrs::distribution::{Binomial, DiscreteCDF};
 

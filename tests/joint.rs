@@ -5,12 +5,14 @@ mod support;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use calib::likelihood::Column;
-use calib::methods::joint::{Joint, RISE_95};
+use calib::methods::joint::Joint;
 use calib::{Calibration, Method, Parameter, compare};
 use dataset::import::importer;
-use dataset::{Dataset, Displacement, Schedule, TruthSample};
+use dataset::{Dataset, Displacement, TruthSample};
+use estimation::Column;
+use estimation::RISE_95;
 use kinematics::{DriveGeometry, Pose, Wheels, wrap_to_pi};
+use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Scenario};
 use serde_json::Value;
 use support::{real_data, succeed};
@@ -198,7 +200,7 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
 fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     let (dataset, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 6);
     let sessions = [dataset.session()];
-    let fit = Joint::DEFAULT.fit(&sessions).expect("looks");
+    let fit = Joint::DEFAULT.settings.fit(&sessions).expect("looks");
     let (_, covariance) = fit.fit.information(&fit.columns).and_then(|information| information.solve()).expect("seen");
     for (row, column) in Column::GEOMETRY.into_iter().enumerate() {
         let (low, high) = fit.profile(column, RISE_95).expect("a profile");

@@ -16,9 +16,10 @@ use calib::methods::linear::{Form, Linear, Readings};
 use calib::methods::tachometer::Tachometer;
 use calib::{CalibError, Calibration, Method, Parameter};
 use dataset::import::importer;
-use dataset::{Dataset, Protocol, RunInfo, Schedule, WheelLog};
+use dataset::{Dataset, Protocol, RunInfo, WheelLog};
 use effects::Effect;
 use kinematics::{Pose, Rule, wrap_to_pi};
+use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Scenario};
 use support::real_data;
 

@@ -5,12 +5,13 @@ mod support;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use calib::methods::joint::{Joint, is_large};
+use calib::methods::joint::Joint;
 use calib::{Calibration, Method, Parameter};
 use dataset::{
     Blocks, Dataset, Existing, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
     write,
 };
+use estimation::is_large;
 use kinematics::{Increment, Pose, Wheels};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

@@ -4,7 +4,8 @@ use bench::Moments;
 use calib::methods::direct::Direct;
 use calib::methods::umbmark::{Form, Umbmark};
 use calib::{Method, Parameter};
-use dataset::{RunInfo, Schedule, Session};
+use dataset::{RunInfo, Session};
+use motion_programs::Schedule;
 use scenario::{Instrument, Scenario};
 
 fn paper() -> Scenario {

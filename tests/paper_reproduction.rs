@@ -2,9 +2,9 @@
 
 use std::sync::LazyLock;
 
-use bench::paper::cause::Extension;
-use bench::paper::table_1::{Hypothesis, Row};
-use bench::paper::{Reproduction, reproduce};
+use paper_reproduction::cause::Extension;
+use paper_reproduction::table_1::{Hypothesis, Row};
+use paper_reproduction::{Reproduction, reproduce};
 
 /// 2000 experiments a hypothesis, as the command's default.
 static REPRODUCTION: LazyLock<Reproduction> =

@@ -6,10 +6,11 @@
 
 mod support;
 
-use calib::methods::joint::Joint;
-use dataset::{Dataset, Protocol, Run, Schedule};
+use dataset::{Dataset, Protocol, Run};
 use diagnose::{Document, Limits, NextExperiment, Options, Predicted, diagnose, diagnose_within, plan_scenario};
 use effects::{Address, Effect, StreamName};
+use estimation::FitSettings;
+use motion_programs::Schedule;
 use scenario::Scenario;
 use support::{document, refusal, succeed};
 
@@ -167,7 +168,7 @@ fn plans_for_random_robots_name_nothing_wrong() {
 
 /// Where the instrument sees the robot against dead reckoning by the first session's calibration: the mean over the runs that a prediction speaks of.
 fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
-    let joint = Joint { nuisances: false, thin: false, thin_displacements: false };
+    let joint = FitSettings::GEOMETRY_ONLY;
     let base = joint.fit(&[first.session()]).expect("the first session fits");
     let mut cut = new.clone();
     cut.runs.retain(|run| direction(run) == predicted.direction);
@@ -241,7 +242,7 @@ fn a_plan_without_data_keeps_what_it_promises() {
     for trial in 0..12 {
         let runs = driven(&scenario, &plan.next_experiment, 4_300 + 10 * trial);
         let sessions: Vec<_> = runs.iter().map(Dataset::session).collect();
-        let fit = Joint { nuisances: false, thin: false, thin_displacements: false }.fit(&sessions).expect("a fit");
+        let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions).expect("a fit");
         let model = &fit.fit.model;
         for (name, found, real) in [
             ("left_wheel_diameter_m", 2.0 * model.m_per_rad.left, diameter_m.left),

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use bench::{BenchError, Campaign, Ended, Shard, SweepOptions, SweepPlan};
-use dataset::Schedule;
+use motion_programs::Schedule;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::record::Field;
 use scenario::Scenario;

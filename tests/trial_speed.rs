@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use bench::{Moments, Trial};
 use calib::{Calibration, Parameter};
-use dataset::Schedule;
+use motion_programs::Schedule;
 use scenario::Scenario;
 use yardstick::Yardstick;
 

@@ -1,8 +1,9 @@
 //! The bound by brute force: every raw reading of one run in one vector, its covariance from each source of noise by finite differences, the start pose
 //! eliminated at the end. What is driven and when it is seen is taken from a simulated run, nothing from the bound's own code.
 
-use dataset::{Motion, Platform, Run, WheelLog};
+use dataset::{Run, WheelLog};
 use kinematics::{ArcScatter, DriveGeometry, Increment, Point, Pose, Side, Wheels};
+use motion_programs::{Motion, Platform};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use scenario::{Instrument, Scenario};
 use sim_yair::SimulatedRobot;

@@ -7,8 +7,9 @@
 use bench::{FisherInformation, Innovation, Moments};
 use calib::methods::direct::Direct;
 use calib::{MedianMad, Method, Parameter};
-use dataset::{Dataset, MotionProgram, Platform, Run, Schedule, Session};
+use dataset::{Dataset, Run, Session};
 use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
+use motion_programs::{MotionProgram, Platform, Schedule};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use scenario::{Instrument, Scenario};

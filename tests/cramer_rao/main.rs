@@ -9,9 +9,10 @@ mod noise_model;
 
 use bench::{FisherInformation, Innovation, NoBound};
 use calib::Parameter;
-use dataset::{Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, Schedule};
+use dataset::{Protocol, ProtocolSettings, Run};
 use effects::{ContactPatchWheelbase, Effect, SlipSpeed, WheelMismatch, WheelScale, Wheelbase};
 use kinematics::{DriveGeometry, Increment, Pose, Wheels};
+use motion_programs::{Motion, MotionProgram, Platform, Schedule};
 use nalgebra::{Matrix3, Vector3};
 use scenario::{Engine, Instrument, Scenario};
 use sim_yair::SimulatedRobot;

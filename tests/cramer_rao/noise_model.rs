@@ -5,9 +5,10 @@
 //! false alarm of 6e-7 each, 1e-4 over the file. Rejected by the same score: no scatter inside arcs, and roundings that are independent.
 
 use bench::Innovation;
-use dataset::{Dataset, Motion, Platform, Run};
+use dataset::{Dataset, Run};
 use effects::{ContactPatchWheelbase, Effect, Quantization};
 use kinematics::{Pose, Rule, wrap_to_pi};
+use motion_programs::{Motion, Platform};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use scenario::{Instrument, Scenario};

@@ -1,8 +1,9 @@
 //! Terms outside of the catalogue: every covariate and channel has the size that a scenario says, and recorded data show it so.
 
-use dataset::{Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run};
+use dataset::{Protocol, ProtocolSettings, Run};
 use effects::{Channel, Covariate, Effect, Hypothesis, SparseTerm};
 use kinematics::Pose;
+use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Placement, Scenario};
 use sim_yair::{SimulatedRobot, SimulationError};
 

@@ -1,10 +1,10 @@
 //! A robot without any imperfection but the one, watched exactly, and what counts and a mean term predict of it.
 
-use dataset::{
-    Dataset, Interval, Look, ModelTerm, Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, WheelLog,
-};
+use dataset::{Dataset, Protocol, ProtocolSettings, Run, WheelLog};
 use effects::Forward;
 use kinematics::{Increment, Pose, Twist, Wheels};
+use model_term::{Interval, Look, ModelTerm};
+use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
 

@@ -9,9 +9,10 @@ use calib::methods::tachometer::Tachometer;
 use calib::methods::umbmark::Umbmark;
 use calib::{Calibration, Method};
 use dataset::import::importer;
-use dataset::{Dataset, Protocol, Schedule, Session, WheelLog};
+use dataset::{Dataset, Protocol, Session, WheelLog};
 use effects::Effect;
 use kinematics::{DriveGeometry, Pose, Rule, Wheels};
+use motion_programs::Schedule;
 use nalgebra::Vector3;
 use scenario::{Instrument, Log};
 

@@ -14,8 +14,9 @@ use calib::methods::augmented_kalman::AugmentedKalman;
 use calib::methods::censi::Censi;
 use calib::methods::segments::Segments;
 use calib::{CalibError, Method, Parameter};
-use dataset::{Protocol, RunInfo, Schedule, WheelLog};
+use dataset::{Protocol, RunInfo, WheelLog};
 use kinematics::{DriveGeometry, Pose, Wheels, wrap_to_pi};
+use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Scenario};
 
 const METHODS: [&dyn Method; 3] = [&Censi::DEFAULT, &Segments::DEFAULT, &AugmentedKalman::DEFAULT];

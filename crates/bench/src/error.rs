@@ -30,9 +30,6 @@ pub enum BenchError {
     /// The scenario's points are not scenarios.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A cause of the paper's contradictions cannot be fitted.
-    #[error(transparent)]
-    Cause(#[from] crate::paper::cause::CauseError),
     /// A point cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

@@ -6,18 +6,12 @@
 //! number of threads, shards and interruptions.
 
 mod bound;
-mod challenge;
 mod error;
 mod moments;
-pub mod paper;
 mod sweep;
 mod trial;
 
 pub use bound::{FisherInformation, Innovation, NoBound};
-pub use challenge::{
-    CaseResult, ChallengeResult, Confusion, EffectKind, Measure, NoiseClass, OracleView, PathFamily, Planned, Round,
-    Said, TruthKind, challenge, challenge_case, challenge_datasets,
-};
 pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{

@@ -1,6 +1,7 @@
 //! One Monte-Carlo trial: the protocols driven once, into buffers that the next trial uses again.
 
-use dataset::{Dataset, MotionProgram, Platform, Run, Session};
+use dataset::{Dataset, Run, Session};
+use motion_programs::{MotionProgram, Platform};
 use scenario::Scenario;
 use sim_yair::{Plan, SimulatedRobot, SimulationError};
 

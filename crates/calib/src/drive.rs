@@ -2,7 +2,7 @@
 //!
 //! The robot is any [`Platform`]: the simulator, which this crate does not link, or a real one.
 
-use dataset::{Platform, Schedule, record_session};
+use motion_programs::{Platform, Schedule, record_session};
 
 use crate::estimate::{CalibError, Calibration, Method};
 

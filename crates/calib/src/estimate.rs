@@ -1,11 +1,12 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
-use dataset::{NominalRobot, Schedule, Session};
+use dataset::{NominalRobot, Session};
 use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
-use crate::methods::joint::OneStep;
+use estimation::{EstimationError, OneStep};
 
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -270,6 +271,17 @@ pub enum CalibError {
     },
 }
 
+impl CalibError {
+    /// A method's reason where its maximum-likelihood fit gives none.
+    pub(crate) fn of_fit(method: &'static str, error: EstimationError) -> Self {
+        match error {
+            EstimationError::NotADrive(source) => Self::NotADrive { method, source },
+            EstimationError::CounterWraps { run, side, bits } => Self::CounterWraps { run, side, bits },
+            other => Self::NotApplicable { method, why: other.to_string() },
+        }
+    }
+}
+
 /// A calibration method.
 pub trait Method: Sync + Send {
     /// The name that commands and files use.
@@ -286,24 +298,6 @@ pub trait Method: Sync + Send {
     /// # Errors
     /// [`CalibError`] when the method does not apply to these sessions, with the reason.
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError>;
-}
-
-/// Refuses sessions whose counters wrap unannounced: a calibration would swallow a jump of 2ⁿ counts as a parameter.
-///
-/// # Errors
-/// [`CalibError::CounterWraps`] for the first run that shows it.
-pub fn refuse_wrapped_counters(sessions: &[Session<'_>]) -> Result<(), CalibError> {
-    for view in sessions.iter().flat_map(|session| &session.runs) {
-        if let dataset::WheelLog::Ticks(ticks) = &view.odometry().wheels {
-            for side in kinematics::Side::BOTH {
-                if let Some(bits) = dataset::suspected_wrap(&ticks[side]) {
-                    let run = view.info().id.clone();
-                    return Err(CalibError::CounterWraps { run, side: side.name(), bits });
-                }
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The nominal drive of the first session.

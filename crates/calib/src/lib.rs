@@ -4,17 +4,13 @@
 //! the simulator nor the effects: what it is not given, it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
 mod compare;
+mod dead_reckoning_jacobian;
 mod drift;
 mod drive;
 mod estimate;
-mod extended;
-mod foreseen;
-pub mod likelihood;
-mod looks;
+mod pose_measurements;
 mod report;
 mod robust;
-mod sensitivity;
-mod wheel_track;
 
 pub mod methods;
 
@@ -25,9 +21,7 @@ pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, OwnInstrument, Parameter, Rejected,
-    refuse_wrapped_counters,
 };
-pub use extended::EndError;
 pub use methods::{METHODS, method};
 pub use report::{
     CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,

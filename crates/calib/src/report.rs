@@ -9,7 +9,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, OwnInstrument, Parameter};
-use crate::methods::joint::OneStep;
+use estimation::OneStep;
 
 /// Why a calibration file is not one.
 #[derive(Debug, thiserror::Error)]

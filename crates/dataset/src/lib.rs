@@ -6,32 +6,24 @@
 //! simulator here, a real robot elsewhere.
 
 mod ahead;
-mod cost;
 mod counter;
 mod error;
 pub mod import;
-mod platform;
-mod program;
 mod read;
 mod record;
 mod session;
 mod table;
-mod term;
 mod warning;
 mod write;
 
 pub use ahead::read_ahead;
-pub use cost::{Cost, Pace};
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
-pub use platform::{Platform, record_session};
-pub use program::{Motion, MotionProgram, Schedule};
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
 pub use session::{RunView, Session};
-pub use term::{CopyTerm, Interval, Look, ModelTerm, TermParameter};
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

@@ -1,7 +1,7 @@
 //! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
 
-use dataset::{ModelTerm, TermParameter};
 use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
+use model_term::{ModelTerm, TermParameter};
 
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]

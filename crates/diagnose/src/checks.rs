@@ -4,9 +4,9 @@
 //! every channel, beside what the model has: a regression of innovations would be blurred by the filter.
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
-use calib::likelihood::{Chain, Innovation};
-use calib::methods::joint::{JointFit, WHITE_BELOW};
 use effects::{Channel, Covariate, Sparse};
+use estimation::{Chain, Innovation};
+use estimation::{JointFit, WHITE_BELOW};
 use kinematics::Side;
 
 use crate::candidate::Choice;
@@ -366,8 +366,8 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
 
 #[cfg(test)]
 mod tests {
-    use calib::methods::joint::{Joint, JointFit};
     use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+    use estimation::{FitSettings, JointFit};
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{anscombe_glynn, outliers, whiteness};
@@ -448,7 +448,7 @@ mod tests {
     }
 
     fn fitted(dataset: &Dataset) -> JointFit<'_> {
-        Joint { nuisances: false, thin: false, thin_displacements: false }.fit(&[dataset.session()]).expect("a fit")
+        FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit")
     }
 
     #[test]

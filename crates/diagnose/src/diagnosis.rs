@@ -1,9 +1,9 @@
 //! The order of work.
 
-use calib::methods::joint::{Joint, JointFit};
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
+use estimation::{EstimationError, FitSettings, JointFit};
 use kinematics::DriveGeometry;
 use nalgebra::DMatrix;
 use scenario::Scenario;
@@ -53,7 +53,7 @@ pub enum DiagnoseError {
     },
     /// There is no base fit.
     #[error("no calibrated model to ask: {0}")]
-    NoFit(#[from] CalibError),
+    NoFit(#[from] EstimationError),
 }
 
 /// A diagnosis.
@@ -75,7 +75,7 @@ pub struct Diagnosis {
 #[derive(Debug, Clone)]
 pub struct FittedModel {
     /// Lengths, and sizes in the order of the terms' parameters.
-    pub model: calib::likelihood::Model,
+    pub model: estimation::Model,
     choices: Vec<Choice>,
 }
 
@@ -86,7 +86,7 @@ impl FittedModel {
 
     /// Its terms, at the start of their lives.
     #[must_use]
-    pub fn terms(&self) -> Vec<Box<dyn dataset::ModelTerm>> {
+    pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
         crate::candidate::terms(&self.choices)
     }
 }
@@ -106,8 +106,8 @@ fn looks_a_run(fit: &JointFit<'_>) -> f64 {
     fit.records.looks() as f64 / runs.max(1) as f64
 }
 
-const ALL_LOOKS: Joint = Joint { nuisances: false, thin: false, thin_displacements: false };
-const THINNED: Joint = Joint { nuisances: false, thin: true, thin_displacements: true };
+const ALL_LOOKS: FitSettings = FitSettings::GEOMETRY_ONLY;
+const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 /// Diagnoses one robot's sessions.
 ///
@@ -472,7 +472,7 @@ fn calibration(datasets: &[Dataset], extended: &Extended<'_>) -> Result<Calibrat
         covariance: covariance
             .as_ref()
             .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
-        not_observable: fit.not_observable(),
+        not_observable: calib::methods::joint::not_observable(fit),
         runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         converged: fit.fit.converged,
         ..Calibration::new("joint", geometry, datasets[0].robot.ticks_per_rev)

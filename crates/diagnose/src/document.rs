@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib::{CalibrationReport, Names};
-use dataset::Schedule;
+use motion_programs::Schedule;
 use serde::Serialize;
 
 /// In one word.

@@ -3,10 +3,9 @@
 //! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
 //! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
 
-use calib::EndError;
-use calib::likelihood::{Column, Evidence, Model};
-use calib::methods::joint::JointFit;
-use dataset::ModelTerm;
+use estimation::JointFit;
+use estimation::{Column, EndError, Evidence, Model};
+use model_term::ModelTerm;
 use nalgebra::DVector;
 
 use crate::candidate::terms;

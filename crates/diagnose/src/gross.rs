@@ -3,10 +3,10 @@
 //! A factor on both wheels is no matter of the likelihood, which fits any lengths: how plausible the fitted lengths are decides. A fault that a fit
 //! hides is worse than none.
 
-use calib::likelihood::NoiseComponent;
-use calib::methods::joint::{Joint, JointFit};
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
+use estimation::NoiseComponent;
+use estimation::{FitSettings, JointFit};
 
 use crate::search::{cost, count};
 
@@ -42,7 +42,7 @@ pub(crate) struct Fault {
     pub(crate) gain: f64,
 }
 
-const PLAIN: Joint = Joint { nuisances: false, thin: false, thin_displacements: false };
+const PLAIN: FitSettings = FitSettings::GEOMETRY_ONLY;
 
 /// An instrument turned farther than this on the robot is more of a claim than the fault.
 const MOST_TURNED_RAD: f64 = 1.0;

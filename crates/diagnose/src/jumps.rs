@@ -9,10 +9,10 @@
 //! Jumps and errors in any direction, anywhere, say what a cause without a name would do as well.
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
-use calib::likelihood::{Chain, Column, Evidence, Innovation};
-use calib::methods::joint::JointFit;
-use dataset::{Interval, Look, ModelTerm, TermParameter};
+use estimation::JointFit;
+use estimation::{Chain, Column, Evidence, Innovation};
 use kinematics::{Increment, Pose, Side, Wheels};
+use model_term::{Interval, Look, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -376,10 +376,10 @@ fn of_any(whose: Whose, seen: &[Seen]) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use calib::methods::joint::Joint;
     use dataset::RunInfo;
     use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, TruthNoise, TruthSample, WheelLog};
     use effects::{Address, Stream, StreamName};
+    use estimation::FitSettings;
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{Whose, log_likelihoods};
@@ -480,9 +480,7 @@ mod tests {
 
     /// The names with the logs of their chances, the likeliest first, and that of any cause.
     fn order(dataset: &Dataset) -> (Vec<(&'static str, f64)>, f64) {
-        let fit = Joint { nuisances: false, thin: false, thin_displacements: false }
-            .fit(&[dataset.session()])
-            .expect("a fit");
+        let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
         let any = [Whose::Robot, Whose::Instrument];
         let (likelihoods, any) = log_likelihoods(&Extended::alone(&fit), &NAMES, &any).expect("large errors");
         let mut order: Vec<_> = NAMES.into_iter().zip(likelihoods).collect();

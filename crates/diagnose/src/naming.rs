@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::NoiseComponent;
-use calib::methods::joint::JointFit;
 use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
+use estimation::JointFit;
+use estimation::NoiseComponent;
 
 use crate::candidate::Choice;
 use crate::checks::Checked;

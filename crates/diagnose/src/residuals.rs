@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use calib::methods::joint::JointFit;
-use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use estimation::JointFit;
 use kinematics::{Pose, Side, wrap_to_pi};
+use model_term::{Interval, Look, ModelTerm, TermParameter};
 use serde::Serialize;
 
 use crate::candidate::terms;

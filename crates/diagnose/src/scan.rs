@@ -5,9 +5,9 @@
 //! directions that even such a size would not show are left out: they cost power and show nothing.
 //! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
 
-use calib::likelihood::{Column, Evidence};
-use calib::methods::joint::JointFit;
-use dataset::TermParameter;
+use estimation::JointFit;
+use estimation::{Column, Evidence};
+use model_term::TermParameter;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::{Column, NoiseComponent};
 use effects::Sign;
+use estimation::{Column, NoiseComponent};
 
 use crate::candidate::terms;
 use crate::checks::{Follows, what_follows};

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::NoiseComponent;
-use dataset::{Dataset, Protocol, Schedule, WheelLog};
+use dataset::{Dataset, Protocol, WheelLog};
 use effects::{Covariate, Effect, Sparse, SparseTerm, effect_of_sizes};
+use estimation::NoiseComponent;
+use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
 use crate::candidate::Choice;

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use calib::likelihood::{Column, Evidence, NoiseComponent};
-use calib::methods::joint::JointFit;
 use effects::{Effect, effect_of_sizes};
+use estimation::JointFit;
+use estimation::{Column, Evidence, NoiseComponent};
 use nalgebra::DVector;
 use rayon::prelude::*;
 

@@ -6,7 +6,7 @@
 //! leaves, over 1.96. Where little is known of the shape, a size is far from going with it in a line.
 //! Reference: Cox & Hinkley 1974 (profile likelihood).
 
-use calib::methods::joint::JointFit;
+use estimation::JointFit;
 
 use crate::search::{Extended, cost, count, refit};
 

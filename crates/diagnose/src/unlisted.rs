@@ -1,7 +1,7 @@
 //! Structure that no name of the catalogue explains: sparse terms, each if it earns its place on runs that it was not fitted to.
 
-use calib::methods::joint::JointFit;
 use effects::{Channel, Covariate, Sparse};
+use estimation::JointFit;
 use kinematics::Side;
 use rayon::prelude::*;
 

@@ -4,8 +4,9 @@
 //! or a decay length, is one of a few shapes. Gross faults rewrite the records ([`Hypothesis::Records`]). What only scatters has no mean: the checks of a fit
 //! show it ([`Hypothesis::Scatter`]).
 
-use dataset::{Dataset, Interval, ModelTerm, NominalRobot, Run, WheelLog};
+use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Pose, Twist, Wheels, sin_cos};
+use model_term::{Interval, ModelTerm};
 
 /// How data would show an effect.
 pub enum Hypothesis {

@@ -10,8 +10,9 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{Interval, Look, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
 use kinematics::{Increment, Pose, Wheels};
+use model_term::{Interval, Look, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use resvg::{tiny_skia, usvg};
 
 use crate::error::ReportError;
-use crate::file::write_whole;
 use crate::font::Font;
 use crate::layout::Layout;
 use crate::panel::Panel;
+use atomic_file::write_whole;
 
 /// The width of every figure in SVG pixels; its height follows from its panels.
 pub const WIDTH_PX: f64 = 900.0;

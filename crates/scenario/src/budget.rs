@@ -4,7 +4,7 @@
 //! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
 //! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
 
-use dataset::{Cost, MotionProgram, Pace, Schedule};
+use motion_programs::{Cost, MotionProgram, Pace, Schedule};
 use serde::{Deserialize, Serialize};
 
 use crate::experiment::{LENGTHS_M, MOST_RUNS, Scenario, ScenarioError};
@@ -359,11 +359,11 @@ mod tests {
                 let (mut least, mut most) = ([0.0_f64; 2], [0.0_f64; 2]);
                 for motion in &program.motions {
                     let (distance_m, turn_rad) = match *motion {
-                        dataset::Motion::Straight { length_m } => (length_m, 0.0),
-                        dataset::Motion::Spin { turn_rad } => (0.0, turn_rad),
-                        dataset::Motion::Arc { radius_m, turn_rad } => (radius_m * turn_rad.abs(), turn_rad),
-                        dataset::Motion::Measure => continue,
-                        dataset::Motion::Pause { .. } => panic!("no such motion in these protocols"),
+                        motion_programs::Motion::Straight { length_m } => (length_m, 0.0),
+                        motion_programs::Motion::Spin { turn_rad } => (0.0, turn_rad),
+                        motion_programs::Motion::Arc { radius_m, turn_rad } => (radius_m * turn_rad.abs(), turn_rad),
+                        motion_programs::Motion::Measure => continue,
+                        motion_programs::Motion::Pause { .. } => panic!("no such motion in these protocols"),
                     };
                     // A quarter of a half turn ends where a circle is widest.
                     let quarter = kinematics::Increment { distance_m: 0.25 * distance_m, turn_rad: 0.25 * turn_rad };

@@ -3,9 +3,9 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use dataset::Schedule;
 use effects::{Effect, EffectError};
 use kinematics::{DriveGeometry, GeometryError};
+use motion_programs::Schedule;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Budget, NoFit};

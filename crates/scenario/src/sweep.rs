@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use dataset::Schedule;
+use motion_programs::Schedule;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 

@@ -112,7 +112,8 @@ impl Course {
 
 #[cfg(test)]
 mod tests {
-    use dataset::{Motion, MotionProgram, Protocol, ProtocolSettings};
+    use dataset::{Protocol, ProtocolSettings};
+    use motion_programs::{Motion, MotionProgram};
     use scenario::{Engine, Scenario};
 
     use super::*;

@@ -1,8 +1,8 @@
 //! Programs made ready to drive: what a motion tells the wheels is the same at every trial, so a campaign works it out once.
 
-use dataset::{Motion, MotionProgram};
 use effects::Command;
 use kinematics::{DriveGeometry, Increment};
+use motion_programs::{Motion, MotionProgram};
 use scenario::Robot;
 
 use crate::actuator::{Piece, Pieces};

@@ -1,8 +1,9 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
-use dataset::{MarkedPoint, MotionProgram, NominalRobot, Platform, Run, RunInfo, TruthNoise, WheelLog};
+use dataset::{MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
 use effects::{Address, EffectError, Forward, RunStart, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
+use motion_programs::{MotionProgram, Platform};
 use scenario::{Engine, Instrument, Scenario};
 
 use crate::active::ActiveEffects;

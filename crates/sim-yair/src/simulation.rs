@@ -1,8 +1,9 @@
 //! A whole scenario simulated: the dataset that a robot would have brought home, and the truth that it hides.
 
-use dataset::{Dataset, MotionProgram, Platform, Provenance, Run};
+use dataset::{Dataset, Provenance, Run};
 use effects::{Address, Effect};
 use kinematics::Pose;
+use motion_programs::{MotionProgram, Platform};
 use scenario::Scenario;
 use serde::Serialize;
 

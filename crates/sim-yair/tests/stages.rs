@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
-use dataset::{Motion, MotionProgram, Platform, Protocol, ProtocolSettings, Run, WheelLog};
+use dataset::{Protocol, ProtocolSettings, Run, WheelLog};
 use effects::{Command, Forward, Readout, RunStart, SampleClock, Sighting, Step};
 use kinematics::Pose;
+use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
 

@@ -14,8 +14,8 @@ mod model;
 mod timeline;
 
 use calib::Parameter;
-use dataset::MotionProgram;
 use kinematics::GeometryError;
+use motion_programs::MotionProgram;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use scenario::Scenario;
 

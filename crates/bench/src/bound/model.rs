@@ -5,8 +5,9 @@
 //! is constant in the body's frame. Δ²/12 takes two readings' roundings as independent: their correlation is up to exp(−4π²σ²/Δ²), 1 % at σ = Δ/3. Readings
 //! without an error of their own share their rounding between marks and between ends: the bound would be beaten up to sixfold, so that there is none.
 
-use dataset::{MarkedPoint, Motion};
+use dataset::MarkedPoint;
 use kinematics::{DriveGeometry, Increment, Point, Pose, WheelNoise, Wheels};
+use motion_programs::Motion;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use scenario::{Engine, Instrument, Robot, Scenario};
 

@@ -5,8 +5,8 @@
 //! motion sees a share of the motion's travel, and rows inside motions (`[log]`) tell nothing that counts, but for rounded ones: a line through many
 //! rounded rows can beat the bound.
 
-use dataset::Motion;
 use kinematics::{Increment, Side, Wheels};
+use motion_programs::Motion;
 
 use super::model::Model;
 

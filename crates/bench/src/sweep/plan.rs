@@ -1,7 +1,7 @@
 //! A sweep ready to run: the points of its design, who estimates at each of them from what, and one chunk of trials at a time.
 
 use calib::{Method, Parameter, method};
-use dataset::MotionProgram;
+use motion_programs::MotionProgram;
 use scenario::{Point, Scenario};
 
 use super::result::{DriftResult, EstimatorResult, MethodCost, PointResult};

@@ -89,7 +89,7 @@ pub(super) fn write_rows(
     out: &Path,
 ) -> Result<(), BenchError> {
     let path = out.join(ROWS_FILE);
-    let staged = report::stage(&path, b"").map_err(|error| failed(&path, &error))?;
+    let staged = atomic_file::stage(&path, b"").map_err(|error| failed(&path, &error))?;
     let mut input: Box<dyn Read> = Box::new(std::io::empty());
     for spool in spools {
         let file = File::open(spool).map_err(|error| failed(spool, &error))?;

@@ -43,7 +43,7 @@ fn write_all(plan: &SweepPlan, result: &SweepResult, spools: &[PathBuf], dir: &P
     let csv = csv_bytes(result).map_err(|error| failed(dir, &error))?;
     for (name, bytes) in [("sweep.json", json), ("sweep.csv", csv)] {
         let path = dir.join(name);
-        report::write_whole(&path, &bytes).map_err(|error| failed(&path, &error))?;
+        atomic_file::write_whole(&path, &bytes).map_err(|error| failed(&path, &error))?;
     }
     if !spools.is_empty() {
         write_rows(plan, result, spools, dir)?;
@@ -61,7 +61,7 @@ fn write_all(plan: &SweepPlan, result: &SweepResult, spools: &[PathBuf], dir: &P
 pub fn can_be_written(dir: &Path) -> Result<(), BenchError> {
     let probe = || {
         std::fs::create_dir_all(dir)?;
-        report::stage(&dir.join("sweep.json"), b"").map(drop)
+        atomic_file::stage(&dir.join("sweep.json"), b"").map(drop)
     };
     probe().map_err(|error: std::io::Error| failed(dir, &format!("cannot write results there: {}", error.kind())))
 }

@@ -3,9 +3,10 @@
 //! Systematic effects act on the path as they acted on the protocols, so that a calibration is judged by what odometry is for; noise, scatter, faults of the records
 //! and the instrument's errors are left out, since they are not the calibration's.
 
-use dataset::{Dataset, MotionProgram, Schedule};
+use dataset::Dataset;
 use effects::{Address, Hypothesis};
 use kinematics::{DriveGeometry, Pose, Rule};
+use motion_programs::{MotionProgram, Schedule};
 use scenario::{Log, Noise, Placement, Scenario};
 use sim_yair::{SimulationError, simulate_programs};
 

@@ -11,15 +11,16 @@
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
-use dataset::{RunView, Schedule, Session};
+use dataset::{RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{Increment, Pose, Wheels, unwrap_near, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector3};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Mounting, Parameter, Rejected, drive, nominal};
-use crate::looks::{Look, Looks, Spacing};
+use crate::pose_measurements::{Look, Looks, Spacing};
 use crate::robust::left_of_variance;
-use crate::sensitivity::{Lengths, Reckoned};
-use crate::wheel_track::WheelTrack;
+use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
+use estimation::WheelTrack;
 
 /// The method with its trimming and its limits.
 #[derive(Debug, Clone, Copy, PartialEq)]

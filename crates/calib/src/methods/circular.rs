@@ -11,7 +11,8 @@
 //! Observability: e, and B in metres whatever the scale of the wheels. Blind to their common scale, which changes how far round a circle goes, not its radius.
 //! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no small-angle form.
 
-use dataset::{NominalRobot, Protocol, RunView, Schedule, Session};
+use dataset::{NominalRobot, Protocol, RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Wheels, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
@@ -19,7 +20,7 @@ use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
-use crate::wheel_track::WheelTrack;
+use estimation::WheelTrack;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

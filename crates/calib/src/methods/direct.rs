@@ -8,11 +8,12 @@
 //! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
-use dataset::{PointReading, Protocol, RunView, Schedule, Session};
+use dataset::{PointReading, Protocol, RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
-use crate::looks::Ends;
+use crate::pose_measurements::Ends;
 use crate::robust::{MedianMad, Summary, mean};
 
 /// The method with its outlier rule.

@@ -9,16 +9,17 @@
 //! the scatter of the ends and of the spins' wheelbases, with the slopes of each step over the other's result.
 //! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves out a wheel, is not offered.
 
-use dataset::{NominalRobot, Protocol, RunView, Schedule, Session};
+use dataset::{NominalRobot, Protocol, RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
-use crate::looks::{Look, Looks, Spacing};
+use crate::pose_measurements::{Look, Looks, Spacing};
 use crate::robust::Summary;
-use crate::sensitivity::{Lengths, Reckoned};
-use crate::wheel_track::WheelTrack;
+use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
+use estimation::WheelTrack;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

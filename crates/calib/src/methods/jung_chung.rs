@@ -12,11 +12,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use dataset::{Protocol, Schedule, Session};
+use dataset::{Protocol, Session};
+use motion_programs::Schedule;
 use kinematics::{Wheels, wrap_to_pi};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::looks::Ends;
+use crate::pose_measurements::Ends;
 use crate::robust::Summary;
 
 /// The method; it has nothing to choose.

@@ -11,12 +11,13 @@
 //! geometry that the general form comes nearest to.
 //! Reference: Antonelli, Chiaverini, Fusco 2005 (general form); Antonelli & Chiaverini 2007 (physical form).
 
-use dataset::{NominalRobot, RunView, Schedule, Session};
+use dataset::{NominalRobot, RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Side, Wheels, sinc, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::wheel_track::WheelTrack;
+use estimation::WheelTrack;
 
 /// How many parameters the model has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,14 +7,15 @@
 //! Observability: all three on paths with straights and turns, looked at on the way. Without heading errors in the sum spins show nothing of the separation.
 //! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends by Rprop and stops before the minimum.
 
-use dataset::{Schedule, Session};
+use dataset::Session;
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Wheels};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
-use crate::looks::{Look, Looks, Spacing};
-use crate::sensitivity::{Lengths, Reckoned, unseen};
+use crate::pose_measurements::{Look, Looks, Spacing};
+use crate::dead_reckoning_jacobian::{Lengths, Reckoned, unseen};
 
 /// The method with its segments.
 #[derive(Debug, Clone, Copy, PartialEq)]

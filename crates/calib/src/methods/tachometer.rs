@@ -9,7 +9,8 @@
 //! Reference: Goel, Roumeliotis, Sukhatme 1999 (encoders calibrated against a precision tachometer). The ratio of sums is ours: a slope through the origin
 //! would be drawn towards zero by the rounding of the counts, which enters its regressor.
 
-use dataset::{NominalRobot, RunView, Schedule, Session};
+use dataset::{NominalRobot, RunView, Session};
+use motion_programs::Schedule;
 use kinematics::{Side, Wheels};
 use nalgebra::{DMatrix, DVector};
 
@@ -17,7 +18,7 @@ use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
-use crate::wheel_track::WheelTrack;
+use estimation::WheelTrack;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

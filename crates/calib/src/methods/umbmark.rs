@@ -10,12 +10,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use dataset::{Protocol, Schedule, Session};
+use dataset::{Protocol, Session};
+use motion_programs::Schedule;
 use kinematics::{Pose, Rule, Wheels};
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::looks::Ends;
+use crate::pose_measurements::Ends;
 use crate::robust::Summary;
 
 /// Which coordinate of the end errors α and β are taken from.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::{Column, Evidence};
-use calib::methods::joint::JointFit;
+use estimation::JointFit;
+use estimation::{Column, Evidence};
 
 use super::library::Manoeuvre;
 use super::predict::predictions;

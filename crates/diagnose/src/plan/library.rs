@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use calib::likelihood::Model;
-use dataset::{Cost, Dataset, Displacement, Motion, MotionProgram, Odometry, Provenance, Run, RunInfo, Schedule};
+use dataset::{Dataset, Displacement, Odometry, Provenance, Run, RunInfo};
 use dataset::{TruthNoise, TruthSample, WheelLog};
+use estimation::Model;
 use kinematics::{Increment, Pose, Wheels};
+use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 
 use super::setting::{Reading, Setting};
 

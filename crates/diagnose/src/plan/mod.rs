@@ -11,9 +11,10 @@ mod show;
 mod weigh;
 mod words;
 
-use calib::likelihood::Evidence;
-use calib::methods::joint::JointFit;
-use dataset::{Dataset, Schedule};
+use dataset::Dataset;
+use estimation::Evidence;
+use estimation::JointFit;
+use motion_programs::Schedule;
 
 use crate::candidate::{Choice, terms};
 use crate::document::{Blind, NextExperiment};

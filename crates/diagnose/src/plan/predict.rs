@@ -3,8 +3,8 @@
 //! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
 //! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
 
-use calib::likelihood::{Column, Evidence, Model};
-use calib::methods::joint::JointFit;
+use estimation::JointFit;
+use estimation::{Column, EndError, Evidence, Model};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
@@ -167,12 +167,12 @@ impl Foreseen {
         let mut named = model.clone();
         named.sizes.resize(parameters, 0.0);
         columns.iter().zip(step.iter()).for_each(|(column, by)| named.advance(column_at(*column), *by));
-        let noise = calib::likelihood::Noise { variance: [1.0; 4] };
+        let noise = estimation::Noise { variance: [1.0; 4] };
         // Only the records matter here: dead reckoning takes the model that it is given.
-        let fit = calib::methods::joint::Joint::unfitted(self.reference.clone(), noise, &[self.dataset.session()]);
+        let fit = JointFit::unfitted(self.reference.clone(), noise, &[self.dataset.session()]);
         let looks = |model: &Model| -> Option<Vec<Vector3<f64>>> {
             let ends = fit.reckoned_looks(model, &mut terms(all));
-            let vector = |end: &calib::EndError| Vector3::new(end.off.x_m, end.off.y_m, end.off.theta_rad);
+            let vector = |end: &EndError| Vector3::new(end.off.x_m, end.off.y_m, end.off.theta_rad);
             (ends.len() == self.noise.len()).then(|| ends.iter().map(vector).collect())
         };
         let here = looks(&named)?;

@@ -128,8 +128,8 @@ impl Setting {
         })
     }
 
-    pub(crate) fn pace(&self, speed_m_s: f64) -> dataset::Pace {
-        dataset::Pace {
+    pub(crate) fn pace(&self, speed_m_s: f64) -> motion_programs::Pace {
+        motion_programs::Pace {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: speed_m_s,
             acceleration_m_s2: self.acceleration_m_s2,

@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use calib::likelihood::{Column, Evidence, Model, Noise};
-use calib::methods::joint::{Joint, JointFit};
+use estimation::JointFit;
+use estimation::{Column, Evidence, Model, Noise};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
 
@@ -299,7 +299,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     if setting.free_m.iter().any(|side_m| *side_m <= 0.0) {
         return Err(nothing_fits());
     }
-    let fit: JointFit<'_> = Joint::unfitted(Model::of(&geometry, 0), noise, &[]);
+    let fit: JointFit<'_> = JointFit::unfitted(Model::of(&geometry, 0), noise, &[]);
     let choices: Vec<Choice> = some_shapes(&mean_terms(&[])).into_iter().filter(is_driven).collect();
     let targets = targets(&choices, Column::BASE.len());
     let frame = Frame::of(&fit, &choices);

@@ -3,8 +3,8 @@
 //! With Î the information of old and planned runs together, n what is free beside and b another name's sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s,
 //! the noncentrality of the test of b against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
 
-use calib::likelihood::{Column, Evidence};
-use calib::methods::joint::JointFit;
+use estimation::JointFit;
+use estimation::{Column, Evidence};
 use nalgebra::{DMatrix, DVector};
 
 use super::Part;

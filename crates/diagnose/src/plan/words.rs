@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use dataset::Schedule;
+use motion_programs::Schedule;
 use serde::Serialize;
 
 use super::Part;

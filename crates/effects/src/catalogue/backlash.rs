@@ -4,7 +4,8 @@
 //! the whole gap of travel. Observability: reversals of one wheel; a corner turned on the spot reverses one wheel. Alias: `castor_kick`.
 //! Reference: the play operator, Krasnosel'skii & Pokrovskii 1983; 0.4 to 2.6 mm at wheels of 50 mm radius, derived from teeth.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Signature: constant direction in the room, at any speed. Observability: the same way at several headings; two speeds against `floor_slope`.
 //! Alias: `floor_slope` that goes with the way, exactly. Reference: users' reports, mm/m to cm/m; a rule of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sin_cos, sinc};
 use serde::{Deserialize, Serialize};
 

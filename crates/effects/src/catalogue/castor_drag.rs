@@ -5,7 +5,7 @@
 //! beside spins. Alias: `wheelbase` (q L in wide bends, q b/2 in spins), `turn_rate_wheelbase`.
 //! Reference: rolling resistance with creep in proportion to force; a rule of thumb without figures.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

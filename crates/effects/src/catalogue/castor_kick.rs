@@ -5,7 +5,8 @@
 //! Observability: reversals after turns to both sides. Alias: `backlash`, whose loss also comes with reversals. Needs a log finer than s₀.
 //! Reference: the castor's differential equation linearised, ψ' = −sin ψ/trail; 2 to 4 trail lengths, 0.1 to 2° a reversal, a rule of thumb.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! what is counted; where speeds are logged instead, a scale. Observability: a robot that moves late in long runs. Alias: `wheel_scale` where speeds are
 //! logged; `truth_latency` over short runs. Reference: resonators and timers, 0.01 to 3 %, as users report.
 
-use dataset::{Look, ModelTerm, TermParameter};
+use model_term::{Look, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! forward-only data, where it is a scale. Alias: `backlash` where reversals are as frequent as metres.
 //! Reference: treads with a grain, a slope under the test floor; 0.1 to 0.5 %, a rule of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

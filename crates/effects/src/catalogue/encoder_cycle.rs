@@ -4,7 +4,7 @@
 //! locked to that wheel's phase, n times a turn. Observability: a continuous log with more than 2n samples a turn. Alias: `wheel_eccentricity` at n = 1, exactly.
 //! Reference: geometry of an eccentric disc, A = e/r_disc over the gear's ratio.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

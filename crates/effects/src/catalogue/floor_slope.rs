@@ -4,7 +4,7 @@
 //! Observability: the same way at two headings; time and way at two speeds. Alias: `carpet_nap` (same heading at two speeds), exactly where the creep
 //! goes with the way. Reference: tyre creep in proportion to side force: weight times slope over stiffness, 0.04 to 0.1 % per degree.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

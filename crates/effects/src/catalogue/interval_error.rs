@@ -7,7 +7,8 @@
 
 use std::collections::VecDeque;
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Observability: bends at two speeds. Alias: `truth_lever_arm` (same ω, two speeds tell), `truth_yaw`, `truth_latency`: a single circle tells none apart.
 //! Reference: linear tyre, slip angle = side force over cornering stiffness: c = m/C_α, 3 to 10 ms; the moved centre of rotation of skid steer, far more.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sinc};
 use serde::{Deserialize, Serialize};
 

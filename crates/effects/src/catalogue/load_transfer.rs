@@ -4,7 +4,7 @@
 //! Signature: e_dθ = −2c v²ω/b. Observability: bends at two speeds; nothing in spins and on straights. Alias: `turn_rate_wheelbase` (0.98 on circles).
 //! Reference: the balance of moments of a rigid body on springs; 0.2 % at v ω = 0.5 m/s² for a soft tyre.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

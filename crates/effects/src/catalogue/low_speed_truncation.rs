@@ -6,7 +6,7 @@
 //! Alias: `wheel_scale` at one speed. Assumption of the hypothesis: fractions of all sizes are equally likely, which a speed that is a whole number of
 //! units a cycle breaks. Reference: users' reports of integer odometry; the mean of a uniform fraction.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

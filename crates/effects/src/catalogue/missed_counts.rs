@@ -4,7 +4,7 @@
 //! in |v_w| of that wheel; the robot goes farther than it counts. Observability: speeds on both sides of the hinge. Alias: `slip_speed` of the other sign.
 //! Reference: the HCTL-1100's input filter (a state must stand three clocks); interrupt-driven counters behave alike. 0.1 to 2 %, a rule of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

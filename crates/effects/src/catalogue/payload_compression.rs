@@ -5,7 +5,7 @@
 //! Observability: runs with different payloads. Alias: `thermal_drift` and `wear` where the payload was changed once.
 //! Reference: a linear spring; 0.1 to 1 % for a load that the robot is made for, a rule of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Observability: speed changes on straights. Alias: `slip_acceleration` of one wheel.
 //! Reference: two HCTL-1100 that share no sampling: δ up to one sample time, 0.06 to 2 ms.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

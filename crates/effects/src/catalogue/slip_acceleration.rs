@@ -4,7 +4,7 @@
 //! Observability: speed changes seen from outside. Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
 //! Reference: tyre slip stiffness; κ = v/(C_s g) with C_s = 20 to 40 gives 1 to 10 ms.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Observability: at least two speeds. Alias: `missed_counts`, load, `turn_rate_wheelbase`.
 //! Reference: longitudinal slip with rolling resistance that grows with speed; sizes are rules of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

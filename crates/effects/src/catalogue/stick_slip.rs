@@ -6,7 +6,8 @@
 //! Alias: quantization; `backlash` and `truth_latency` where looks are few. Reference: Coulomb friction on a compliant contact, Armstrong-Hélouvry et al.
 //! 1994; the mean age of a renewal process, Cox 1962.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

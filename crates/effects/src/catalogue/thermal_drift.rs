@@ -4,7 +4,7 @@
 //! Observability: runs early and late in a session. Alias: `wear`, at 1.00 while the mean speed is steady: a long pause or a cold restart tells them apart.
 //! Reference: a lumped heat capacity (Newton's law of cooling) and linear expansion; 0.2 % over 10 to 60 minutes for rubber.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,8 @@
 //! Observability: hard starts and stops. Alias: `bumps`; `slip_acceleration` and `truth_latency` where looks are few or the floor holds nearly all: a wheel under
 //! control trembles, so that the ground lags as by a delay until the floor gives way. Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! constant speed. Observability: starts, stops and reversals. Alias: `slip_acceleration`, exactly: the same lag of both wheels is a time shift.
 //! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100 ms, in published logs up to 0.3 s.
 
-use dataset::{Look, ModelTerm, TermParameter};
+use model_term::{Look, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Observability: turns; a robot that only drives straight shows nothing, since where it starts is not known beforehand. Alias: `lateral_skid` at one
 //! speed. Reference: Censi et al. 2013, the sensor's place on the robot.
 
-use dataset::{Look, ModelTerm, TermParameter};
+use model_term::{Look, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Observability: any straight way, forward or backward. Alias: equal toe of both wheels is the same thing, on every path: no data tells them apart;
 //! `lateral_skid` at one yaw rate. Reference: Censi et al. 2013, the sensor's orientation on the robot.
 
-use dataset::{Look, ModelTerm, TermParameter};
+use model_term::{Look, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! Alias: `load_transfer` (0.98 on circles), `slip_speed` in spins, `castor_drag`; `wheelbase` at one yaw rate.
 //! Reference: a rule of thumb, 0.1 to 3 %; users report a wheel separation multiplier that depends on the yaw rate.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 

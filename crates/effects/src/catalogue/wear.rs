@@ -4,7 +4,7 @@
 //! Observability: very long sessions. Alias: `thermal_drift`, at 1.00 while the mean speed is steady: a long pause tells them apart.
 //! Reference: Archard 1953, wear in proportion to the way; negligible within a session.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 

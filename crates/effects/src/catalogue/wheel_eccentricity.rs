@@ -4,7 +4,7 @@
 //! Observability: phase continuity and more than two samples a turn. Alias: `encoder_cycle` with one cycle a turn, exactly.
 //! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a rule of thumb.
 
-use dataset::{Interval, ModelTerm, TermParameter};
+use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 

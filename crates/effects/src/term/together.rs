@@ -3,8 +3,9 @@
 //! A library has hundreds of products of a few dozen covariates, most of them on several channels. The moment, the value of each covariate at it and each product
 //! are found once; a sine and a cosine of the same angle come together.
 
-use dataset::{Interval, ModelTerm, RunInfo, TermParameter};
+use dataset::RunInfo;
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 
 use super::{Past, Sparse, on_channel, parameter};
 use crate::covariate::{Channel, Covariate, Moment};

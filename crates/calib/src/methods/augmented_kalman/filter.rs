@@ -8,7 +8,7 @@ use kinematics::{Count, DriveGeometry, GeometryError, OdometryCovariance, Pose, 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 use super::noise::{Expected, HEADING, NoiseFilter, POSITION, Variances, WHEELS};
-use crate::sensitivity::{Lengths, Reckoned};
+use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
 
 /// When the factors count as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]

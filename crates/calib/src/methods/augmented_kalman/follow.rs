@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{AugmentedFilter, AugmentedKalman};
 use crate::estimate::{CalibError, nominal};
-use crate::looks::{Look, Looks, Spacing};
+use crate::pose_measurements::{Look, Looks, Spacing};
 
 /// What the robot knows of its drive after a look.
 #[derive(Debug, Clone, PartialEq)]

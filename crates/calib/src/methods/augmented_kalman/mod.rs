@@ -14,7 +14,8 @@ mod noise;
 
 use std::f64::consts::PI;
 
-use dataset::{Schedule, Session};
+use dataset::Session;
+use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,8 +24,8 @@ pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
-use crate::looks::{Look, Looks, Spacing};
-use crate::sensitivity::unseen;
+use crate::pose_measurements::{Look, Looks, Spacing};
+use crate::dead_reckoning_jacobian::unseen;
 
 /// The method with its beliefs before any data.
 #[derive(Debug, Clone, Copy, PartialEq)]

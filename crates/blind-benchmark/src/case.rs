@@ -1,0 +1,511 @@
+//! One case: a random robot, what is hidden in it, what it brings home, and what the oracle knows. Addressed by seed and number alone.
+
+use dataset::{Dataset, Provenance, Run};
+use effects::{Effect, StreamName};
+use kinematics::DriveGeometry;
+use motion_programs::Platform;
+use scenario::Scenario;
+use sim_yair::SimulatedRobot;
+
+use super::draw::Draw;
+use super::hidden::{Act, EffectKind, Hidden, hideable};
+use super::looks::{NoiseClass, Watching};
+use super::oracle::{Shown, TrueNoise};
+use super::power::{TOLD_APART, detection_limit};
+use super::robot::{RandomRobot, SessionPlan};
+use crate::error::ChallengeError;
+
+/// What a case asks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Round {
+    /// Nothing is hidden.
+    Null,
+    /// One effect is hidden.
+    Single,
+    /// Two effects are hidden.
+    Pair,
+    /// One effect is hidden, and the catalogue is without it.
+    LeftOut,
+}
+
+/// A block of cases: of each twenty, so many are nulls, singles, pairs; the others leave an effect out.
+const BLOCK: u64 = 20;
+const NULLS: u64 = 7;
+const SINGLES: u64 = 7;
+const PAIRS: u64 = 2;
+
+impl Round {
+    /// The round of a case, and which of its kind it is.
+    pub(crate) const fn of(number: u64) -> (Self, u64) {
+        let (block, place) = (number / BLOCK, number % BLOCK);
+        if place < NULLS {
+            (Self::Null, block * NULLS + place)
+        } else if place < NULLS + SINGLES {
+            (Self::Single, block * SINGLES + place - NULLS)
+        } else if place < NULLS + SINGLES + PAIRS {
+            (Self::Pair, block * PAIRS + place - NULLS - SINGLES)
+        } else {
+            let left = NULLS + SINGLES + PAIRS;
+            (Self::LeftOut, block * (BLOCK - left) + place - left)
+        }
+    }
+}
+
+/// What the oracle knows of a hidden effect.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct OracleView {
+    /// The effect.
+    pub id: String,
+    /// Its kind.
+    pub kind: EffectKind,
+    /// Whether it acts in another functional form than the catalogue's.
+    pub other_form: bool,
+    /// Sizes by the hypothesis's names, shape parameters after them.
+    pub sizes: Vec<(String, f64)>,
+    /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None` for gross faults.
+    pub noncentrality: Option<f64>,
+    /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
+    pub ratio: Option<f64>,
+    /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross faults and scatter.
+    pub form_share: Option<f64>,
+    /// Noncentrality of the best test between it and each other name whose sizes can be, the least first: what the other name leaves of it. Empty for gross faults.
+    pub rivals: Vec<(String, f64)>,
+    /// The other names that this test does not tell from it with nine chances in ten.
+    pub aliases: Vec<String>,
+}
+
+/// A case ready to be diagnosed.
+pub(crate) struct Case {
+    seed: u64,
+    number: u64,
+    pub(crate) round: Round,
+    pub(crate) robot: RandomRobot,
+    pub(crate) watching: Watching,
+    pub(crate) hidden: Vec<Hidden>,
+    pub(crate) oracle: Vec<OracleView>,
+    pub(crate) datasets: Vec<Dataset>,
+    /// The held-out log, without noise, and the same without the effects.
+    pub(crate) held_out: Option<(Dataset, Dataset)>,
+    /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its place among the hidden ones, and the log.
+    pub(crate) held_out_by_chance: Vec<(usize, Dataset)>,
+    /// What a calibration without the effects would find, without noise.
+    pub(crate) best_drive: Option<estimation::Model>,
+    pub(crate) noise: TrueNoise,
+}
+
+/// Sizes over the detection limit: of singles, and of pairs, which ask for names and not for power.
+const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
+const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
+/// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
+const CLOSE: f64 = 1.5;
+/// Where the held-out log's draws are, away from the sessions'.
+const HELD_OUT: u32 = 16;
+/// Where those of planned runs are.
+const PLANNED: u32 = 8;
+/// Steps in which a scale is sought.
+const MOST_STEPS: usize = 5;
+/// Another form of which the hypothesis takes up less is another effect: the forms of tests/effect_hypotheses leave at most 0.65² of their squares.
+const LEAST_SHARE: f64 = 0.5;
+/// Robots and paths that are tried for an effect.
+const ATTEMPTS: u64 = 10;
+
+/// The sessions of a robot with hidden effects, with noise or without.
+fn drive(
+    plans: &[SessionPlan],
+    case: &Sight<'_>,
+    hidden: &[&Hidden],
+    noisy: bool,
+    first_point: u32,
+) -> Result<Vec<Dataset>, ChallengeError> {
+    let ids: Vec<&str> = hidden.iter().map(|hidden| hidden.id).collect();
+    (first_point..).zip(plans).map(|(point, plan)| drive_session(plan, case, hidden, &ids, noisy, point)).collect()
+}
+
+/// What the drives of one case share.
+struct Sight<'c> {
+    seed: u64,
+    number: u64,
+    robot: &'c RandomRobot,
+    watching: &'c Watching,
+}
+
+fn drive_session(
+    plan: &SessionPlan,
+    case: &Sight<'_>,
+    hidden: &[&Hidden],
+    ids: &[&str],
+    noisy: bool,
+    point: u32,
+) -> Result<Dataset, ChallengeError> {
+    let mut scenario: Scenario = plan.scenario.clone();
+    if !noisy {
+        scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
+    }
+    scenario.effects.extend(case.robot.harmless(ids));
+    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
+    if noisy && case.watching.class == NoiseClass::Dropouts && point < HELD_OUT && !ids.contains(&"dropped_samples") {
+        scenario.effects.push(Effect::DroppedSamples(effects::DroppedSamples { probability: 0.02 }));
+    }
+    let mut more = Vec::new();
+    for hidden in hidden {
+        match hidden.act() {
+            Some(Act::Catalogue(effect)) => scenario.effects.push(effect),
+            Some(Act::Other(forward)) => more.push((hidden.id, forward)),
+            None => {}
+        }
+    }
+    let mut robot = SimulatedRobot::with_more_effects(&scenario, case.seed, case.number, more)?.at_point(point);
+    let mut runs = Vec::with_capacity(plan.programs.len());
+    for (number, program) in (0_u32..).zip(&plan.programs) {
+        let mut run = Run::default();
+        robot.drive_into(program, &mut run)?;
+        // Each run's looks have draws of their own.
+        let address = effects::Address { seed: case.seed, point, trial: case.number, run: number };
+        let mut draw = Draw(address.stream(StreamName::new("challenge looks")));
+        case.watching.look(&mut run, noisy.then_some(&mut draw));
+        runs.push(run);
+    }
+    Ok(Dataset {
+        provenance: Provenance::default(),
+        robot: robot.robot(),
+        truth_noise: case.watching.stated(),
+        points: Vec::new(),
+        runs,
+    })
+}
+
+impl Case {
+    /// The case of a number; `None` where no robot that was tried shows the effect at all.
+    pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
+        let (round, place) = Round::of(number);
+        for attempt in 0..ATTEMPTS {
+            // Two that show on the same paths must be met; which, is drawn anew.
+            let ids = Self::ids(seed, number, round, place, if round == Round::Pair { attempt } else { 0 });
+            if let Some(case) = Self::attempt(seed, number, round, &ids, attempt)? {
+                return Ok(Ok(case));
+            }
+        }
+        Ok(Err(Self::ids(seed, number, round, place, 0).first().copied().unwrap_or("")))
+    }
+
+    /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn have a mean or scatter: a gross fault is one of
+    /// a few discrete things.
+    fn ids(seed: u64, number: u64, round: Round, place: u64, attempt: u64) -> Vec<&'static str> {
+        let mut draw = Draw::of(seed, number, "what", attempt);
+        let all = hideable();
+        let of =
+            |kind: EffectKind| all.iter().filter(move |(_, of)| *of == kind).map(|(id, _)| *id).collect::<Vec<_>>();
+        let mut one = |gross: f64, scatter: f64| {
+            let chance = draw.uniform(0.0, 1.0);
+            let list = of(if chance < gross {
+                EffectKind::Gross
+            } else if chance < gross + scatter {
+                EffectKind::Scatter
+            } else {
+                EffectKind::Mean
+            });
+            list[draw.below(list.len())]
+        };
+        match round {
+            Round::Null => Vec::new(),
+            Round::Single => vec![one(0.1, 0.15)],
+            Round::Pair => {
+                let first = one(0.0, 0.0);
+                let mut second = one(0.0, 0.0);
+                while second == first {
+                    second = one(0.0, 0.0);
+                }
+                vec![first, second]
+            }
+            #[allow(clippy::cast_possible_truncation)]
+            Round::LeftOut => vec![all[place as usize % all.len()].0],
+        }
+    }
+
+    fn attempt(
+        seed: u64,
+        number: u64,
+        round: Round,
+        ids: &[&'static str],
+        attempt: u64,
+    ) -> Result<Option<Self>, ChallengeError> {
+        let mut draw = Draw::of(seed, number, "robot", attempt);
+        let needs = ids.iter().fold(super::robot::Needs::default(), |all, id| {
+            let own = Hidden::needs(id);
+            super::robot::Needs { payload: all.payload || own.payload, jitter: all.jitter || own.jitter }
+        });
+        let robot = RandomRobot::draw(&mut draw, needs)?;
+        let watching = Watching::draw(&mut draw);
+        let mut hidden = Vec::new();
+        for id in ids {
+            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(None) };
+            hidden.push(effect);
+        }
+        let sight = Sight { seed, number, robot: &robot, watching: &watching };
+        let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
+        let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
+        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: watching.variances() };
+        let ratios = if round == Round::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
+        let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
+        let plain = if weak { drive(&robot.sessions, &sight, &[], false, 0)? } else { Vec::new() };
+        let mut shown = Vec::new();
+        for effect in &mut hidden {
+            let seen = |effect: &Hidden| -> Result<Option<Shown>, ChallengeError> {
+                let exact = drive(&robot.sessions, &sight, &[effect], false, 0)?;
+                Ok(Shown::of(&exact, &plain, &truth, noise))
+            };
+            match scale(effect, &mut draw, ratios, seen)? {
+                Chosen::Gross => shown.push(None),
+                Chosen::Shown(found) => shown.push(Some(*found)),
+                Chosen::Unseen => return Ok(None),
+            }
+        }
+        let all: Vec<&Hidden> = hidden.iter().collect();
+        let both = if hidden.len() == 2 {
+            let exact = drive(&robot.sessions, &sight, &all, false, 0)?;
+            Shown::of(&exact, &plain, &truth, noise)
+        } else {
+            None
+        };
+        let oracle =
+            hidden.iter().enumerate().map(|(k, effect)| view(effect, k, &shown, both.as_ref(), &hidden)).collect();
+        let best = both.as_ref().or(shown.first().and_then(Option::as_ref));
+        let best_drive = best.map(Shown::best_drive);
+        let datasets = drive(&robot.sessions, &sight, &all, true, 0)?;
+        let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, ChallengeError> {
+            Ok(drive(std::slice::from_ref(&robot.held_out), &sight, hidden, false, HELD_OUT)?.pop())
+        };
+        let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
+        let mut held_out_by_chance = Vec::new();
+        for (place, effect) in hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && by_chance(effect)) {
+            held_out_by_chance.extend(log(&[effect])?.map(|log| (place, log)));
+        }
+        Ok(Some(Self {
+            seed,
+            number,
+            round,
+            watching,
+            hidden,
+            oracle,
+            datasets,
+            held_out,
+            held_out_by_chance,
+            best_drive,
+            noise,
+            robot,
+        }))
+    }
+
+    /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only effect, which is a mean: other names, each with the noncentrality of the
+    /// test between it and the true one by all that was driven.
+    pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<More>, ChallengeError> {
+        let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
+        let sight = Sight { seed: self.seed, number: self.number, robot: &self.robot, watching: &self.watching };
+        let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, ChallengeError> {
+            let mut all = drive(&self.robot.sessions, &sight, hidden, false, 0)?;
+            all.extend(drive(plans, &sight, hidden, false, PLANNED)?);
+            Ok(all)
+        };
+        let Some(shown) = Shown::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else { return Ok(None) };
+        let rivals = shown.rivals(effect.id, known(effect, &shown));
+        Ok(Some(More { datasets: drive(plans, &sight, &[effect], true, PLANNED)?, rivals }))
+    }
+
+    /// The drive that a calibration should find.
+    pub(crate) fn truth(&self) -> Option<DriveGeometry> {
+        self.robot.sessions[0].scenario.true_geometry().ok()
+    }
+}
+
+/// What a robot brings home that drives some more.
+pub(crate) struct More {
+    pub(crate) datasets: Vec<Dataset>,
+    pub(crate) rivals: Vec<(&'static str, f64)>,
+}
+
+enum Chosen {
+    Gross,
+    Shown(Box<Shown>),
+    Unseen,
+}
+
+/// Whether chance has a part in an effect's signature: where in its gap a wheel was left, which fraction of a count was lost.
+fn by_chance(effect: &Hidden) -> bool {
+    ["backlash", "low_speed_truncation"].contains(&effect.id)
+}
+
+/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it.
+fn by_form(effect: &Hidden) -> bool {
+    effect.other_form || by_chance(effect)
+}
+
+/// Noncentrality of the test that knows the effect.
+fn known(effect: &Hidden, shown: &Shown) -> f64 {
+    if by_form(effect) { shown.noncentrality_in_form(effect.id) } else { shown.noncentrality() }
+}
+
+/// λ over that of the detection limit, as a ratio of sizes.
+fn ratio(effect: &Hidden, shown: &Shown) -> f64 {
+    match effect.kind {
+        EffectKind::Mean => (known(effect, shown) / detection_limit(shown.freedom(effect.id))).sqrt(),
+        // λ grows with the fourth power of the size.
+        _ => (shown.scatter / TOLD_APART).powf(0.25),
+    }
+}
+
+/// Sets a scale at which the effect is as large as drawn, in units of the oracle's detection limit.
+fn scale(
+    effect: &mut Hidden,
+    draw: &mut Draw,
+    (low, high): (f64, f64),
+    seen: impl Fn(&Hidden) -> Result<Option<Shown>, ChallengeError>,
+) -> Result<Chosen, ChallengeError> {
+    if effect.kind == EffectKind::Gross {
+        return Ok(Chosen::Gross);
+    }
+    effect.scale = effect.most.min(1.0);
+    let Some(first) = seen(effect)? else { return Ok(Chosen::Unseen) };
+    let at_first = ratio(effect, &first);
+    // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
+    let most = at_first * effect.most / effect.scale;
+    if most.is_nan() || most <= low.max(1.0) {
+        return Ok(Chosen::Unseen);
+    }
+    let wanted = draw.log_uniform(low, high.min(most));
+    let mut found = (first, at_first);
+    // How fast the ratio grows with the scale: as its first power, until two points say otherwise.
+    let mut growth = 1.0_f64;
+    for _ in 0..MOST_STEPS {
+        let off = wanted / found.1;
+        if (1.0 / CLOSE.sqrt()..=CLOSE.sqrt()).contains(&off) {
+            break;
+        }
+        let before = (effect.scale, found.1);
+        effect.scale = (effect.scale * off.powf(1.0 / growth).clamp(1e-3, 1e3)).min(effect.most);
+        if effect.act().is_none() {
+            return Ok(Chosen::Unseen);
+        }
+        let Some(next) = seen(effect)? else { return Ok(Chosen::Unseen) };
+        let at_next = ratio(effect, &next);
+        if at_next.is_nan() || at_next <= 0.0 {
+            return Ok(Chosen::Unseen);
+        }
+        let slope = (at_next / before.1).ln() / (effect.scale / before.0).ln();
+        growth = if slope.is_finite() { slope.clamp(0.3, 6.0) } else { 1.0 };
+        found = (next, at_next);
+    }
+    let off = wanted / found.1;
+    let close = (1.0 / CLOSE..=CLOSE).contains(&off);
+    // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
+    let described_better =
+        || found.0.rivals(effect.id, known(effect, &found.0)).first().is_some_and(|(_, left)| *left < -TOLD_APART);
+    let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
+    let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_taken_up_by_lengths();
+    if close && of_its_kind && of_its_own { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
+}
+
+fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Shown>, others: &[Hidden]) -> OracleView {
+    let sizes = effect.sizes().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
+    let mut view = OracleView {
+        id: effect.id.to_owned(),
+        kind: effect.kind,
+        other_form: effect.other_form,
+        sizes,
+        noncentrality: None,
+        ratio: None,
+        form_share: None,
+        rivals: Vec::new(),
+        aliases: Vec::new(),
+    };
+    let Some(own) = shown[place].as_ref() else { return view };
+    if effect.kind == EffectKind::Mean {
+        let other = others.iter().position(|other| other.id != effect.id);
+        let other = other.and_then(|other| Some((&others[other], shown[other].as_ref()?)));
+        let noncentrality = match (both, other) {
+            (Some(both), Some((other, _))) if by_form(effect) => both.noncentrality_beside(effect.id, other.id),
+            (Some(both), Some((_, other))) => {
+                // By polarisation: ⟨a, b⟩ = (|a + b|² − |a|² − |b|²)/2.
+                let (a, b) = (own.noncentrality(), other.noncentrality());
+                let product = 0.5 * (both.noncentrality() - a - b);
+                if b > 0.0 { (a - product * product / b).max(0.0) } else { a }
+            }
+            _ => known(effect, own),
+        };
+        view.noncentrality = Some(noncentrality);
+        view.ratio = Some((noncentrality / detection_limit(own.freedom(effect.id))).sqrt());
+        view.form_share = Some(form_share(effect, own));
+    } else {
+        view.noncentrality = Some(own.scatter);
+        view.ratio = Some(ratio(effect, own));
+    }
+    // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
+    view.rivals =
+        own.rivals(effect.id, known(effect, own)).into_iter().map(|(id, left)| (id.to_owned(), left)).collect();
+    view.aliases = view.rivals.iter().filter(|(_, left)| *left < TOLD_APART).map(|(id, _)| id.clone()).collect();
+    view
+}
+
+/// How much of an effect's signature its own hypothesis takes up.
+fn form_share(effect: &Hidden, shown: &Shown) -> f64 {
+    let whole = shown.noncentrality();
+    if whole > 0.0 { shown.noncentrality_in_form(effect.id) / whole } else { 0.0 }
+}
+
+/// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
+#[cfg(test)]
+pub(crate) struct Trial {
+    seed: u64,
+    robot: RandomRobot,
+    watching: Watching,
+    hidden: Hidden,
+    noise: TrueNoise,
+    truth: DriveGeometry,
+    plain: Vec<Dataset>,
+    pub(crate) noncentrality: f64,
+}
+
+#[cfg(test)]
+impl Trial {
+    /// The first robot that shows the effect, in its catalogue's form, under white noise and many looks.
+    pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, ChallengeError> {
+        for attempt in 0..50 {
+            let mut draw = Draw::of(seed, 0, "trial", attempt);
+            let robot = RandomRobot::draw(&mut draw, Hidden::needs(id))?;
+            let watching = Watching::draw(&mut draw);
+            let Some(mut hidden) = Hidden::draw(id, &robot, &mut draw) else { continue };
+            let plainly = watching.class == NoiseClass::White && watching.kind == super::looks::TruthKind::Dense;
+            if !plainly || hidden.other_form {
+                continue;
+            }
+            let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
+            let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
+            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: watching.variances() };
+            let sight = Sight { seed, number: 0, robot: &robot, watching: &watching };
+            let plain = drive(&robot.sessions, &sight, &[], false, 0)?;
+            let mut noncentrality = 0.0;
+            for _ in 0..4 {
+                let exact = drive(&robot.sessions, &sight, &[&hidden], false, 0)?;
+                let Some(shown) = Shown::of(&exact, &plain, &truth, noise) else { return Ok(None) };
+                noncentrality = shown.noncentrality_in_form(hidden.id);
+                let off = ratio(&hidden, &shown);
+                if (0.99..1.01).contains(&off) {
+                    break;
+                }
+                hidden.scale /= off;
+            }
+            return Ok(Some(Self { seed, robot, watching, hidden, noise, truth, plain, noncentrality }));
+        }
+        Ok(None)
+    }
+
+    /// The oracle's statistic on a drive with noise of its own, with the effect or without.
+    pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
+        let Self { seed, robot, watching, .. } = self;
+        let sight = Sight { seed: *seed, number, robot, watching };
+        let all = [&self.hidden];
+        let data = drive(&robot.sessions, &sight, if hidden { &all } else { &[] }, true, 0)?;
+        let shown = Shown::of(&data, &self.plain, &self.truth, self.noise);
+        Ok(shown.map_or(0.0, |shown| shown.statistic(self.hidden.id)))
+    }
+}

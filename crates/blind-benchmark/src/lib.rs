@@ -1,0 +1,130 @@
+//! The blind benchmark of diagnosis: random robots with known imperfections, diagnosed from their records alone, and scored against an oracle.
+//!
+//! A case is addressed by (seed, number): what is hidden, in whom, driven how, seen how, are draws of that address, so that any case can be driven again
+//! alone and no number of threads changes a bit. The tool under test gets datasets in memory and nothing else; the answer is looked at afterwards. Robots
+//! do effects by the catalogue's forward faces or in other functional forms, and neither is the code of the hypotheses. The oracle ([`OracleView`]) says what
+//! is detectable on a case's paths and which names its data cannot tell apart. Blocks of twenty cases hold seven nulls, seven single effects, two pairs
+//! and four effects that are left out of the catalogue in turn.
+
+mod case;
+mod draw;
+mod error;
+mod forms;
+mod hidden;
+mod looks;
+mod measure;
+mod oracle;
+mod planned;
+mod power;
+mod robot;
+mod score;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use case::Case;
+
+pub use case::{OracleView, Round};
+pub use error::ChallengeError;
+pub use hidden::EffectKind;
+pub use looks::{NoiseClass, TruthKind};
+pub use measure::Measure;
+pub use planned::Planned;
+pub use robot::PathFamily;
+pub use score::{CaseResult, Said};
+
+/// What comes of a campaign.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ChallengeResult {
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Every measure against its bar.
+    pub measures: Vec<Measure>,
+    /// What was hidden, what was said, and how often.
+    pub confusions: Vec<Confusion>,
+    /// Effects that no robot drawn for them showed: how often.
+    pub never_shown: BTreeMap<String, usize>,
+    /// Every case.
+    pub cases: Vec<CaseResult>,
+}
+
+/// What was said of what.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+pub struct Confusion {
+    /// What was asked.
+    pub round: String,
+    /// What was hidden.
+    pub hidden: String,
+    /// What was said.
+    pub said: String,
+    /// How often.
+    pub count: usize,
+    /// The cases.
+    pub cases: Vec<u64>,
+}
+
+/// Drives one case again: what was hidden and what was said; `Err` with the id where no robot drawn for an effect shows it.
+///
+/// # Errors
+/// [`ChallengeError`] when it cannot be simulated.
+pub fn challenge_case(seed: u64, number: u64) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
+    match Case::draw(seed, number)? {
+        Ok(case) => Ok(Ok(score::score(number, &case)?)),
+        Err(id) => Ok(Err(id)),
+    }
+}
+
+/// The datasets of one case, as the tool gets them.
+///
+/// # Errors
+/// As [`challenge_case`].
+pub fn challenge_datasets(seed: u64, number: u64) -> Result<Vec<dataset::Dataset>, ChallengeError> {
+    Ok(Case::draw(seed, number)?.map(|case| case.datasets).unwrap_or_default())
+}
+
+/// Drives all cases on so many threads, 0 for one a core, and scores them; `done` is called after each.
+///
+/// # Errors
+/// [`ChallengeError`] when a case cannot be simulated, or the threads cannot be started.
+pub fn challenge(
+    seed: u64,
+    cases: u64,
+    jobs: usize,
+    done: &(dyn Fn() + Sync),
+) -> Result<ChallengeResult, ChallengeError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
+    let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
+    let one = |number| {
+        let result = challenge_case(seed, number);
+        done();
+        result
+    };
+    let results: Vec<Result<CaseResult, &'static str>> =
+        pool.install(|| (0..cases).into_par_iter().map(one).collect::<Result<_, _>>())?;
+    let (mut scored, mut never_shown) = (Vec::new(), BTreeMap::new());
+    for result in results {
+        match result {
+            Ok(result) => scored.push(result),
+            Err(id) => *never_shown.entry(id.to_owned()).or_insert(0) += 1,
+        }
+    }
+    let measures = measure::measures(seed, &scored);
+    Ok(ChallengeResult { seed, measures, confusions: confusions(&scored), never_shown, cases: scored })
+}
+
+fn confusions(cases: &[CaseResult]) -> Vec<Confusion> {
+    let mut counts: BTreeMap<(String, String, String), Vec<u64>> = BTreeMap::new();
+    for case in cases {
+        let hidden: Vec<&str> = case.hidden.iter().map(|hidden| hidden.id.as_str()).collect();
+        let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
+        let round = serde_json::to_value(case.round).ok().and_then(|value| value.as_str().map(str::to_owned));
+        counts.entry((round.unwrap_or_default(), hidden, case.verdict())).or_default().push(case.case);
+    }
+    counts
+        .into_iter()
+        .map(|((round, hidden, said), cases)| Confusion { round, hidden, said, count: cases.len(), cases })
+        .collect()
+}

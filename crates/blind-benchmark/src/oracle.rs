@@ -1,0 +1,292 @@
+//! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
+//!
+//! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the drive that
+//! fits best without the effect, then sees what of the signature the lengths leave. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
+//! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
+//! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
+//! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
+//! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
+//! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
+
+use dataset::{Dataset, Session};
+use effects::{CATALOGUE, Hypothesis, hypothesis};
+use estimation::{Column, Evidence, Model, Noise, Records, Selection, Thinning, pass_with_innovations};
+use kinematics::DriveGeometry;
+use model_term::{ModelTerm, TermParameter};
+use nalgebra::{DMatrix, DVector};
+
+/// Variances are larger by this in the oracle's pass.
+const LOUD: f64 = 1e10;
+/// What is known of the lengths before any data, as a share: the tool holds to nominal what it sees worse.
+const LENGTHS_SD: f64 = 0.05;
+/// A rival's sizes are free up to so many times what is plausible.
+const RIVAL_SD: f64 = 10.0;
+/// A size within so many standard deviations of nothing may be nothing.
+const IN_ERROR: f64 = 3.0;
+
+/// One shape of one name, and where its columns are.
+struct Candidate {
+    id: &'static str,
+    held: Vec<(&'static str, f64)>,
+    parameters: Vec<TermParameter>,
+    columns: std::ops::Range<usize>,
+}
+
+/// What noise-free runs show at the true drive.
+pub(crate) struct Shown {
+    /// At the lengths that a calibration without the effect would find: a turn lost all along a path is of second order in it before that.
+    total: Evidence,
+    /// χ² of the signature at the true lengths.
+    at_truth: f64,
+    /// The drive with those lengths.
+    best: Model,
+    candidates: Vec<Candidate>,
+    free: Vec<usize>,
+    /// ½ Σ e², e being the mean squared innovation of a run.
+    pub(crate) scatter: f64,
+}
+
+/// The true noise.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrueNoise {
+    pub(crate) wheel_var_per_m: f64,
+    pub(crate) look_var: [f64; 2],
+}
+
+/// The noise of a robot whose counts say nearly all of a turn.
+const LEAST_VAR: f64 = 1e-16;
+
+impl TrueNoise {
+    fn loud(self) -> Noise {
+        let [xy, theta] = self.look_var;
+        Noise { variance: [self.wheel_var_per_m, LEAST_VAR, xy, theta].map(|variance| variance.max(LEAST_VAR) * LOUD) }
+    }
+}
+
+/// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on average over the looks' errors.
+pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
+    look(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * LOUD * seen.total.chi_square)
+}
+
+/// The same with the lengths and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
+pub(crate) fn misfit_of_form(
+    datasets: &[Dataset],
+    model: &Model,
+    noise: TrueNoise,
+    terms: &mut [Box<dyn ModelTerm>],
+) -> f64 {
+    let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain((0..model.sizes.len()).map(Column::Term)).collect();
+    let (mut model, mut least) = (model.clone(), f64::INFINITY);
+    for _ in 0..=LENGTH_STEPS {
+        let Some(seen) = look(datasets, &model, noise, terms) else { return least };
+        least = least.min(0.5 * LOUD * seen.total.chi_square);
+        let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
+        columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+    }
+    least
+}
+
+/// A pass over noise-free runs.
+struct Seen {
+    total: Evidence,
+    /// Whitened innovations, each with its run.
+    z: Vec<((usize, usize), f64)>,
+}
+
+fn look(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Option<Seen> {
+    let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
+    let records = Records::of(&sessions);
+    let selections = Selection::of(&records, Thinning::NONE, model);
+    let headings = vec![0.0; records.chains.len()];
+    let pass = pass_with_innovations(&records, &selections, model, &noise.loud(), &headings, terms);
+    let (first, others) = pass.runs.split_first()?;
+    let mut total = first.clone();
+    others.iter().for_each(|run| total.add(run, 1.0));
+    let z = pass.innovations.iter().flatten().map(|found| (records.chains[found.chain].run, found.z)).collect();
+    Some(Seen { total, z })
+}
+
+/// Steps of Gauss and Newton to the best lengths.
+const LENGTH_STEPS: usize = 3;
+
+/// The step of the lengths to their best, without any effect.
+fn to_best_lengths(total: &Evidence, at: &[usize]) -> Option<DVector<f64>> {
+    let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
+        LOUD * total.information[(at[i], at[j])] + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
+    });
+    let gradient = DVector::from_fn(at.len(), |i, _| LOUD * total.gradient[at[i]]);
+    Some(-(matrix.try_inverse()? * gradient))
+}
+
+/// ½ Σ e² over innovations, e being the mean square of a run's.
+fn scatter(z: &[((usize, usize), f64)]) -> f64 {
+    z.chunk_by(|a, b| a.0 == b.0)
+        .map(|run| {
+            let sum: f64 = run.iter().map(|(_, z)| LOUD * z * z).sum();
+            #[allow(clippy::cast_precision_loss)]
+            let count = run.len() as f64;
+            0.5 * sum * sum / count
+        })
+        .sum()
+}
+
+impl Shown {
+    /// Looks at noise-free runs with every name's hypotheses at hand. `without` are the same runs without the effect: what they show, rounded counts and
+    /// looks between two rows, is not the effect's.
+    pub(crate) fn of(
+        datasets: &[Dataset],
+        without: &[Dataset],
+        truth: &DriveGeometry,
+        noise: TrueNoise,
+    ) -> Option<Self> {
+        let mut terms: Vec<Box<dyn ModelTerm>> = Vec::new();
+        let mut candidates = Vec::new();
+        let mut at = Column::BASE.len();
+        for id in CATALOGUE {
+            let Some(shapes) = hypothesis(id).and_then(Hypothesis::into_shapes) else { continue };
+            for shape in shapes {
+                let parameters = shape.term.parameters().to_vec();
+                let columns = at..at + parameters.len();
+                at = columns.end;
+                candidates.push(Candidate { id, held: shape.held, parameters, columns });
+                terms.push(shape.term);
+            }
+        }
+        let free: Vec<usize> = Column::GEOMETRY.iter().map(|column| column.index()).collect();
+        let mut model = Model::of(truth, at - Column::BASE.len());
+        let plain = look(without, &model, noise, &mut terms)?;
+        let mut at_truth = None;
+        let mut seen = look(datasets, &model, noise, &mut terms)?;
+        for _ in 0..LENGTH_STEPS {
+            at_truth.get_or_insert(LOUD * seen.total.chi_square);
+            let step = to_best_lengths(&seen.total, &free)?;
+            Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+            seen = look(datasets, &model, noise, &mut terms)?;
+        }
+        if seen.z.len() == plain.z.len() {
+            seen.total.gradient -= &plain.total.gradient;
+            seen.z.iter_mut().zip(&plain.z).for_each(|(seen, plain)| seen.1 -= plain.1);
+            seen.total.chi_square = seen.z.iter().map(|(_, z)| z * z).sum();
+        }
+        let at_truth = at_truth.unwrap_or(0.0);
+        let best = Model { sizes: Vec::new(), ..model };
+        Some(Self { scatter: scatter(&seen.z), total: seen.total, at_truth, best, candidates, free })
+    }
+
+    /// How much of χ² the lengths and some candidates take up at their best, and the candidates' sizes there with standard deviations.
+    fn taken_up(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
+        let mut at = self.free.clone();
+        let mut prior: Vec<f64> = at.iter().map(|_| LENGTHS_SD.powi(-2)).collect();
+        for candidate in candidates {
+            at.extend(candidate.columns.clone());
+            prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.plausible).powi(-2)));
+        }
+        // The information of loud looks is less by the same factor as their χ².
+        let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
+            LOUD * self.total.information[(at[i], at[j])] + if i == j { prior[i] } else { 0.0 }
+        });
+        let gradient = DVector::from_fn(at.len(), |i, _| LOUD * self.total.gradient[at[i]]);
+        let size = matrix.diagonal().map(f64::sqrt);
+        let scaled = DMatrix::from_fn(at.len(), at.len(), |i, j| matrix[(i, j)] / (size[i] * size[j]));
+        let Some(inverse) = scaled.cholesky().map(|cholesky| cholesky.inverse()) else { return (0.0, Vec::new()) };
+        let inverse = DMatrix::from_fn(at.len(), at.len(), |i, j| inverse[(i, j)] / (size[i] * size[j]));
+        let step = -(&inverse * &gradient);
+        let values = (self.free.len()..at.len()).map(|k| (step[k], inverse[(k, k)].sqrt())).collect();
+        (-gradient.dot(&step), values)
+    }
+
+    /// The signature's χ² with the lengths at their best: noncentrality of the test by the true form.
+    pub(crate) fn noncentrality(&self) -> f64 {
+        (LOUD * self.total.chi_square - self.taken_up(&[]).0).max(0.0)
+    }
+
+    /// Whether the drive's lengths take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
+    pub(crate) fn is_taken_up_by_lengths(&self) -> bool {
+        self.noncentrality() < 0.01 * self.at_truth
+    }
+
+    /// The shape of a name that takes up most, beside the lengths, and how much: noncentrality of the test by the hypothesis's own form.
+    fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
+        let alone = self.taken_up(&[]).0;
+        self.candidates
+            .iter()
+            .filter(|candidate| candidate.id == id)
+            .map(|candidate| (candidate, (self.taken_up(&[candidate]).0 - alone).max(0.0)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Noncentrality of the test of a name by its hypothesis's own form.
+    pub(crate) fn noncentrality_in_form(&self, id: &str) -> f64 {
+        self.best_shape(id).map_or(0.0, |(_, noncentrality)| noncentrality)
+    }
+
+    /// The same with another name's hypothesis in the model already.
+    pub(crate) fn noncentrality_beside(&self, id: &str, other: &str) -> f64 {
+        let (Some((own, _)), Some((other, _))) = (self.best_shape(id), self.best_shape(other)) else { return 0.0 };
+        (self.taken_up(&[own, other]).0 - self.taken_up(&[other]).0).max(0.0)
+    }
+
+    /// The oracle's test of an effect with one shape on what was measured with noise: χ² without the effect.
+    #[cfg(test)]
+    pub(crate) fn statistic(&self, id: &str) -> f64 {
+        self.noncentrality_in_form(id)
+    }
+
+    /// How many directions of an effect's own hypothesis a plausible size would show by a standard deviation; at least one.
+    pub(crate) fn freedom(&self, id: &str) -> usize {
+        self.candidates
+            .iter()
+            .filter(|candidate| candidate.id == id)
+            .map(|candidate| {
+                let cross = |i: usize, j: usize| LOUD * self.total.information[(i, j)];
+                let own: Vec<usize> = candidate.columns.clone().collect();
+                let free = DMatrix::from_fn(self.free.len(), self.free.len(), |i, j| {
+                    cross(self.free[i], self.free[j]) + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
+                });
+                let between = DMatrix::from_fn(own.len(), self.free.len(), |i, j| cross(own[i], self.free[j]));
+                let matrix = DMatrix::from_fn(own.len(), own.len(), |i, j| cross(own[i], own[j]));
+                let Some(inverse) = free.try_inverse() else { return 0 };
+                let left = matrix - &between * inverse * between.transpose();
+                let plausible = |k: usize| candidate.parameters[k].plausible;
+                let scaled = DMatrix::from_fn(own.len(), own.len(), |i, j| left[(i, j)] * plausible(i) * plausible(j));
+                scaled.symmetric_eigenvalues().iter().filter(|value| **value >= 1.0).count()
+            })
+            .max()
+            .unwrap_or(1)
+            .max(1)
+    }
+
+    /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less than `own` of the true signature its
+    /// hypothesis takes up. Names whose best sizes no effect can have are none.
+    pub(crate) fn rivals(&self, id: &str, own: f64) -> Vec<(&'static str, f64)> {
+        let alone = self.taken_up(&[]).0;
+        let mut rivals: Vec<(&'static str, f64)> = Vec::new();
+        for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {
+            let (taken, values) = self.taken_up(&[candidate]);
+            let sizes: Vec<(&str, f64)> = candidate
+                .parameters
+                .iter()
+                .zip(&values)
+                .map(|(parameter, (size, sigma))| {
+                    (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size })
+                })
+                .chain(candidate.held.iter().copied())
+                .collect();
+            if effects::effect_of_sizes(candidate.id, &sizes).is_none() && sizes.iter().any(|(_, size)| *size != 0.0) {
+                continue;
+            }
+            let left = own - (taken - alone);
+            match rivals.iter_mut().find(|(of, _)| *of == candidate.id) {
+                Some(known) => known.1 = known.1.min(left),
+                None => rivals.push((candidate.id, left)),
+            }
+        }
+        rivals.sort_by(|a, b| a.1.total_cmp(&b.1));
+        rivals
+    }
+
+    /// The lengths at their best, as the drive that a calibration without the effect would find.
+    pub(crate) fn best_drive(&self) -> Model {
+        self.best.clone()
+    }
+}

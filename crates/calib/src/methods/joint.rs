@@ -1,0 +1,175 @@
+//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument measured.
+//!
+//! Model: [`estimation`]: counts predict, measurements correct; geometry, the noise of wheels and instrument and every start pose are estimated.
+//! Assumptions: the instrument's errors are independent. That is tested: while innovations are autocorrelated, measurements are taken farther
+//! apart. Extrinsics and latency of the instrument join when they predict runs that they were not fitted to.
+//! Observability: any path; what the measurements do not determine is named and kept at its nominal value. Ends of closed paths hide the common scale, paths without
+//! turns the wheel separation.
+//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
+
+use dataset::{Blocks, DatasetError, Session, Warning};
+use motion_programs::Schedule;
+use estimation::{Apart, Column, FitSettings, JointFit, LargeFit, Model, OneStepError, fit_large};
+use kinematics::Pose;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::dead_reckoning_jacobian::unseen;
+use crate::estimate::{
+    CalibError, Calibration, Covariance, Method, Mounting, NotObservable, OwnInstrument, Rejected, drive, nominal,
+};
+
+/// The method with the settings of its fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// What is estimated beside the geometry.
+    pub settings: FitSettings,
+}
+
+impl Joint {
+    /// The method as the table of contents offers it.
+    pub const DEFAULT: Self = Self { settings: FitSettings::CALIBRATION };
+
+    const NAME: &'static str = "joint";
+
+    /// Calibrates from datasets of any size, in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where
+    /// [`estimation::is_large`] says no, [`Method::calibrate`] does better: it takes all measurements for every choice.
+    ///
+    /// # Errors
+    /// [`LargeCalibrationError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+    pub fn calibrate_large(
+        &self,
+        datasets: &mut [Blocks],
+        notice: impl FnMut(usize, &Warning),
+    ) -> Result<Calibration, LargeCalibrationError> {
+        let large = fit_large(self.settings, datasets, notice).map_err(|error| match error {
+            OneStepError::Dataset(error) => LargeCalibrationError::Dataset(error),
+            OneStepError::Estimation(error) => CalibError::of_fit(Self::NAME, error).into(),
+        })?;
+        let LargeFit { fit, one_step, robot, names } = large;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        Ok(Calibration { one_step: Some(one_step), ..calibration(&fit, robot.ticks_per_rev, &names)? })
+    }
+}
+
+/// Why large datasets are not calibrated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LargeCalibrationError {
+    /// They cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The method does not apply.
+    #[error(transparent)]
+    Calib(#[from] CalibError),
+}
+
+impl Method for Joint {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn about(&self) -> &'static str {
+        "any path and any truth (poses, positions, ends, displacements, marks): maximum likelihood of whole runs, noise estimated"
+    }
+
+    /// The paper's runs, with squares for what only shows in corners.
+    fn protocol(&self) -> Vec<Schedule> {
+        vec![
+            Schedule::Straights { length_m: 0.5, runs: 40 },
+            Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 20 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 5 },
+        ]
+    }
+
+    fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
+        let (robot, _) = nominal(Self::NAME, sessions)?;
+        let names: Vec<&str> = sessions.iter().map(|session| session.name).collect();
+        let fit = self.settings.fit(sessions).map_err(|error| CalibError::of_fit(Self::NAME, error))?;
+        calibration(&fit, robot.ticks_per_rev, &names)
+    }
+}
+
+/// The fit as a calibration of sessions with these names.
+fn calibration(fit: &JointFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
+    let Model { m_per_rad, separation_m, .. } = fit.fit.model;
+    let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
+    let covariance = fit.covariance(&mut []);
+    let diameter_m = geometry.wheel_diameter_m();
+    let sizes = [diameter_m.left, diameter_m.right, separation_m];
+    let at = |column: Column| fit.columns.iter().position(|of| *of == column);
+    let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
+    let instrument = fit.mean_instrument();
+    let mounting = fit.has(Column::MountX).then(|| Mounting {
+        body_from_sensor: instrument.body_from_sensor,
+        covariance: at(Column::MountX)
+            .filter(|_| covariance.is_some())
+            .map(|first| Matrix3::from_fn(|i, j| var(first + i, first + j).unwrap_or(f64::NAN))),
+    });
+    let latency_sigma_s = at(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
+    Ok(Calibration {
+        covariance: covariance
+            .as_ref()
+            .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
+        mounting,
+        latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
+        own_instruments: own_instruments(fit, names),
+        not_observable: not_observable(fit),
+        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        runs_rejected: rejected(fit),
+        converged: fit.fit.converged,
+        ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
+    })
+}
+
+/// What the measurements do not determine of the geometry.
+#[must_use]
+pub fn not_observable(fit: &JointFit<'_>) -> Vec<NotObservable> {
+    fit.unseen
+        .iter()
+        .map(|direction| {
+            let (parameter, why) = unseen(&Vector3::new(direction[0], direction[1], direction[2]));
+            NotObservable { parameter, why }
+        })
+        .collect()
+}
+
+/// Runs without use and runs of which no measurement fitted.
+fn rejected(fit: &JointFit<'_>) -> Vec<Rejected> {
+    let id = |run: (usize, usize)| fit.records.ids[run.0][run.1].clone();
+    let unused = fit.records.unused.iter().map(|run| Rejected {
+        run: id(*run),
+        why: "it has no wheels, or fewer than two measurements of the instrument within its log".to_owned(),
+    });
+    let far = fit.fit.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
+        run: id(run.run),
+        why: "what the instrument measured lies far outside of what wheels and noise explain".to_owned(),
+    });
+    unused.chain(far).collect()
+}
+
+/// The instruments of groups, by the sessions' names.
+fn own_instruments(fit: &JointFit<'_>, names: &[&str]) -> Vec<OwnInstrument> {
+    let Some(own) = &fit.fit.model.own else { return Vec::new() };
+    let name = |(session, run): (usize, usize)| {
+        let session_name = names[session].to_owned();
+        match own.apart {
+            Apart::Session => session_name,
+            Apart::Run if names.len() == 1 => fit.records.ids[session][run].clone(),
+            Apart::Run => format!("{session_name}/{}", fit.records.ids[session][run]),
+        }
+    };
+    own.of
+        .iter()
+        .map(|(group, instrument)| {
+            let shown = |column: Column, value: f64| fit.shows(*group, column).then_some(value);
+            let Pose { x_m, y_m, theta_rad } = instrument.body_from_sensor;
+            OwnInstrument {
+                of: name(*group),
+                sensor_x_m: shown(Column::MountX, x_m),
+                sensor_y_m: shown(Column::MountY, y_m),
+                sensor_theta_rad: shown(Column::MountTheta, theta_rad),
+                latency_s: shown(Column::Latency, instrument.latency_s),
+            }
+        })
+        .collect()
+}

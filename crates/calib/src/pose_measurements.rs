@@ -1,0 +1,216 @@
+//! What an outside instrument's poses say of a run: looks far enough apart, and how the wheels turned between them.
+//!
+//! An instrument that looks twenty times a second says little more of the wheels than one that looks once a metre, and what is wrong with its clock or with a
+//! start from standstill is in every one of its looks.
+
+use dataset::{NominalRobot, RunView, Session};
+use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
+
+use crate::estimate::{CalibError, Rejected};
+use estimation::WheelTrack;
+
+/// How far the nominal robot moves from look to look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spacing {
+    /// Travel of its centre, metres, …
+    pub(crate) every_m: f64,
+    /// … or turn, whichever comes first, radians.
+    pub(crate) every_rad: f64,
+}
+
+impl Spacing {
+    /// From the first look within the log to the last one.
+    pub(crate) const ENDS: Self = Self { every_m: f64::INFINITY, every_rad: f64::INFINITY };
+}
+
+/// A later look.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Look {
+    /// Turns of the wheels since the look before, row by row, radians.
+    pub(crate) wheel_rad: Vec<Wheels<f64>>,
+    /// What was seen, in the room; whole turns since the start are counted.
+    pub(crate) pose: Pose,
+}
+
+/// The looks at one run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Looks<'a> {
+    /// The run's id.
+    pub(crate) run: &'a str,
+    /// The first look within the log.
+    pub(crate) start: Pose,
+    /// Those after it, the last within the log included.
+    pub(crate) later: Vec<Look>,
+}
+
+impl<'a> Looks<'a> {
+    /// The looks at a run; `None` when fewer than two poses lie within its log, or the log has gaps.
+    pub(crate) fn at(
+        run: &RunView<'a>,
+        track: &WheelTrack<'_>,
+        nominal: &DriveGeometry,
+        spacing: Spacing,
+    ) -> Option<Self> {
+        let poses = run.observed_poses();
+        let spanned = |pair: &[(f64, Pose)]| track.spans(pair[0].0, pair[1].0);
+        let begins = poses.windows(2).position(spanned).filter(|_| run.info().continuous)?;
+        let within = 2 + poses[begins + 1..].windows(2).take_while(|pair| spanned(pair)).count();
+        let (mut from_s, start) = poses[begins];
+        let (mut last_s, mut theta_rad) = (from_s, start.theta_rad);
+        let (mut distance_m, mut turn_rad, mut later) = (0.0, 0.0, Vec::new());
+        for (number, &(t_s, seen)) in poses[begins..begins + within].iter().enumerate().skip(1) {
+            let mut turned_rad = 0.0;
+            for rad in track.steps(last_s, t_s)? {
+                let step = nominal.increment(nominal.m_per_rad().zip_with(rad, |m_per_rad, rad| m_per_rad * rad));
+                distance_m += step.distance_m.abs();
+                turn_rad += step.turn_rad.abs();
+                turned_rad += step.turn_rad;
+            }
+            last_s = t_s;
+            // Whole turns come from the wheels, a pose at a time.
+            theta_rad = unwrap_near(seen.theta_rad, theta_rad + turned_rad);
+            if distance_m >= spacing.every_m || turn_rad >= spacing.every_rad || number + 1 == within {
+                later.push(Look { wheel_rad: track.steps(from_s, t_s)?, pose: Pose { theta_rad, ..seen } });
+                (from_s, distance_m, turn_rad) = (t_s, 0.0, 0.0);
+            }
+        }
+        Some(Self { run: &run.info().id, start, later })
+    }
+
+    /// The looks at every run of all sessions that has two poses or more, and the runs whose poses are of no use.
+    ///
+    /// # Errors
+    /// [`CalibError`] when a robot's nominal values are no drive, or no run is left.
+    pub(crate) fn of_all(
+        method: &'static str,
+        sessions: &[Session<'a>],
+        spacing: Spacing,
+    ) -> Result<(Vec<Self>, Vec<Rejected>), CalibError> {
+        let (mut looks, mut rejected) = (Vec::new(), Vec::new());
+        for session in sessions {
+            let nominal = session.robot.geometry().map_err(|source| CalibError::NotADrive { method, source })?;
+            for run in session.runs.iter().filter(|run| run.observed_ends().is_some()) {
+                let Some(track) = WheelTrack::of(run, session.robot) else { continue };
+                match Self::at(run, &track, &nominal, spacing) {
+                    Some(found) => looks.push(found),
+                    None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_LOOKS.to_owned() }),
+                }
+            }
+        }
+        if looks.is_empty() {
+            let first = rejected.first().map(|rejected| format!("; {}: {}", rejected.run, rejected.why));
+            let why = format!("{NO_POSES}{}", first.unwrap_or_default());
+            return Err(CalibError::NotApplicable { method, why });
+        }
+        Ok((looks, rejected))
+    }
+}
+
+/// Where a run was first and last seen, and how the wheels turned in between.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ends {
+    pub(crate) start: Pose,
+    /// Whole turns since the start are counted.
+    pub(crate) end: Pose,
+    wheel_rad: Vec<Wheels<f64>>,
+}
+
+impl Ends {
+    /// The first and the last look within the log; `None` as for [`Looks::at`].
+    pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
+        let Looks { start, mut later, .. } = Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
+        let Look { wheel_rad, pose } = later.pop()?;
+        Some(Self { start, end: pose, wheel_rad })
+    }
+
+    /// Turn of each wheel, radians.
+    pub(crate) fn turned_rad(&self) -> Wheels<f64> {
+        self.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad))
+    }
+
+    /// Where the robot ends by its wheels, from the origin, by the midpoint rule.
+    pub(crate) fn reckoned(&self, geometry: &DriveGeometry) -> Pose {
+        self.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
+            pose * geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad)).midpoint()
+        })
+    }
+}
+
+const NO_POSES: &str = "no run has the robot's pose at two instants (truth.csv with headings, or two marked points) and wheels that are logged";
+const NO_LOOKS: &str = "its log has gaps, or does not span two of its poses";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+
+    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second for 20 s; poses every half second, and one
+    /// farther outside of the log on either side than its rows reach, headings wrapped.
+    fn dataset(continuous: bool) -> Dataset {
+        let rows = 29;
+        let (metre, spin) = (1.0, 0.25);
+        let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
+        for row in 1..rows {
+            let travel_m = if row <= 8 { (0.25, 0.25) } else { (-0.5 * spin, 0.5 * spin) };
+            let rad = std::f64::consts::TAU / metre;
+            angles.left.push(angles.left[row - 1] + travel_m.0 * rad);
+            angles.right.push(angles.right[row - 1] + travel_m.1 * rad);
+        }
+        let within = (0..56).map(|k| 0.25 + 0.5 * f64::from(k));
+        let truth = [-0.75].into_iter().chain(within).chain([29.0]).map(|t_s: f64| {
+            let turned = (t_s - 8.0).clamp(0.0, 20.0);
+            TruthSample::new(t_s, 0.25 * t_s.clamp(0.0, 8.0), 0.0, Some(kinematics::wrap_to_pi(turned + 3.0)))
+        });
+        let odometry =
+            Odometry { t_s: (0..29).map(f64::from).collect(), wheels: WheelLog::Angles(angles), ..Odometry::default() };
+        let info = RunInfo { id: "a".to_owned(), continuous, ..RunInfo::default() };
+        let diameter_m = metre / std::f64::consts::PI;
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: diameter_m,
+                right_wheel_diameter_m: diameter_m,
+                wheel_separation_m: 0.25,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![Run { info, odometry, truth: truth.collect(), ..Run::default() }],
+        }
+    }
+
+    #[test]
+    fn looks_are_spaced_end_with_the_log_and_count_whole_turns() {
+        let dataset = dataset(true);
+        let spacing = Spacing { every_m: 0.5, every_rad: 4.0 };
+        let (looks, rejected) = Looks::of_all("test", &[dataset.session()], spacing).expect("poses");
+        assert!(rejected.is_empty());
+        let looks = &looks[0];
+        // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at 27.75 s.
+        assert_eq!(looks.start.x_m, 0.0625);
+        let xs: Vec<f64> = looks.later.iter().take(4).map(|look| look.pose.x_m).collect();
+        assert_eq!(xs, [0.5625, 1.0625, 1.5625, 2.0]);
+        let last = looks.later.last().expect("looks");
+        assert!((last.pose.theta_rad - (3.0 + 19.75)).abs() < 1e-12, "{}", last.pose.theta_rad);
+        let turned: f64 = looks.later.iter().flat_map(|look| &look.wheel_rad).map(|rad| rad.right - rad.left).sum();
+        // 19.75 rad over 0.25 m on wheels of 1/2π m radius.
+        assert!((turned / std::f64::consts::TAU * 1.0 / 0.25 - 19.75).abs() < 1e-12);
+        // From end to end.
+        assert_eq!(Looks::of_all("test", &[dataset.session()], Spacing::ENDS).expect("poses").0[0].later.len(), 1);
+    }
+
+    #[test]
+    fn a_log_with_gaps_and_one_that_begins_after_its_poses_are_rejected() {
+        let spacing = Spacing { every_m: 0.5, every_rad: 4.0 };
+        let mut late = dataset(true);
+        late.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s += 100.0);
+        for dataset in [dataset(false), late] {
+            let why = Looks::of_all("test", &[dataset.session()], spacing).expect_err("no looks").to_string();
+            assert!(
+                why.contains("two instants") && why.ends_with("a: its log has gaps, or does not span two of its poses"),
+                "{why}"
+            );
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Why there is no fit.
+
+use dataset::{Session, WheelLog, suspected_wrap};
+use kinematics::{GeometryError, Side};
+
+/// Why sessions give no maximum-likelihood fit.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimationError {
+    /// Nothing was given.
+    #[error("there is no session")]
+    NoSession,
+    /// The nominal values of the robot are not a drive.
+    #[error("the nominal robot is not a drive: {0}")]
+    NotADrive(#[from] GeometryError),
+    /// The counters wrap and no `counter_bits` says where.
+    #[error(
+        "run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml"
+    )]
+    CounterWraps {
+        /// The run.
+        run: String,
+        /// `left` or `right`.
+        side: &'static str,
+        /// The width that the jumps show.
+        bits: u8,
+    },
+    /// No run has wheels and two measurements.
+    #[error("no run has logged wheels and two measurements of an instrument within its log")]
+    NoMeasurements,
+    /// The fit left what is finite.
+    #[error("the fit diverges: the measurements do not follow the wheels at all")]
+    Diverges,
+    /// A profile was asked for of a parameter that is not free, or not observable.
+    #[error("{parameter} is not fitted, or not observable: it has no profile")]
+    NoProfile {
+        /// The parameter.
+        parameter: String,
+    },
+}
+
+/// Refuses sessions whose counters wrap unannounced: a fit would take a jump of 2ⁿ counts for motion.
+///
+/// # Errors
+/// [`EstimationError::CounterWraps`] for the first run that shows it.
+pub fn refuse_wrapped_counters(sessions: &[Session<'_>]) -> Result<(), EstimationError> {
+    for view in sessions.iter().flat_map(|session| &session.runs) {
+        let WheelLog::Ticks(ticks) = &view.odometry().wheels else { continue };
+        for side in Side::BOTH {
+            if let Some(bits) = suspected_wrap(&ticks[side]) {
+                return Err(EstimationError::CounterWraps { run: view.info().id.clone(), side: side.name(), bits });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,243 @@
+//! What a leg comes to by the counts and the terms, and what it depends on; kept from pass to pass where legs are long.
+//!
+//! A leg of many pieces takes many times as long to be driven as its look to be taken, and it depends on the model alone, not on the noise. Near the model
+//! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
+//! kept legs; where they end is settled by legs that are driven.
+
+use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative};
+use model_term::{Interval, Look, ModelTerm};
+use nalgebra::Vector3;
+
+use super::Filter;
+use crate::model::Model;
+use crate::thinning::Leg;
+use crate::wheel_angles::Piece;
+
+/// A leg's motion in the frame of the body at its start, and what it depends on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moved {
+    pub(super) motion: Pose,
+    pub(super) by_lengths: [Vector3<f64>; 3],
+}
+
+/// Where a filter has its legs from.
+pub(crate) enum Legs<'f> {
+    /// They are driven.
+    Driven,
+    /// They are driven, and kept.
+    Kept(KeptLegs),
+    /// They have been kept, by a model that differs from that in force by this.
+    Known(&'f KeptLegs, &'f Change),
+}
+
+/// What the legs of a chain came to.
+#[derive(Debug, Clone)]
+pub(crate) struct KeptLegs {
+    moved: Vec<Moved>,
+    /// How many parameters the terms have.
+    parameters: usize,
+    /// Derivatives of each leg by them.
+    by_terms: Vec<Vector3<f64>>,
+    /// What they add to the look at the start, and to that after each leg, in the frame of the body.
+    sights: Vec<Pose>,
+}
+
+impl Legs<'_> {
+    /// So many, to be driven with terms of so many parameters, and kept.
+    pub(crate) fn kept(legs: usize, parameters: usize) -> Self {
+        Self::Kept(KeptLegs {
+            moved: Vec::with_capacity(legs),
+            parameters,
+            by_terms: Vec::with_capacity(legs * parameters),
+            sights: vec![Pose::IDENTITY; (legs + 1) * parameters],
+        })
+    }
+
+    /// Those that were kept.
+    pub(crate) fn into_kept(self) -> Option<KeptLegs> {
+        if let Self::Kept(kept) = self { Some(kept) } else { None }
+    }
+}
+
+impl KeptLegs {
+    pub(super) fn sight(&self, legs: usize) -> &[Pose] {
+        &self.sights[legs * self.parameters..][..self.parameters]
+    }
+
+    pub(super) fn keep_sight(&mut self, legs: usize, gradients: &[Pose]) {
+        self.sights[legs * self.parameters..][..self.parameters].copy_from_slice(gradients);
+    }
+}
+
+/// The legs of all chains, phase by phase, and the model by which they were driven.
+#[derive(Debug, Clone)]
+pub(crate) struct Kept {
+    pub(crate) model: Model,
+    pub(crate) phases: Vec<Vec<Option<KeptLegs>>>,
+}
+
+/// How a model differs from that by which legs were driven.
+#[derive(Debug, Clone)]
+pub(crate) struct Change {
+    /// Of the lengths, relative: left, right, separation.
+    lengths: [f64; 3],
+    sizes: Vec<f64>,
+}
+
+impl Kept {
+    /// How a model differs from theirs.
+    pub(crate) fn change_to(&self, model: &Model) -> Change {
+        let lengths = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
+        let (from, to) = (lengths(&self.model), lengths(model));
+        Change {
+            lengths: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
+            sizes: model.sizes.iter().zip(&self.model.sizes).map(|(to, from)| to - from).collect(),
+        }
+    }
+
+    /// Those of a chain in a phase, for a model that differs so much.
+    pub(crate) fn known<'k>(&'k self, phase: usize, chain: usize, change: &'k Change) -> Legs<'k> {
+        self.phases[phase][chain].as_ref().map_or(Legs::Driven, |legs| Legs::Known(legs, change))
+    }
+}
+
+impl Filter<'_, '_> {
+    /// The motion of a leg, and in the filter how it depends on the terms' sizes.
+    #[inline(always)]
+    pub(super) fn moved(&mut self, number: usize, leg: &Leg) -> Moved {
+        if let Legs::Known(kept, change) = self.legs {
+            return self.known(kept, change, number);
+        }
+        let moved = self.driven(leg);
+        if let Legs::Kept(kept) = &mut self.legs {
+            kept.moved.push(moved);
+            kept.by_terms.extend((0..kept.parameters).map(|column| self.leg_by_terms.get(column)));
+        }
+        moved
+    }
+
+    #[inline(always)]
+    fn known(&mut self, kept: &KeptLegs, change: &Change, number: usize) -> Moved {
+        let Moved { mut motion, by_lengths } = kept.moved[number];
+        let mut add = |by: Vector3<f64>, change: f64| {
+            motion.x_m += by.x * change;
+            motion.y_m += by.y * change;
+            motion.theta_rad += by.z * change;
+        };
+        by_lengths.iter().zip(change.lengths).for_each(|(by, change)| add(*by, change));
+        let by_terms = &kept.by_terms[number * kept.parameters..][..kept.parameters];
+        for (column, (by, change)) in by_terms.iter().zip(&change.sizes).enumerate() {
+            add(*by, *change);
+            self.leg_by_terms.set(column, *by);
+        }
+        Moved { motion, by_lengths }
+    }
+
+    /// What the terms add to a look at the pose in force, in the frame of the body.
+    #[inline(always)]
+    pub(super) fn sight_of_terms(&mut self, t_s: f64, twist: Twist) {
+        let world_from_body = self.run_from_chain * self.pose;
+        let look = Look { t_s, world_from_body, twist, run: self.chain.info };
+        self.ask_terms(|term, own| term.sight(&look, own));
+    }
+
+    /// Asks each term for its gradients by its own parameters.
+    #[inline(always)]
+    fn ask_terms(&mut self, ask: impl Fn(&mut dyn ModelTerm, &mut [Pose])) {
+        self.gradients.fill(Pose::IDENTITY);
+        let mut rest = &mut self.gradients[..];
+        for term in self.terms.iter_mut() {
+            let (own, others) = rest.split_at_mut(term.parameters().len());
+            ask(term.as_mut(), own);
+            rest = others;
+        }
+    }
+
+    /// The motion of a leg by the counts and the terms.
+    #[inline(always)]
+    fn driven(&mut self, leg: &Leg) -> Moved {
+        let Model { m_per_rad, separation_m, .. } = *self.model;
+        let mut moved = Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3] };
+        self.leg_by_terms.clear();
+        let run_from_start = Frame::from(self.run_from_chain * self.pose);
+        // Those of terms that are only tested have no size, and there are many.
+        let sized = self.model.sizes.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
+        for piece in &self.chain.pieces[leg.pieces.clone()] {
+            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
+            let before = moved.motion;
+            let half_rad = 0.5 * turn_rad;
+            let (sin, cos) = sin_cos(before.theta_rad + half_rad);
+            let chord = sinc(half_rad);
+            // In the frame of the step's middle; a turn acts on half of the way.
+            let middle = |g: &Pose, by_turn: &Vector3<f64>| {
+                Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
+            };
+            let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
+            let bend = sinc_derivative(half_rad);
+            let by_turn = Vector3::new(
+                0.5 * distance_m * (bend * cos - chord * sin),
+                0.5 * distance_m * (bend * sin + chord * cos),
+                1.0,
+            );
+            let along = Vector3::new(chord * cos, chord * sin, 0.0);
+            let per_m = 1.0 / separation_m;
+            let steps = [
+                along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m),
+                along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m),
+                -by_turn * turn_rad,
+            ];
+            if !self.gradients.is_empty() {
+                self.term_gradients(piece, travel_m, run_from_start * before);
+                for (gradient, size) in self.gradients.iter().zip(&self.model.sizes[..sized]) {
+                    step += *size * middle(gradient, &by_turn);
+                }
+            }
+            for (by, of_step) in moved.by_lengths.iter_mut().zip(steps) {
+                *by = turned(*by, step) + of_step;
+            }
+            moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
+            // As if the rest of the leg led back to its start: one turn at the end of the leg then does for those of all pieces.
+            let by_turn = by_turn + Vector3::new(moved.motion.y_m, -moved.motion.x_m, 0.0);
+            let legs = self.leg_by_terms.x.iter_mut().zip(&mut self.leg_by_terms.y).zip(&mut self.leg_by_terms.theta);
+            for (((x, y), theta), gradient) in legs.zip(&self.gradients) {
+                *x += cos * gradient.x_m - sin * gradient.y_m + by_turn.x * gradient.theta_rad;
+                *y += sin * gradient.x_m + cos * gradient.y_m + by_turn.y * gradient.theta_rad;
+                *theta += gradient.theta_rad;
+            }
+            self.session_m += distance_m.abs();
+            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
+            self.previous = Some(*piece);
+        }
+        let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
+        self.leg_by_terms.turn(end);
+        moved
+    }
+
+    #[inline(always)]
+    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, world_from_body: Pose) {
+        let m_per_rad = self.model.m_per_rad;
+        let previous = self.previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
+        let interval = Interval {
+            t_s: piece.t_s,
+            dt_s: piece.dt_s,
+            row_s: piece.row_s,
+            travel_m,
+            previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
+            previous_dt_s: previous.dt_s,
+            wheel_separation_m: self.model.separation_m,
+            wheel_rad: self.wheel_rad,
+            turned_rad: piece.wheel_rad,
+            world_from_body,
+            session_m: self.session_m,
+            run: self.chain.info,
+        };
+        self.ask_terms(|term, own| term.motion(&interval, own));
+    }
+}
+
+/// A derivative carried over a step: a heading that is off turns what comes after.
+#[inline(always)]
+fn turned(by: Vector3<f64>, step: Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(by.x - step.y * by.z, by.y + step.x * by.z, by.z)
+}

@@ -1,0 +1,170 @@
+//! Instruments of their own: a mounting or a latency that each session, or each run, has for itself.
+//!
+//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on n). A run's evidence with that put in is
+//! I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹ of its group: whoever reads evidences need not know that o exists.
+//! A weak prior keeps a group that shows nothing of o at what is common to all.
+//! Reference: Schur complement; Neyman & Scott 1948 for what many nuisances of few data do to a variance, and why they must gain on what was held out.
+
+use std::collections::BTreeMap;
+
+use kinematics::Pose;
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::{Column, Model};
+use crate::normal_equations::Evidence;
+
+/// Where and how late an instrument looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instrument {
+    /// Its frame on the robot.
+    pub body_from_sensor: Pose,
+    /// How late its looks bear their time, seconds.
+    pub latency_s: f64,
+}
+
+/// Who has an instrument of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Apart {
+    /// Each session.
+    Session,
+    /// Each run.
+    Run,
+}
+
+impl Apart {
+    /// The group of a run: its session, and the run itself where runs stand apart.
+    #[must_use]
+    pub const fn group(self, run: (usize, usize)) -> (usize, usize) {
+        match self {
+            Self::Session => (run.0, 0),
+            Self::Run => run,
+        }
+    }
+}
+
+/// What stands apart, and its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Own {
+    /// For whom.
+    pub apart: Apart,
+    /// The columns that do, of mounting and latency.
+    pub columns: Vec<Column>,
+    /// The instruments found, by group.
+    pub of: BTreeMap<(usize, usize), Instrument>,
+}
+
+/// How a group's own columns follow a step of the others: at rest, and by each column of the evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Follow {
+    pub(crate) group: (usize, usize),
+    rest: DVector<f64>,
+    by: DMatrix<f64>,
+    information: DMatrix<f64>,
+}
+
+impl Follow {
+    /// The step of the own columns that goes with a step of some others.
+    pub(crate) fn step(&self, columns: &[Column], step: &DVector<f64>) -> DVector<f64> {
+        columns
+            .iter()
+            .zip(step.iter())
+            .fold(self.rest.clone(), |sum, (column, by)| sum + self.by.column(column.index()) * *by)
+    }
+
+    /// Squared length of a step of the own columns, over its variance.
+    pub(crate) fn squared(&self, step: &DVector<f64>) -> f64 {
+        (step.transpose() * &self.information * step)[0]
+    }
+}
+
+impl Own {
+    /// Values common to all, to start from.
+    #[must_use]
+    pub fn new(apart: Apart, columns: Vec<Column>) -> Self {
+        Self { apart, columns, of: BTreeMap::new() }
+    }
+
+    /// Takes the own columns out of the evidences of runs or parts of runs; the model is the one in force.
+    pub(crate) fn take_out(&self, evidences: &mut [Evidence], model: &Model) -> Vec<Follow> {
+        let at: Vec<usize> = self.columns.iter().map(|column| column.index()).collect();
+        let mut groups: Vec<(usize, usize)> = evidences.iter().map(|evidence| self.apart.group(evidence.run)).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        groups
+            .into_iter()
+            .filter_map(|group| {
+                let in_group = |evidence: &Evidence| self.apart.group(evidence.run) == group;
+                let mut sum = Evidence::new(group, evidences.first()?.gradient.len());
+                evidences.iter().filter(|evidence| in_group(evidence)).for_each(|evidence| sum.add(evidence, 1.0));
+                let pull = self.pull(model, group);
+                let own = DMatrix::from_fn(at.len(), at.len(), |i, j| {
+                    sum.information[(at[i], at[j])] + if i == j { pull[i].1 } else { 0.0 }
+                });
+                let inverse = own.clone().cholesky()?.inverse();
+                let mut cross = DMatrix::from_fn(at.len(), sum.gradient.len(), |i, j| sum.information[(at[i], j)]);
+                at.iter().for_each(|&column| cross.column_mut(column).fill(0.0));
+                let by = -(&inverse * cross);
+                let rest = -(&inverse * DVector::from_fn(at.len(), |i, _| sum.gradient[at[i]] + pull[i].0));
+                evidences.iter_mut().filter(|evidence| in_group(evidence)).for_each(|part| put_in(part, &at, &by));
+                Some(Follow { group, rest, by, information: own })
+            })
+            .collect()
+    }
+
+    /// Is a column of a group known better than before any data?
+    pub(crate) fn is_shown(&self, follow: &Follow, column: Column) -> bool {
+        let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
+        let Some(inverse) = follow.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
+            return false;
+        };
+        inverse[(at, at)].sqrt() < 0.5 * plausible_sd(column)
+    }
+
+    /// Gradient and curvature of what is plausible of each own column's distance from the common value.
+    fn pull(&self, model: &Model, group: (usize, usize)) -> Vec<(f64, f64)> {
+        let common = model.common_instrument();
+        let own = self.of.get(&group).copied().unwrap_or(common);
+        self.columns
+            .iter()
+            .map(|column| {
+                let sd = plausible_sd(*column);
+                let off = match column {
+                    Column::MountX => own.body_from_sensor.x_m - common.body_from_sensor.x_m,
+                    Column::MountY => own.body_from_sensor.y_m - common.body_from_sensor.y_m,
+                    Column::MountTheta => own.body_from_sensor.theta_rad - common.body_from_sensor.theta_rad,
+                    _ => own.latency_s - common.latency_s,
+                };
+                (off / (sd * sd), 1.0 / (sd * sd))
+            })
+            .collect()
+    }
+}
+
+/// A marker that is taken off and put back sits elsewhere by less than a hand's breadth, turned by less than one sees; clocks are set to a tenth of a second.
+const MOUNT_SD_M: f64 = 0.05;
+const MOUNT_SD_RAD: f64 = 0.1;
+const LATENCY_SD_S: f64 = 0.1;
+
+const fn plausible_sd(column: Column) -> f64 {
+    match column {
+        Column::MountX | Column::MountY => MOUNT_SD_M,
+        Column::MountTheta => MOUNT_SD_RAD,
+        _ => LATENCY_SD_S,
+    }
+}
+
+/// Puts own columns that follow the others by `by` into an evidence; their own rows and columns are empty afterwards.
+fn put_in(evidence: &mut Evidence, at: &[usize], by: &DMatrix<f64>) {
+    let n = evidence.gradient.len();
+    let own = DMatrix::from_fn(at.len(), at.len(), |i, j| evidence.information[(at[i], at[j])]);
+    let cross = DMatrix::from_fn(at.len(), n, |i, j| evidence.information[(at[i], j)]);
+    let gradient = DVector::from_fn(at.len(), |i, _| evidence.gradient[at[i]]);
+    let mixed = by.transpose() * &cross;
+    evidence.information += &mixed + mixed.transpose() + by.transpose() * own * by;
+    evidence.gradient += by.transpose() * gradient;
+    for &column in at {
+        evidence.information.column_mut(column).fill(0.0);
+        evidence.information.row_mut(column).fill(0.0);
+        evidence.gradient[column] = 0.0;
+    }
+}

@@ -1,0 +1,53 @@
+//! Maximum-likelihood estimation of a differential drive from whole runs: the likelihood, the fit, augmented models and predicted information.
+//!
+//! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the geometry in force, plus mean terms; noise k² per metre that
+//! a wheel rolls and a variance per radian turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white noise. Start poses are
+//! free: a run begins at its first measurement. The innovations' derivatives by every mean parameter give, run by run, a normal equation ([`Evidence`]): estimates,
+//! score tests, refits and held-out scores are linear algebra on these.
+//!
+//! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry is never moved to make a covariance fit
+//! (mean-only information). A wrong noise model on 10⁵ measurements would outvote the mean.
+//! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974 (scoring); Chong & Kleeman 1997 (k²|s|).
+
+mod acceleration;
+mod covariances;
+mod dead_reckoned_ends;
+mod decimation;
+mod derivatives;
+mod error;
+mod filter;
+mod group_extrinsics;
+mod maximum_likelihood;
+mod model;
+mod model_fit;
+mod noise;
+mod normal_equations;
+mod nuisances;
+mod one_step;
+mod optimizer;
+mod pass;
+mod predicted_information;
+mod products;
+mod profile;
+mod records;
+#[cfg(test)]
+mod tests;
+mod thinning;
+mod wheel_angles;
+
+pub use dead_reckoned_ends::EndError;
+pub use error::{EstimationError, refuse_wrapped_counters};
+pub use filter::Innovation;
+pub use group_extrinsics::{Apart, Instrument, Own};
+pub use maximum_likelihood::FitSettings;
+pub use model::{Column, Model};
+pub use model_fit::{JointFit, WHITE_BELOW};
+pub use noise::{Noise, NoiseComponent};
+pub use normal_equations::{Evidence, Information};
+pub use one_step::{LARGE_ROWS, LargeFit, OneStep, OneStepError, fit_large, is_large};
+pub use optimizer::{Ends, Fit, FitOptions, fit, pass_with_innovations};
+pub use pass::Pass;
+pub use profile::RISE_95;
+pub use records::{Chain, Records};
+pub use thinning::{Selection, Thinning};
+pub use wheel_angles::WheelTrack;

@@ -1,0 +1,61 @@
+//! The order of work of a fit: geometry first, then what is not observable is fixed, the instrument's extrinsics and latency where they predict held-out runs, thinning
+//! while innovations are not white.
+
+use dataset::Session;
+
+use crate::error::{EstimationError, refuse_wrapped_counters};
+use crate::filter::Gate;
+use crate::model::Model;
+use crate::model_fit::JointFit;
+use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
+use crate::optimizer::{Ends, NOISE_SETTLED};
+
+/// What a fit may do beside the geometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitSettings {
+    /// Estimate extrinsics and latency of the instrument where they predict held-out runs.
+    pub nuisances: bool,
+    /// Take measurements farther apart while their errors are autocorrelated; without, every measurement counts as independent.
+    pub thin: bool,
+    /// Thin displacements too. Poses in between are passed over and their distance stays; displacements in between are lost, and with them precision. A test of a model
+    /// must not count autocorrelated displacements as independent; a calibration is better with them.
+    pub thin_displacements: bool,
+}
+
+impl FitSettings {
+    /// What calibration uses.
+    pub const CALIBRATION: Self = Self { nuisances: true, thin: true, thin_displacements: false };
+    /// Geometry and noise from every measurement; extrinsics stay nominal.
+    pub const GEOMETRY_ONLY: Self = Self { nuisances: false, thin: false, thin_displacements: false };
+
+    /// Fits one robot's sessions.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when the sessions hold no measurements, or the fit diverges.
+    pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<JointFit<'a>, EstimationError> {
+        self.fit_until(Ends::NoiseShare(NOISE_SETTLED), sessions)
+    }
+
+    /// The fit, its steps followed so far.
+    pub(crate) fn fit_until<'a>(&self, ends: Ends, sessions: &[Session<'a>]) -> Result<JointFit<'a>, EstimationError> {
+        refuse_wrapped_counters(sessions)?;
+        let first = sessions.first().ok_or(EstimationError::NoSession)?;
+        let nominal = Model::of(&first.robot.geometry()?, 0);
+        let mut found = JointFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
+        found.look_at_the_mounting();
+        found.refit(None)?;
+        found.hold_what_is_unseen()?;
+        let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };
+        let is_explained = matches!(explained, Explained::Yes(_));
+        match explained {
+            Explained::Yes(other) | Explained::No { thinned: other } => found = other,
+            Explained::NotTried if self.thin => found.thin()?,
+            Explained::NotTried => {}
+        }
+        if self.nuisances && !is_explained {
+            add_nuisances(&mut found, Gate::Shut)?;
+        }
+        found.hold_what_is_unseen()?;
+        Ok(found)
+    }
+}

@@ -1,0 +1,133 @@
+//! The mean parameters: the drive's three lengths, where and how late the instrument looks, and the sizes of further terms.
+
+use kinematics::{DriveGeometry, Pose, Wheels};
+use nalgebra::DVector;
+
+use crate::group_extrinsics::{Instrument, Own};
+
+/// A mean parameter, in the order of the columns of every normal equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// Relative change of the left wheel's diameter.
+    LeftWheel,
+    /// Relative change of the right wheel's diameter.
+    RightWheel,
+    /// Relative change of the wheel separation.
+    Separation,
+    /// Place of the instrument ahead of the drive's centre, metres.
+    MountX,
+    /// Its place to the left, metres.
+    MountY,
+    /// Its heading on the robot, radians.
+    MountTheta,
+    /// How late a look bears its time, seconds.
+    Latency,
+    /// A parameter of a further term, by its place among all of them.
+    Term(usize),
+}
+
+impl Column {
+    /// The columns that every pass carries, before those of further terms.
+    pub const BASE: [Self; 7] = [
+        Self::LeftWheel,
+        Self::RightWheel,
+        Self::Separation,
+        Self::MountX,
+        Self::MountY,
+        Self::MountTheta,
+        Self::Latency,
+    ];
+
+    /// The drive's lengths.
+    pub const GEOMETRY: [Self; 3] = [Self::LeftWheel, Self::RightWheel, Self::Separation];
+
+    /// The instrument's mounting.
+    pub const MOUNTING: [Self; 3] = [Self::MountX, Self::MountY, Self::MountTheta];
+
+    /// Its place in a normal equation.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::LeftWheel => 0,
+            Self::RightWheel => 1,
+            Self::Separation => 2,
+            Self::MountX => 3,
+            Self::MountY => 4,
+            Self::MountTheta => 5,
+            Self::Latency => 6,
+            Self::Term(number) => Self::BASE.len() + number,
+        }
+    }
+}
+
+/// Values of the mean parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Travel of each wheel for a radian, metres.
+    pub m_per_rad: Wheels<f64>,
+    /// Distance between the wheel contacts, metres.
+    pub separation_m: f64,
+    /// The instrument's frame on the robot, where it is common to all.
+    pub body_from_sensor: Pose,
+    /// How late looks bear their time, seconds, where it is common to all.
+    pub latency_s: f64,
+    /// Instruments that sessions or runs have for themselves.
+    pub own: Option<Own>,
+    /// Sizes of the further terms' parameters.
+    pub sizes: Vec<f64>,
+}
+
+impl Model {
+    /// A drive seen at its centre, in time, with further terms of no size.
+    #[must_use]
+    pub fn of(geometry: &DriveGeometry, term_parameters: usize) -> Self {
+        Self {
+            m_per_rad: geometry.m_per_rad(),
+            separation_m: geometry.wheel_separation_m(),
+            body_from_sensor: Pose::IDENTITY,
+            latency_s: 0.0,
+            own: None,
+            sizes: vec![0.0; term_parameters],
+        }
+    }
+
+    pub(crate) const fn common_instrument(&self) -> Instrument {
+        Instrument { body_from_sensor: self.body_from_sensor, latency_s: self.latency_s }
+    }
+
+    /// Where and how late the instrument looks in a run.
+    #[must_use]
+    pub fn instrument(&self, run: (usize, usize)) -> Instrument {
+        let own = self.own.as_ref().and_then(|own| own.of.get(&own.apart.group(run)));
+        own.copied().unwrap_or(self.common_instrument())
+    }
+
+    /// Moves the columns that a group has for itself.
+    pub(crate) fn advance_own(&mut self, group: (usize, usize), by: &DVector<f64>) {
+        let common = self.common_instrument();
+        let Some(own) = &mut self.own else { return };
+        let Instrument { body_from_sensor, latency_s } = own.of.entry(group).or_insert(common);
+        for (column, by) in own.columns.iter().zip(by.iter()) {
+            match column {
+                Column::MountX => body_from_sensor.x_m += by,
+                Column::MountY => body_from_sensor.y_m += by,
+                Column::MountTheta => body_from_sensor.theta_rad += by,
+                _ => *latency_s += by,
+            }
+        }
+    }
+
+    /// Moves one parameter by a step of its column.
+    pub fn advance(&mut self, column: Column, by: f64) {
+        match column {
+            Column::LeftWheel => self.m_per_rad.left *= by.exp(),
+            Column::RightWheel => self.m_per_rad.right *= by.exp(),
+            Column::Separation => self.separation_m *= by.exp(),
+            Column::MountX => self.body_from_sensor.x_m += by,
+            Column::MountY => self.body_from_sensor.y_m += by,
+            Column::MountTheta => self.body_from_sensor.theta_rad += by,
+            Column::Latency => self.latency_s += by,
+            Column::Term(number) => self.sizes[number] += by,
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! The instrument's mounting and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
+
+use kinematics::Pose;
+use nalgebra::DVector;
+
+use crate::error::EstimationError;
+use crate::filter::Gate;
+use crate::group_extrinsics::{Apart, Instrument, Own};
+use crate::model::Column;
+use crate::model_fit::{FOLDS, JointFit, LEAST_RUNS};
+use crate::normal_equations::{Evidence, total};
+use crate::optimizer::Fit;
+use crate::thinning::Thinning;
+
+/// A nuisance must gain by so many standard errors on what was held out.
+const GAIN_IN_SIGMAS: f64 = 2.0;
+/// What a run has for itself is judged on the other parts of it.
+const PARTS_OF_A_RUN: usize = 3;
+
+/// A run, or a part of one, with the fold that holds it out.
+struct Unit {
+    fold: usize,
+    evidence: Evidence,
+}
+
+/// What was predicted of runs by fits to other runs.
+#[derive(Debug, Clone, PartialEq)]
+struct HeldOut {
+    /// Each unit's cost.
+    costs: Vec<f64>,
+    /// Sum of the runs' final errors of dead reckoning, metres.
+    end_m: f64,
+    /// The same of headings, radians.
+    end_rad: f64,
+}
+
+/// A set of the instrument's columns that earned its place.
+struct Earned {
+    /// Over none of them, on what was held out.
+    gain: f64,
+    columns: Vec<Column>,
+    own: Option<Own>,
+    held_out: HeldOut,
+}
+
+/// Whether nuisances explain what is not white or lies far off.
+pub(crate) enum Explained<T> {
+    /// The fit with them.
+    Yes(T),
+    /// The fit without them, thinned as far as it has to be.
+    No { thinned: T },
+    /// There was nothing to explain, or nothing to do it.
+    NotTried,
+}
+
+fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
+    #[allow(clippy::cast_precision_loss)]
+    let n = values.len() as f64;
+    if n < 2.0 {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Some((mean, (variance / n).sqrt()))
+}
+
+/// Lets the mounting and the latency of the instrument in, common to all or for each session or run, where they predict runs that they were not fitted to: the
+/// looks by their likelihood, and the ends of the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a
+/// calibration is for. What a run has for itself is fitted to one part of it and judged by another.
+pub(crate) fn add_nuisances(fit: &mut JointFit<'_>, gate: Gate) -> Result<(), EstimationError> {
+    let sets: [&[Column]; 3] =
+        [&Column::MOUNTING, &[Column::Latency], &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency]];
+    let several = fit.fit.pass.runs.iter().any(|run| run.run.0 != fit.fit.pass.runs[0].run.0);
+    let mut ways = vec![None];
+    // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
+    if gate == Gate::Open || (fit.thinning == Thinning::NONE && fit.is_white()) {
+        ways.push(Some(Apart::Run));
+    }
+    if several {
+        ways.push(Some(Apart::Session));
+    }
+    let mut best: Option<Earned> = None;
+    for apart in ways {
+        let units = units_of(fit, apart, gate);
+        let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
+        // What a larger set gains over a smaller one, it must gain by as much as that over nothing.
+        let mut of_way: Option<Earned> = None;
+        for set in sets {
+            let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
+            let (columns, own): (Vec<Column>, _) = match apart {
+                None => (others().chain(set.iter().copied()).collect(), None),
+                Some(apart) => (others().collect(), Some(Own::new(apart, set.to_vec()))),
+            };
+            let Some(found) = held_out(fit, &units, &columns, own.as_ref()) else { continue };
+            let before = of_way.as_ref().map_or(&base, |earned| &earned.held_out);
+            let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
+            let Some((mean, error)) = mean_and_error(&gains) else { continue };
+            let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
+            if mean > GAIN_IN_SIGMAS * error && !drifts {
+                let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
+                of_way = Some(Earned { gain, columns, own, held_out: found });
+            }
+        }
+        if let Some(earned) = of_way
+            && best.as_ref().is_none_or(|best| earned.gain > best.gain)
+        {
+            best = Some(earned);
+        }
+    }
+    if let Some(Earned { columns, own, .. }) = best {
+        let mut from = fit.here();
+        // From where these looks put them, and with every look until they fit: from nothing, a gate may hide what they would explain.
+        if gate == Gate::Open {
+            from.noise = None;
+        }
+        let mut all: Vec<Evidence> =
+            units_of(fit, own.as_ref().map(|own| own.apart), gate).into_iter().map(|unit| unit.evidence).collect();
+        let follows = own.as_ref().map_or_else(Vec::new, |own| own.take_out(&mut all, &from.model));
+        from.model.own = own;
+        if let Some((step, _)) = total(&all).and_then(|sum| sum.of(&columns).solve()) {
+            columns.iter().zip(step.iter()).for_each(|(column, by)| from.model.advance(*column, *by));
+            follows.iter().for_each(|follow| from.model.advance_own(follow.group, &follow.step(&columns, &step)));
+        }
+        fit.columns = columns;
+        fit.refit(Some(from))?;
+    }
+    Ok(())
+}
+
+/// Looks that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all looks, if
+/// they are then white, and were not before or less than half as many lie far off. If they are not, their number says little for what they seem to show.
+pub(crate) fn explained_by_nuisances<'a>(
+    fit: &JointFit<'a>,
+    thin: bool,
+) -> Result<Explained<JointFit<'a>>, EstimationError> {
+    if (fit.is_white() || !thin) && fit.fit.pass.outliers.is_empty() {
+        return Ok(Explained::NotTried);
+    }
+    let mut explained = fit.clone();
+    add_nuisances(&mut explained, Gate::Open)?;
+    if explained.columns == fit.columns && explained.fit.model.own.is_none() {
+        return Ok(Explained::NotTried);
+    }
+    let mut plain = fit.clone();
+    if thin {
+        plain.thin()?;
+    }
+    let far = |found: &JointFit<'_>| found.fit.pass.outliers.len();
+    let uses_more = plain.thinning != Thinning::NONE || 2 * far(&explained) < far(&plain);
+    let is_better = uses_more && !(thin && explained.is_to_be_thinned());
+    Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
+}
+
+/// Fits some columns, and what is own to groups, to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not
+/// determine the columns.
+fn held_out(fit: &JointFit<'_>, units: &[Unit], columns: &[Column], own: Option<&Own>) -> Option<HeldOut> {
+    let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
+    for fold in 0..FOLDS.min(units.len()) {
+        let mut others: Vec<Evidence> =
+            units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.evidence.clone()).collect();
+        let follows = own.map_or_else(Vec::new, |own| own.take_out(&mut others, &fit.fit.model));
+        let (step, _) = total(&others)?.of(columns).solve()?;
+        let mut common = fit.fit.model.clone();
+        columns.iter().zip(step.iter()).for_each(|(column, by)| common.advance(*column, *by));
+        for (k, unit) in units.iter().enumerate().filter(|(_, unit)| unit.fold == fold) {
+            let Evidence { run, .. } = unit.evidence;
+            let (mut columns, mut step, mut model) = (columns.to_vec(), step.clone(), common.clone());
+            // A group of which nothing else is known has what is common.
+            if let Some(own) = own
+                && let Some(follow) = follows.iter().find(|follow| follow.group == own.apart.group(run))
+            {
+                let by = follow.step(&columns, &step);
+                own.columns.iter().zip(by.iter()).for_each(|(column, by)| model.advance(*column, *by));
+                columns.extend(&own.columns);
+                step = DVector::from_iterator(columns.len(), step.iter().chain(by.iter()).copied());
+            }
+            found.costs[k] = unit.evidence.cost_after(&columns, &step);
+            for (end_m, end_rad) in fit.records.end_errors(run, &model) {
+                found.end_m += end_m;
+                found.end_rad += end_rad;
+            }
+        }
+    }
+    Some(found)
+}
+
+/// Evidence to be held out, so that a group is not held out as a whole.
+fn units_of(fit: &JointFit<'_>, apart: Option<Apart>, gate: Gate) -> Vec<Unit> {
+    let runs = fit.fit.pass.runs.len().max(1);
+    let parts = match (apart, gate) {
+        (Some(Apart::Run), gate) => fit.blocks(&mut [], PARTS_OF_A_RUN, gate),
+        (_, Gate::Shut) => fit.units(&mut []),
+        (_, Gate::Open) => fit.blocks(&mut [], LEAST_RUNS.div_ceil(runs), gate),
+    };
+    // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
+    let mut seen: Vec<((usize, usize), usize)> = Vec::new();
+    parts
+        .into_iter()
+        .enumerate()
+        .map(|(number, evidence)| {
+            let fold = match seen.iter_mut().find(|(run, _)| *run == evidence.run) {
+                Some((_, fold)) => {
+                    *fold += 1;
+                    *fold % FOLDS
+                }
+                None => {
+                    seen.push((evidence.run, number % FOLDS));
+                    number % FOLDS
+                }
+            };
+            Unit { fold, evidence }
+        })
+        .collect()
+}
+
+impl JointFit<'_> {
+    /// Is a column of the instrument in the model, for all or for groups?
+    pub fn has(&self, column: Column) -> bool {
+        self.columns.contains(&column) || self.fit.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
+    }
+
+    /// The instrument that all share, or the mean of those that groups show to have.
+    pub fn mean_instrument(&self) -> Instrument {
+        let common = self.fit.model.common_instrument();
+        let Some(own) = &self.fit.model.own else { return common };
+        let mean = |column: Column, common: f64, of: fn(&Instrument) -> f64| {
+            let shown: Vec<f64> = own
+                .of
+                .iter()
+                .filter(|(group, _)| self.shows(**group, column))
+                .map(|(_, instrument)| of(instrument))
+                .collect();
+            #[allow(clippy::cast_precision_loss)] // a group a run at most
+            if shown.is_empty() { common } else { shown.iter().sum::<f64>() / shown.len() as f64 }
+        };
+        let Pose { x_m, y_m, theta_rad } = common.body_from_sensor;
+        Instrument {
+            body_from_sensor: Pose::new(
+                mean(Column::MountX, x_m, |own| own.body_from_sensor.x_m),
+                mean(Column::MountY, y_m, |own| own.body_from_sensor.y_m),
+                mean(Column::MountTheta, theta_rad, |own| own.body_from_sensor.theta_rad),
+            ),
+            latency_s: mean(Column::Latency, common.latency_s, |own| own.latency_s),
+        }
+    }
+
+    /// Does a group's data show a column of its own?
+    #[must_use]
+    pub fn shows(&self, group: (usize, usize), column: Column) -> bool {
+        let Fit { model, pass, .. } = &self.fit;
+        let follow = pass.own.iter().find(|follow| follow.group == group);
+        model.own.as_ref().zip(follow).is_some_and(|(own, follow)| own.is_shown(follow, column))
+    }
+}

@@ -1,0 +1,319 @@
+//! Datasets too large to be held: the whole fit of pieces that are spread over them, then one scoring step over all, a part at a time.
+//!
+//! With the normal equation Σ I, Σ g of everything at the pieces' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is asymptotically as good as the fit of everything, as θ₀ is
+//! within O(1/√n): what it misses is of the order of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
+//! whether the instrument has a mounting or a latency are those of the pieces.
+
+use std::ops::Range;
+use std::sync::mpsc::{Receiver, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use dataset::{Blocks, Dataset, DatasetError, NominalRobot, Session, Warning};
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{EstimationError, refuse_wrapped_counters};
+use crate::group_extrinsics::{Apart, Instrument};
+use crate::maximum_likelihood::FitSettings;
+use crate::model::{Column, Model};
+use crate::model_fit::{JointFit, unseen};
+use crate::normal_equations::{Evidence, Information, total};
+use crate::optimizer::{Ends, pass_settled};
+use crate::records::Records;
+use crate::thinning::Selection;
+
+/// With more rows of odometry and looks together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
+pub const LARGE_ROWS: usize = 500_000;
+/// With more rows a look, pieces would show too few looks: such datasets are fitted as a whole.
+const MOST_ROWS_A_LOOK: usize = 500;
+/// Looks of the pieces together. They show a variance to 0.3 %, and a correlation of innovations to 0.4 %.
+const FIRST_LOOKS: usize = 1 << 16;
+/// Rows of the pieces together at most, where looks are few.
+const FIRST_ROWS: usize = 1 << 19;
+/// As many as can be held out, and no more: looks may have to be thinned to some of hundreds of rows, and only a long way shows by its end what lengths are worth.
+const PIECES: usize = 8;
+/// How far the noise of the pieces is followed before looks are told to be white or not, and at last: nearer than the pieces know it.
+const FIRST_NOISE_SETTLED: f64 = 5e-2;
+const LAST_NOISE_SETTLED: f64 = 1e-3;
+/// A part that is held at a time has so many blocks at least, and so many looks and thinned looks: at its cut one of them has no other to begin at.
+const PART_BLOCKS: usize = 32;
+const PART_LOOKS: usize = 1000;
+const PART_LEGS: usize = 50;
+/// Parts wait for no more cores than these, as each holds its memory.
+const MOST_WORKERS: usize = 4;
+/// A step whose square, of lengths by ratio and of headings in radians, is below this share of a standard deviation is right to about that share.
+const NEAR: f64 = 0.05;
+const MOST_PASSES: usize = 5;
+
+/// How a calibration of large datasets was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OneStep {
+    /// Looks of all runs.
+    pub looks: usize,
+    /// Looks of the pieces that were fitted as a whole first.
+    pub first_looks: usize,
+    /// Passes over everything: one, unless the first fit was far off.
+    pub passes: usize,
+}
+
+/// Why large datasets are not calibrated.
+#[derive(Debug, thiserror::Error)]
+pub enum OneStepError {
+    /// They cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// There is no fit.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+}
+
+/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a look in 500 rows at least.
+#[must_use]
+pub fn is_large(datasets: &[Blocks]) -> bool {
+    let (rows, looks) = rows_and_looks(datasets);
+    rows + looks > LARGE_ROWS && looks.saturating_mul(MOST_ROWS_A_LOOK) >= rows
+}
+
+fn rows_and_looks(datasets: &[Blocks]) -> (usize, usize) {
+    let of = |blocks: &Blocks, count: fn(&Blocks, usize) -> usize| -> usize {
+        (0..blocks.infos().len()).map(|run| count(blocks, run)).sum()
+    };
+    datasets
+        .iter()
+        .fold((0, 0), |(rows, looks), blocks| (rows + of(blocks, Blocks::rows), looks + of(blocks, Blocks::seen_rows)))
+}
+
+/// Blocks of one run: dataset, run, blocks.
+type Part = (usize, usize, Range<usize>);
+
+/// One part's evidence, and what else it said.
+struct Weighed {
+    number: usize,
+    evidence: Option<Evidence>,
+    own: Option<Instrument>,
+    looks: usize,
+}
+
+/// Everything at the values of a fit.
+struct Gathered {
+    parts: Vec<Evidence>,
+    looks: usize,
+}
+
+/// The fit of datasets of any size; its records hold no measurements, only the runs' ids.
+#[derive(Debug, Clone)]
+pub struct LargeFit {
+    /// The fit.
+    pub fit: JointFit<'static>,
+    /// How it was made.
+    pub one_step: OneStep,
+    /// The robot of the first dataset.
+    pub robot: NominalRobot,
+    /// The datasets' names.
+    pub names: Vec<String>,
+}
+
+/// Fits datasets of any size in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where [`is_large`] says no,
+/// [`FitSettings::fit`] does better: it takes all measurements for every choice.
+///
+/// # Errors
+/// [`OneStepError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+pub fn fit_large(
+    settings: FitSettings,
+    datasets: &mut [Blocks],
+    mut notice: impl FnMut(usize, &Warning),
+) -> Result<LargeFit, OneStepError> {
+    let pieces = pieces(datasets)?;
+    let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
+    let mut first = settings.fit_until(Ends::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
+    first.ends = Ends::NoiseShare(LAST_NOISE_SETTLED);
+    first.refit(Some(first.here()))?;
+    let first_looks = first.records.looks();
+    let part_blocks = part_blocks(&first, datasets);
+    let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
+    let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
+    let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
+    // What the pieces hold is needed no more.
+    let mut found = first.with_records(Records { chains: Vec::new(), unused: Vec::new(), ids });
+    let mut passes = 0;
+    loop {
+        passes += 1;
+        let Gathered { parts, looks } = found.gather(datasets, part_blocks, &mut notice)?;
+        let is_near = found.step_over(parts)?;
+        if is_near || passes == MOST_PASSES {
+            found.fit.converged &= is_near;
+            return Ok(LargeFit { fit: found, one_step: OneStep { looks, first_looks, passes }, robot, names });
+        }
+    }
+}
+
+/// The pieces, a dataset of them from each dataset.
+fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
+    let (rows, looks) = rows_and_looks(datasets);
+    let wanted = (FIRST_LOOKS.saturating_mul(rows) / looks.max(1)).min(FIRST_ROWS);
+    // Every so many rows a piece, in the middle of these.
+    let stride = (rows / PIECES).max(1);
+    let within = stride.saturating_sub(wanted / PIECES) / 2..(stride + wanted / PIECES) / 2;
+    let mut before = 0;
+    let mut pieces = Vec::with_capacity(datasets.len());
+    for blocks in datasets {
+        let mut piece = blocks.header().clone();
+        for run in 0..blocks.infos().len() {
+            let count = blocks.blocks(run);
+            let start = before;
+            before += blocks.rows(run);
+            let is_taken = |block: usize| within.contains(&((start + block * Blocks::ROWS) % stride));
+            let mut block = 0;
+            while block < count {
+                let end = block + (block..count).take_while(|block| is_taken(*block)).count();
+                if end > block {
+                    piece.runs.extend(blocks.read(run, block..end)?.dataset.runs);
+                }
+                block = end + 1;
+            }
+        }
+        pieces.push(piece);
+    }
+    Ok(pieces)
+}
+
+/// How many blocks of a run are held at a time.
+fn part_blocks(first: &JointFit<'_>, datasets: &[Blocks]) -> usize {
+    let (rows, looks) = rows_and_looks(datasets);
+    let legs: usize =
+        first.selections.first().map_or(0, |selection| selection.legs.iter().map(Vec::len).sum::<usize>());
+    let looks_a_leg = first.records.looks().div_ceil(legs.max(1));
+    let wanted_looks = PART_LOOKS.max(PART_LEGS * looks_a_leg);
+    PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(looks.max(1))).div_ceil(Blocks::ROWS))
+}
+
+impl JointFit<'_> {
+    /// The evidence of everything at the values in force, part by part. This thread reads, others compute; sums are taken in the order of the parts.
+    fn gather(
+        &mut self,
+        datasets: &mut [Blocks],
+        part_blocks: usize,
+        notice: &mut impl FnMut(usize, &Warning),
+    ) -> Result<Gathered, OneStepError> {
+        let runs_stand_apart = self.fit.model.own.as_ref().is_some_and(|own| own.apart == Apart::Run);
+        let parts: Vec<Part> = datasets
+            .iter()
+            .enumerate()
+            .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| (dataset, run, blocks.blocks(run))))
+            .flat_map(|(dataset, run, count)| {
+                // What a run has for itself is found from all of it.
+                let cuts = if runs_stand_apart { 1 } else { count.div_ceil(part_blocks) };
+                (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
+            })
+            .collect();
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MOST_WORKERS);
+        let mut weighed = std::thread::scope(|scope| -> Result<Vec<Weighed>, OneStepError> {
+            // No part waits: the thread that reads waits for one that has time.
+            let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
+            let take = Arc::new(Mutex::new(take));
+            let (hand_in, collect) = channel();
+            for _ in 0..workers {
+                let (take, hand_in, this) = (Arc::clone(&take), hand_in.clone(), &*self);
+                scope.spawn(move || {
+                    while let Some((number, run, part)) = next(&take) {
+                        if hand_in.send(this.weighed(number, run, &part)).is_err() {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop((hand_in, take));
+            for (number, (dataset, run, blocks)) in parts.iter().enumerate() {
+                let loaded = datasets[*dataset].read(*run, blocks.clone())?;
+                loaded.warnings.iter().for_each(|warning| notice(*dataset, warning));
+                // Nobody takes any more: what was handed in says why.
+                if give.send((number, (*dataset, *run), loaded.dataset)).is_err() {
+                    break;
+                }
+            }
+            drop(give);
+            Ok(collect.into_iter().collect::<Result<Vec<_>, EstimationError>>()?)
+        })?;
+        weighed.sort_unstable_by_key(|part| part.number);
+        let looks = weighed.iter().map(|part| part.looks).sum();
+        let mut unused = Vec::new();
+        for of_run in weighed.chunk_by(|a, b| run_of(&parts[a.number]) == run_of(&parts[b.number])) {
+            if of_run.iter().all(|part| part.evidence.is_none()) {
+                unused.push(run_of(&parts[of_run[0].number]));
+            }
+        }
+        Arc::make_mut(&mut self.records).unused = unused;
+        if let Some(own) = &mut self.fit.model.own {
+            let found =
+                weighed.iter().filter_map(|part| Some((own.apart.group(run_of(&parts[part.number])), part.own?)));
+            own.of.extend(found);
+        }
+        Ok(Gathered { parts: weighed.into_iter().filter_map(|part| part.evidence).collect(), looks })
+    }
+
+    /// What a part says at the values in force.
+    fn weighed(&self, number: usize, run: (usize, usize), part: &Dataset) -> Result<Weighed, EstimationError> {
+        let sessions = [part.session()];
+        refuse_wrapped_counters(&sessions)?;
+        let records = Records::of(&sessions).belonging_to(run);
+        if records.chains.is_empty() {
+            return Ok(Weighed { number, evidence: None, own: None, looks: 0 });
+        }
+        let selections = Selection::of(&records, self.thinning, &self.nominal);
+        let (mut model, noise) = (self.fit.model.clone(), &self.fit.noise);
+        let stands_apart = model.own.as_ref().is_some_and(|own| own.apart == Apart::Run);
+        if stands_apart {
+            model = pass_settled(&records, &selections, model, noise)?.0;
+        }
+        let instrument = model.instrument(run);
+        let Instrument { body_from_sensor, latency_s } = instrument;
+        // The columns that stand apart are still in the evidence: they are taken out of a group's sum.
+        let model = Model { body_from_sensor, latency_s, own: None, ..model };
+        let (_, pass) = pass_settled(&records, &selections, model, noise)?;
+        let own = stands_apart.then_some(instrument);
+        Ok(Weighed { number, evidence: total(&pass.runs), own, looks: records.looks() })
+    }
+
+    /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
+    fn step_over(&mut self, mut parts: Vec<Evidence>) -> Result<bool, EstimationError> {
+        let own = self.fit.model.own.clone();
+        let follows = own.map_or_else(Vec::new, |own| own.take_out(&mut parts, &self.fit.model));
+        let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };
+        let information = sum.of(&self.columns);
+        self.unseen = unseen(&information.matrix);
+        let free = self.free_basis();
+        let reduced = Information {
+            matrix: free.transpose() * information.matrix * &free,
+            gradient: free.transpose() * information.gradient,
+        };
+        let (step, covariance) = reduced.solve().ok_or(EstimationError::Diverges)?;
+        let (step, covariance) = (&free * step, &free * covariance * free.transpose());
+        let mut moved = DVector::zeros(sum.gradient.len());
+        let mut is_near = true;
+        for (row, column) in self.columns.iter().enumerate() {
+            moved[column.index()] = step[row];
+            self.fit.model.advance(*column, step[row]);
+            let bends = Column::GEOMETRY.contains(column) || *column == Column::MountTheta;
+            is_near &= !bends || step[row].powi(2) <= NEAR * covariance[(row, row)].sqrt();
+        }
+        follows.iter().for_each(|follow| self.fit.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
+        // To first order the scores are those at the new values.
+        for part in &mut parts {
+            let by = &part.information * &moved;
+            part.chi_square += 2.0 * part.gradient.dot(&moved) + by.dot(&moved);
+            part.gradient += by;
+        }
+        self.fit.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
+        self.fit.pass.own = follows;
+        self.parts = parts;
+        Ok(is_near)
+    }
+}
+
+const fn run_of(part: &Part) -> (usize, usize) {
+    (part.0, part.1)
+}
+
+fn next<T>(take: &Mutex<Receiver<T>>) -> Option<T> {
+    take.lock().unwrap_or_else(PoisonError::into_inner).recv().ok()
+}

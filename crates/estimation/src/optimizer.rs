@@ -1,0 +1,463 @@
+//! The fit: Gauss–Newton for the mean parameters and Fisher scoring for the noise, side by side.
+
+use kinematics::{Increment, Pose, unwrap_near};
+use model_term::ModelTerm;
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+
+use crate::acceleration::{Acceleration, Size};
+use crate::error::EstimationError;
+use crate::filter::{Gate, Kept, Want};
+use crate::model::{Column, Model};
+use crate::noise::{LEAST_SIGMA, Noise, NoisePrior};
+use crate::normal_equations::{Information, total};
+use crate::pass::{FreeHeading, Pass, pass};
+use crate::records::{Chain, Records, Start};
+use crate::thinning::Selection;
+
+/// Median of χ² with one degree of freedom.
+const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
+/// A step this small, squared and over its variance, changes nothing that a print shows.
+const SETTLED: f64 = 1e-8;
+/// Nor does one of the noise by less than this share of a variance.
+pub(crate) const NOISE_SETTLED: f64 = 1e-4;
+/// Where models are compared by their likelihoods, steps of the mean and of the noise may end that are this small, squared and over their variance: they change its
+/// logarithm by half of it.
+const MEAN_COST: f64 = 1e-4;
+const NOISE_COST: f64 = 1e-2;
+const LARGEST_NOISE_STEP: f64 = 1.5;
+/// After a step of less than a standard deviation, legs need not be driven again for the next: they follow it to first order.
+const NEAR: f64 = 1.0;
+/// Where steps by kept legs have settled, one by driven legs that is this small, squared and over its variance, is the last: the next would be less by orders.
+const CONFIRMED: f64 = 1e-4;
+/// So near to where they were driven, squared and over the variance, legs are what they would be if they were driven again: at 0.02, driven legs made a step of 5e-8.
+const STILL: f64 = 0.1;
+/// Steps before outliers are told: at least, and at most.
+const LEAST_STARTS: usize = 3;
+const MOST_STARTS: usize = 20;
+/// A step of ten standard deviations, squared, is a long way.
+const FAR: f64 = 100.0;
+/// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
+const DAMPING: f64 = 1e-7;
+const LEAST_INFORMATION: f64 = 1e-9;
+
+/// Where the steps of a fit end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ends {
+    /// Where they are less than 1e-4 of a standard deviation of the mean, and this share of each variance.
+    NoiseShare(f64),
+    /// Where they change the log of the likelihood by less than 0.005: a variance that hardly matters may be anything.
+    Likelihood,
+}
+
+/// What to fit.
+#[derive(Debug, Clone)]
+pub struct FitOptions {
+    /// The free columns.
+    pub columns: Vec<Column>,
+    /// Directions of the free columns along which nothing moves: rows over the columns.
+    pub held: Vec<DVector<f64>>,
+    /// The noise stays as it is.
+    pub noise_held: bool,
+    /// Where steps end.
+    pub ends: Ends,
+    /// Most steps.
+    pub max_steps: usize,
+    /// Looks that lie far off are taken like the others.
+    pub every_look: bool,
+}
+
+impl FitOptions {
+    /// Fits some columns.
+    #[must_use]
+    pub fn of(columns: &[Column]) -> Self {
+        Self {
+            columns: columns.to_vec(),
+            held: Vec::new(),
+            noise_held: false,
+            ends: Ends::NoiseShare(NOISE_SETTLED),
+            max_steps: 60,
+            every_look: false,
+        }
+    }
+}
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The mean parameters.
+    pub model: Model,
+    /// The noise.
+    pub noise: Noise,
+    /// Start headings of chains whose instrument sees none, radians; 0 for others.
+    pub(crate) free_headings: Vec<f64>,
+    /// The last pass, at the values above.
+    pub pass: Pass,
+    /// Did the steps die out?
+    pub converged: bool,
+    /// Did a step go far, and farther than the first? What it ends at may be one of several minima.
+    pub strayed: bool,
+}
+
+impl Fit {
+    /// Before anything is fitted.
+    pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
+        let pass = Pass::nothing();
+        Self {
+            model: nominal.clone(),
+            noise: prior.noise(),
+            free_headings: Vec::new(),
+            pass,
+            converged: false,
+            strayed: false,
+        }
+    }
+
+    /// The normal equation of some columns at the values found, over all runs.
+    #[must_use]
+    pub fn information(&self, columns: &[Column]) -> Option<Information> {
+        total(&self.pass.runs).map(|sum| sum.of(columns))
+    }
+}
+
+/// Where to start.
+#[derive(Debug, Clone)]
+pub(crate) struct From {
+    pub(crate) model: Model,
+    pub(crate) noise: Option<Noise>,
+    pub(crate) free_headings: Option<Vec<f64>>,
+}
+
+/// Fits the model to the records, from the nominal drive on.
+///
+/// # Errors
+/// [`EstimationError`] when there is nothing to fit, or it diverges.
+pub fn fit(
+    records: &Records<'_>,
+    selections: &[Selection],
+    nominal: &Model,
+    stated: dataset::TruthNoise,
+    terms: &mut [Box<dyn ModelTerm>],
+    options: &FitOptions,
+) -> Result<Fit, EstimationError> {
+    let from = From { model: nominal.clone(), noise: None, free_headings: None };
+    fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
+}
+
+pub(crate) fn fit_from(
+    records: &Records<'_>,
+    selections: &[Selection],
+    from: From,
+    prior: &NoisePrior,
+    terms: &mut [Box<dyn ModelTerm>],
+    options: &FitOptions,
+) -> Result<Fit, EstimationError> {
+    if selections.iter().all(|selection| selection.legs.iter().all(Vec::is_empty)) {
+        return Err(EstimationError::NoMeasurements);
+    }
+    let mut model = from.model;
+    let mut headings =
+        from.free_headings.unwrap_or_else(|| records.chains.iter().map(|chain| start_heading(chain, &model)).collect());
+    let basis = basis(options);
+    let mut noise = from.noise.unwrap_or_else(|| prior.noise());
+    if from.noise.is_none() {
+        // Sizes first, by medians, which outliers do not move; then outliers can be told.
+        for round in 1..=MOST_STARTS {
+            let want = Want { innovations: true, gate: Gate::Open, ..Want::default() };
+            let found = pass(records, selections, &model, &noise, &headings, terms, want);
+            let mean = MeanStep::of(&found, options, &basis)?;
+            let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
+            let moved = mean.squared + own;
+            let mut squares: Vec<f64> =
+                found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
+            if squares.is_empty() {
+                break;
+            }
+            let middle = squares.len() / 2;
+            let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
+            // A long way with few looks bends the path: while steps are large, every look would be taken for an outlier.
+            if round >= LEAST_STARTS && moved < 1.0 {
+                break;
+            }
+        }
+    }
+    let want = Want { noise_score: !options.noise_held, gate: Gate::of(options.every_look), ..Want::default() };
+    let (mut converged, mut strayed, mut first) = (false, false, None);
+    let (mut pace, mut acceleration) = (Pace::default(), Acceleration::default());
+    let keep = Selection::has_long_legs(selections);
+    let (mut kept, mut confirms): (Option<Kept>, bool) = (None, false);
+    // How far the model has come from where legs were kept: squares of its steps.
+    let mut strolled = 0.0;
+    for _ in 0..options.max_steps {
+        let by_kept = Want { keep: keep && kept.is_none(), by: kept.as_ref(), ..want };
+        let mut found = pass(records, selections, &model, &noise, &headings, terms, by_kept);
+        let mean = MeanStep::of(&found, options, &basis)?;
+        let of_noise = if options.noise_held { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
+        let columns = options.columns.len();
+        let tamed = pace.tamed(of_noise.by);
+        let own = if acceleration.engages(Size { mean: mean.squared, noise: of_noise.by.amax() }) {
+            let proposed = stacked(&mean.by, &of_noise.by);
+            let by = acceleration.instead_of(&proposed, &block_diagonal(&mean.information, &of_noise.information));
+            let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
+            let (moved, own) = take_step(&mut model, &mut headings, &found, options, by.rows(0, columns).into_owned())?;
+            acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut noise, by_noise)));
+            own
+        } else {
+            take_noise_step(&mut noise, tamed);
+            take_step(&mut model, &mut headings, &found, options, mean.by)?.1
+        };
+        let moved = mean.squared + own;
+        strayed |= moved > FAR.max(*first.get_or_insert(moved));
+        // By kept legs steps only seem to settle: driven ones have the last word, where the model has gone on since.
+        strolled = if kept.is_none() { moved } else { strolled + moved };
+        let mean_settled = if confirms { CONFIRMED } else { SETTLED };
+        let settles = match options.ends {
+            Ends::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
+            Ends::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
+        };
+        if settles && (kept.is_none() || strolled < STILL) {
+            (converged, kept) = (true, kept.or(found.kept.take()));
+            break;
+        }
+        kept = if settles { None } else { kept.or(found.kept.take()).filter(|_| moved < NEAR) };
+        confirms = settles;
+    }
+    // The last step was so small that legs follow it as if they were driven.
+    let by = kept.as_ref().filter(|_| converged);
+    let want = Want { innovations: true, gate: Gate::of(options.every_look), by, ..Want::default() };
+    let pass = pass(records, selections, &model, &noise, &headings, terms, want);
+    Ok(Fit { model, noise, free_headings: headings, pass, converged, strayed })
+}
+
+/// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
+const HEADING_SETTLED_RAD: f64 = 1e-6;
+
+/// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for
+/// themselves, are followed until they settle; nothing else moves.
+pub(crate) fn pass_settled(
+    records: &Records<'_>,
+    selections: &[Selection],
+    mut model: Model,
+    noise: &Noise,
+) -> Result<(Model, Pass), EstimationError> {
+    let options = FitOptions::of(&[]);
+    let mut headings: Vec<f64> = records.chains.iter().map(|chain| start_heading(chain, &model)).collect();
+    for round in 1.. {
+        let found = pass(records, selections, &model, noise, &headings, &mut [], Want::default());
+        let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
+        let mut next = model.clone();
+        let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
+        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MOST_STARTS {
+            return Ok((model, found));
+        }
+        model = next;
+    }
+    Err(EstimationError::Diverges)
+}
+
+/// A pass at given values, with its innovations; free headings are those of chains whose instrument sees none, one for each chain.
+#[must_use]
+pub fn pass_with_innovations(
+    records: &Records<'_>,
+    selections: &[Selection],
+    model: &Model,
+    noise: &Noise,
+    free_headings: &[f64],
+    terms: &mut [Box<dyn ModelTerm>],
+) -> Pass {
+    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, ..Want::default() })
+}
+
+/// An orthonormal basis of the directions that may move.
+pub(crate) fn basis(options: &FitOptions) -> DMatrix<f64> {
+    let n = options.columns.len();
+    if options.held.is_empty() {
+        return DMatrix::identity(n, n);
+    }
+    let held = DMatrix::from_columns(&options.held);
+    // Held directions have eigenvalue 1 or more in H Hᵀ, the others 0.
+    let eigen = (&held * held.transpose()).symmetric_eigen();
+    let free: Vec<_> =
+        (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
+}
+
+/// A damped Gauss–Newton step of the mean.
+struct MeanStep {
+    /// By column of the options.
+    by: DVector<f64>,
+    /// Information on those columns.
+    information: DMatrix<f64>,
+    /// Squared length over its variance.
+    squared: f64,
+}
+
+impl MeanStep {
+    fn of(found: &Pass, options: &FitOptions, basis: &DMatrix<f64>) -> Result<Self, EstimationError> {
+        let Some(sum) = total(&found.runs) else { return Err(EstimationError::NoMeasurements) };
+        let Information { matrix, gradient } = sum.of(&options.columns);
+        if options.columns.is_empty() || basis.ncols() == 0 {
+            return Ok(Self { by: DVector::zeros(options.columns.len()), information: matrix, squared: 0.0 });
+        }
+        let reduced = basis.transpose() * &matrix * basis;
+        let m = reduced.nrows();
+        let damping = DVector::from_fn(m, |k, _| DAMPING * reduced[(k, k)] + LEAST_INFORMATION);
+        let damped =
+            Information { matrix: &reduced + DMatrix::from_diagonal(&damping), gradient: basis.transpose() * gradient };
+        let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
+        let squared = (step.transpose() * &reduced * &step)[0];
+        Ok(Self { by: basis * step, information: matrix, squared })
+    }
+}
+
+/// Moves the mean by a step, and the start headings and instruments that follow it; returns what was moved by in the end, and the squared length, over its variance,
+/// of what groups' own instruments moved by.
+fn take_step(
+    model: &mut Model,
+    headings: &mut [f64],
+    found: &Pass,
+    options: &FitOptions,
+    mut step: DVector<f64>,
+) -> Result<(DVector<f64>, f64), EstimationError> {
+    let mut moved = vec![0.0; found.runs.first().ok_or(EstimationError::NoMeasurements)?.gradient.len()];
+    for (column, by) in options.columns.iter().zip(step.iter_mut()) {
+        // A drive that a step makes a half or twice as large is none; the next step goes on.
+        *by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
+        if !by.is_finite() {
+            return Err(EstimationError::Diverges);
+        }
+        model.advance(*column, *by);
+        moved[column.index()] = *by;
+    }
+    let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
+    for FreeHeading { chain, run, rest, by } in &found.headings {
+        let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+        if let Some(own) = &model.own
+            && let Some(at) = found.own.iter().position(|follow| follow.group == own.apart.group(*run))
+        {
+            follows += own
+                .columns
+                .iter()
+                .zip(own_steps[at].iter())
+                .map(|(column, step)| by[column.index()] * step)
+                .sum::<f64>();
+        }
+        headings[*chain] += rest + follows;
+    }
+    let mut size = 0.0;
+    for (follow, by) in found.own.iter().zip(&own_steps) {
+        size += follow.squared(by);
+        model.advance_own(follow.group, by);
+    }
+    Ok((step, size))
+}
+
+/// A scoring step of the logarithms of the variances.
+struct NoiseStep {
+    by: Vector4<f64>,
+    information: Matrix4<f64>,
+}
+
+impl NoiseStep {
+    fn none() -> Self {
+        Self { by: Vector4::zeros(), information: Matrix4::identity() }
+    }
+
+    fn of(noise: &Noise, found: &Pass, prior: &NoisePrior) -> Self {
+        let pull = prior.pull(noise);
+        let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+        let information =
+            found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
+        let Some(mut by) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else {
+            return Self::none();
+        };
+        // What stands at its floor does not move.
+        for (by, variance) in by.iter_mut().zip(noise.variance) {
+            if variance <= LEAST_SIGMA * LEAST_SIGMA {
+                *by = by.max(0.0);
+            }
+        }
+        Self { by, information }
+    }
+
+    /// Squared length over its variance.
+    fn squared(&self) -> f64 {
+        self.by.dot(&(self.information * self.by))
+    }
+}
+
+/// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    last: Vector4<f64>,
+    share: Vector4<f64>,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { last: Vector4::zeros(), share: Vector4::repeat(1.0) }
+    }
+}
+
+impl Pace {
+    /// The step to take instead of `step`.
+    fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
+        for k in 0..step.len() {
+            self.share[k] =
+                if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
+        }
+        self.last = step;
+        step.component_mul(&self.share)
+    }
+}
+
+/// Moves the noise, by so much at the most; returns by how much.
+fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
+    let by = by * (LARGEST_NOISE_STEP / by.amax()).min(1.0);
+    let before = *noise;
+    for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
+        *variance = (*variance * by.exp()).max(LEAST_SIGMA * LEAST_SIGMA);
+    }
+    Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
+}
+
+/// The steps of mean and noise as one.
+fn stacked(mean: &DVector<f64>, noise: &Vector4<f64>) -> DVector<f64> {
+    DVector::from_iterator(mean.len() + noise.len(), mean.iter().chain(noise.iter()).copied())
+}
+
+fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
+    let n = mean.nrows();
+    let mut all = DMatrix::zeros(n + noise.nrows(), n + noise.nrows());
+    all.view_mut((0, 0), (n, n)).copy_from(mean);
+    all.view_mut((n, n), noise.shape()).copy_from(noise);
+    all
+}
+
+/// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
+pub(crate) fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
+    let Some(first) = chain.looks.first().filter(|look| chain.start == Start::Seen && look.theta_rad.is_none()) else {
+        return 0.0;
+    };
+    let (mut pose, mut at) = (Pose::IDENTITY, first.after);
+    let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
+    for look in &chain.looks[1..] {
+        for piece in &chain.pieces[at..look.after] {
+            let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            pose = pose * Increment::from_travel(travel_m, model.separation_m).arc();
+        }
+        at = look.after;
+        let (x_m, y_m) = (look.x_m - first.x_m, look.y_m - first.y_m);
+        dot += pose.x_m * x_m + pose.y_m * y_m;
+        cross += pose.x_m * y_m - pose.y_m * x_m;
+        longest_m = longest_m.max(x_m.hypot(y_m));
+        // Reckoning is good at the start; half a metre of way shows the heading to a degree.
+        if longest_m > 0.5 || heading_rad == 0.0 {
+            heading_rad = unwrap_near(cross.atan2(dot), 0.0);
+        }
+        if longest_m > 0.5 {
+            break;
+        }
+    }
+    heading_rad
+}

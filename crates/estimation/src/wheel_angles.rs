@@ -1,0 +1,301 @@
+//! The turn of each wheel along a run, at its rows and at instants between them.
+//!
+//! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
+//! compares the wheels with such looks integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
+//! the first row and after the last, the speeds of the interval there go on.
+
+use dataset::{NominalRobot, RunView, WheelLog};
+use kinematics::{Count, Twist, Wheels};
+
+/// An instant may miss a row by the rounding of its file.
+pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
+/// How far out of the log an instant may be, as a share of the interval there: farther, another row would have been written.
+const OUTSIDE: f64 = 0.5;
+
+/// A stretch of constant wheel speeds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) t_s: f64,
+    pub(crate) dt_s: f64,
+    /// Turn of each wheel, radians.
+    pub(crate) wheel_rad: Wheels<f64>,
+    /// Start and end of the logged interval of which it is a part, or the whole.
+    pub(crate) row_s: [f64; 2],
+}
+
+/// Turns of both wheels since a run's first row.
+#[derive(Debug, Clone)]
+pub struct WheelTrack<'a> {
+    t_s: &'a [f64],
+    turn_rad: Wheels<Vec<f64>>,
+    /// The counters' angles at the first row: where each wheel's mark stands.
+    first_rad: Wheels<f64>,
+    continuous: bool,
+}
+
+impl<'a> WheelTrack<'a> {
+    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a turn.
+    ///
+    /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
+    #[must_use]
+    pub fn of(run: &RunView<'a>, robot: &NominalRobot) -> Option<Self> {
+        fn since_first<C: Count>(column: &[C], rad: f64) -> Vec<f64> {
+            column.iter().map(|count| count.since(column[0]) * rad).collect()
+        }
+        let odometry = run.odometry();
+        if odometry.t_s.is_empty() {
+            return None;
+        }
+        let mut first_rad = Wheels::both(0.0);
+        let turn_rad = match &odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
+                #[allow(clippy::cast_precision_loss)] // whole turns are taken off first where the counter is long
+                let mark = |column: &[i64]| (column[0] as f64 * rad).rem_euclid(std::f64::consts::TAU);
+                first_rad = ticks.as_ref().map(|column| mark(column));
+                ticks.as_ref().map(|column| since_first(column, rad))
+            }
+            WheelLog::Angles(angles) => {
+                first_rad = angles.as_ref().map(|column| column[0]);
+                angles.as_ref().map(|column| since_first(column, 1.0))
+            }
+            WheelLog::Twist { v_mps, omega_radps } => {
+                let geometry = robot.geometry().ok()?;
+                let mut turns = Wheels::both(vec![0.0]);
+                // A row's twist holds over the interval that ends there.
+                for (row, t_s) in odometry.t_s.windows(2).enumerate() {
+                    let twist = Twist { v_m_s: v_mps[row + 1], omega_rad_s: omega_radps[row + 1] };
+                    let speed_rad_s = geometry.wheel_speed_m_s(twist).zip_with(geometry.m_per_rad(), |v, r| v / r);
+                    turns = turns.zip_with(speed_rad_s, |mut turns: Vec<f64>, speed| {
+                        turns.push(turns[row] + speed * (t_s[1] - t_s[0]));
+                        turns
+                    });
+                }
+                turns
+            }
+        };
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous: run.info().continuous })
+    }
+
+    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
+    /// one of its intervals lies between them.
+    #[must_use]
+    pub fn steps(&self, from_s: f64, to_s: f64) -> Option<Vec<Wheels<f64>>> {
+        let (first, last) = (self.row_at(from_s)?, self.row_at(to_s)?);
+        let from = self.turn_at(first, from_s)?;
+        let to = self.turn_at(last, to_s)?;
+        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + SAME_INSTANT_S)
+            ..self.t_s.partition_point(|t_s| *t_s < to_s - SAME_INSTANT_S);
+        if to_s < from_s || !(self.continuous || within.is_empty()) {
+            return None;
+        }
+        let mut previous = from;
+        let inner = within.map(|row| self.row_rad(row));
+        let step = |next: Wheels<f64>| {
+            let turned = next.zip_with(previous, |next, previous| next - previous);
+            previous = next;
+            turned
+        };
+        Some(inner.chain([to]).map(step).collect())
+    }
+
+    /// Whether [`Self::steps`] says anything between two instants.
+    #[must_use]
+    pub fn spans(&self, from_s: f64, to_s: f64) -> bool {
+        self.steps(from_s, to_s).is_some()
+    }
+
+    /// The wheels' angles at the rows, radians since the first.
+    #[must_use]
+    pub fn turns(&self) -> &Wheels<Vec<f64>> {
+        &self.turn_rad
+    }
+
+    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its twist.
+    #[must_use]
+    pub const fn first_rad(&self) -> Wheels<f64> {
+        self.first_rad
+    }
+
+    /// A reader that goes through the log once.
+    pub(crate) fn cursor(&self) -> Cursor<'_, 'a> {
+        Cursor { track: self, row: 0 }
+    }
+
+    fn row_rad(&self, row: usize) -> Wheels<f64> {
+        Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
+    }
+
+    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of the outer interval where it is close outside of the
+    /// log; `None` farther out.
+    fn row_at(&self, t_s: f64) -> Option<usize> {
+        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S);
+        self.row_of(before, t_s)
+    }
+
+    /// The same where it is known how many rows are at or before it.
+    fn row_of(&self, before: usize, t_s: f64) -> Option<usize> {
+        let rows_s = self.t_s;
+        let last = rows_s.len() - 1;
+        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= SAME_INSTANT_S {
+            return Some(before - 1);
+        }
+        let (row, outside_s) =
+            if before == 0 { (0, rows_s[0] - t_s) } else { (last.checked_sub(1)?, t_s - rows_s[last]) };
+        let next_s = rows_s.get(row + 1).filter(|_| self.continuous)?;
+        (outside_s <= OUTSIDE * (next_s - rows_s[row])).then_some(row)
+    }
+
+    fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
+        let since_s = t_s - self.t_s[row];
+        if since_s.abs() <= SAME_INSTANT_S {
+            return Some(self.row_rad(row));
+        }
+        let next_s = *self.t_s.get(row + 1)?;
+        let share = since_s / (next_s - self.t_s[row]);
+        Some(self.row_rad(row).zip_with(self.row_rad(row + 1), |a, b| a + share * (b - a)))
+    }
+}
+
+/// Reads a track in the order of time, in time that grows with its rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Cursor<'t, 'a> {
+    track: &'t WheelTrack<'a>,
+    /// The row of the last instant asked for.
+    row: usize,
+}
+
+impl Cursor<'_, '_> {
+    /// Goes to the row of an instant; false where the log does not span it.
+    fn seek(&mut self, t_s: f64) -> bool {
+        let rows_s = self.track.t_s;
+        let is_before = |row_s: f64| row_s <= t_s + SAME_INSTANT_S;
+        let mut before = if is_before(rows_s[self.row]) { self.row + 1 } else { 0 };
+        while before < rows_s.len() && is_before(rows_s[before]) {
+            before += 1;
+        }
+        let row = self.track.row_of(before, t_s);
+        self.row = row.unwrap_or(self.row);
+        row.is_some()
+    }
+
+    /// Turns of the wheels at an instant since the first row, radians.
+    pub(crate) fn angle_rad(&mut self, t_s: f64) -> Option<Wheels<f64>> {
+        if !self.seek(t_s) {
+            return None;
+        }
+        self.track.turn_at(self.row, t_s)
+    }
+
+    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is appended, where the log does not reach from one to the
+    /// other without a gap.
+    pub(crate) fn pieces(&mut self, from_s: f64, to_s: f64, pieces: &mut Vec<Piece>) -> bool {
+        let before = pieces.len();
+        let Some(mut angle) = self.angle_rad(from_s) else { return false };
+        let (mut at_s, mut row) = (from_s, self.row);
+        let Some(end) = self.angle_rad(to_s).filter(|_| to_s > from_s) else { return false };
+        let rows_s = self.track.t_s;
+        let mut push = |t_s: f64, next: Wheels<f64>, row: usize| {
+            let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
+            let row_s = [rows_s[row], rows_s.get(row + 1).copied().unwrap_or(t_s)];
+            pieces.push(Piece { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
+            (at_s, angle) = (t_s, next);
+        };
+        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
+            row += 1;
+            push(rows_s[row], self.track.row_rad(row), row - 1);
+        }
+        push(to_s, end, row);
+        if self.track.continuous || pieces.len() - before == 1 {
+            return true;
+        }
+        pieces.truncate(before);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dataset::{Dataset, Odometry, Provenance, Run, RunInfo, TruthNoise};
+
+    fn dataset(wheels: WheelLog, continuous: bool) -> Dataset {
+        let odometry = Odometry { t_s: vec![0.0, 1.0, 2.0, 4.0], wheels, ..Odometry::default() };
+        let run = Run { info: RunInfo { continuous, ..RunInfo::default() }, odometry, ..Run::default() };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.2,
+                right_wheel_diameter_m: 0.4,
+                wheel_separation_m: 0.5,
+                ticks_per_rev: Some(std::f64::consts::TAU),
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![run],
+        }
+    }
+
+    fn steps(wheels: WheelLog, continuous: bool, from_s: f64, to_s: f64) -> Option<Vec<(f64, f64)>> {
+        let dataset = dataset(wheels, continuous);
+        let session = dataset.session();
+        let track = WheelTrack::of(&session.runs[0], session.robot)?;
+        Some(track.steps(from_s, to_s)?.into_iter().map(|step| (step.left, step.right)).collect())
+    }
+
+    fn ticks() -> WheelLog {
+        WheelLog::Ticks(Wheels { left: vec![7, 17, 27, 67], right: vec![0, 0, -10, -10] })
+    }
+
+    #[test]
+    fn steps_follow_the_rows_and_share_the_outer_intervals() {
+        assert_eq!(steps(ticks(), true, 0.0, 2.0), Some(vec![(10.0, 0.0), (10.0, -10.0)]));
+        assert_eq!(steps(ticks(), true, 0.5, 3.0), Some(vec![(5.0, 0.0), (10.0, -10.0), (20.0, 0.0)]));
+        assert_eq!(steps(ticks(), true, 2.5, 3.5), Some(vec![(20.0, 0.0)]));
+        // A rounding beside a row is that row.
+        assert_eq!(steps(ticks(), true, 1.0 + 1e-10, 2.0 - 1e-10), Some(vec![(10.0, -10.0)]));
+        assert_eq!(steps(ticks(), true, 4.0, 4.0), Some(vec![(0.0, 0.0)]));
+    }
+
+    #[test]
+    fn outside_of_the_log_and_across_gaps_nothing_is_said() {
+        for (from_s, to_s) in [(-0.6, 1.0), (1.0, 5.1), (2.0, 1.0)] {
+            assert_eq!(steps(ticks(), true, from_s, to_s), None, "{from_s} {to_s}");
+        }
+        // Nor is anything said beside the log of what has gaps.
+        assert_eq!(steps(ticks(), false, -0.1, 0.5), None);
+        assert_eq!(steps(ticks(), false, 1.0, 2.0), Some(vec![(10.0, -10.0)]));
+        assert_eq!(steps(ticks(), false, 1.2, 1.8).map(|steps| steps.len()), Some(1));
+        assert_eq!(steps(ticks(), false, 0.0, 2.0), None);
+    }
+
+    #[test]
+    fn beside_the_log_the_outer_speeds_go_on() {
+        assert_eq!(steps(ticks(), true, -0.5, 1.0), Some(vec![(5.0, 0.0), (10.0, 0.0)]));
+        assert_eq!(steps(ticks(), true, 2.0, 4.5), Some(vec![(40.0, 0.0), (10.0, 0.0)]));
+        let dataset = dataset(ticks(), true);
+        let session = dataset.session();
+        let track = WheelTrack::of(&session.runs[0], session.robot).expect("a track");
+        let (mut cursor, mut pieces) = (track.cursor(), Vec::new());
+        assert!(cursor.pieces(-0.25, 2.0, &mut pieces) && cursor.pieces(2.0, 4.5, &mut pieces));
+        let sum = pieces.iter().map(|piece| piece.wheel_rad).reduce(|a, b| a.zip_with(b, |a, b| a + b));
+        // Counted on: 2.5 before the first row, 60 in the log, 10 after its last.
+        assert_eq!(sum, Some(Wheels { left: 72.5, right: -10.0 }));
+        assert!(pieces.windows(2).all(|pair| pair[0].t_s + pair[0].dt_s == pair[1].t_s));
+        assert!(!cursor.pieces(2.0, 5.1, &mut pieces));
+    }
+
+    #[test]
+    fn a_twist_is_rebuilt_into_wheels_and_angles_are_taken_as_they_are() {
+        let twist = WheelLog::Twist { v_mps: vec![9.0, 1.0, 0.0, 0.0], omega_radps: vec![9.0, 0.0, 0.4, 0.0] };
+        // A metre on wheels of 0.1 m and 0.2 m radius, then 0.4 rad over 0.5 m.
+        let found = steps(twist, true, 0.0, 2.0).expect("spanned");
+        let expected = [(10.0, 5.0), (-1.0, 0.5)];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found.0 - expected.0).abs() < 1e-14 && (found.1 - expected.1).abs() < 1e-14, "{found:?}");
+        }
+        let angles = WheelLog::Angles(Wheels { left: vec![1.0, 2.5, 3.0, 3.0], right: vec![0.0; 4] });
+        assert_eq!(steps(angles, true, 0.0, 1.0), Some(vec![(1.5, 0.0)]));
+    }
+}
