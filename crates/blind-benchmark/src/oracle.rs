@@ -4,19 +4,20 @@
 //! fits best without the effect, then sees what of the signature the lengths leave. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
 //! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
 //! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
-//! No look may be lost to the gate of outliers: all variances are taken larger by one factor, which leaves the filter's gains as they are.
+//! No measurement is rejected as an outlier.
 //! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
 //! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, hypothesis};
-use estimation::{Column, Evidence, Model, Noise, Records, Selection, Thinning, pass_with_innovations};
+use estimation::{
+    Column, Evidence, Gate, Information, Model, Noise, Records, Selection, Thinning, inverse, pass_with_innovations,
+    total,
+};
 use kinematics::DriveGeometry;
 use model_term::{ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector};
 
-/// Variances are larger by this in the oracle's pass.
-const LOUD: f64 = 1e10;
 /// What is known of the lengths before any data, as a share: the tool holds to nominal what it sees worse.
 const LENGTHS_SD: f64 = 0.05;
 /// A rival's sizes are free up to so many times what is plausible.
@@ -57,15 +58,15 @@ pub(crate) struct TrueNoise {
 const LEAST_VAR: f64 = 1e-16;
 
 impl TrueNoise {
-    fn loud(self) -> Noise {
+    fn noise(self) -> Noise {
         let [xy, theta] = self.look_var;
-        Noise { variance: [self.wheel_var_per_m, LEAST_VAR, xy, theta].map(|variance| variance.max(LEAST_VAR) * LOUD) }
+        Noise { variance: [self.wheel_var_per_m, LEAST_VAR, xy, theta].map(|variance| variance.max(LEAST_VAR)) }
     }
 }
 
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on average over the looks' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    look(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * LOUD * seen.total.chi_square)
+    look(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * seen.total.chi_square)
 }
 
 /// The same with the lengths and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
@@ -79,7 +80,7 @@ pub(crate) fn misfit_of_form(
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
     for _ in 0..=LENGTH_STEPS {
         let Some(seen) = look(datasets, &model, noise, terms) else { return least };
-        least = least.min(0.5 * LOUD * seen.total.chi_square);
+        least = least.min(0.5 * seen.total.chi_square);
         let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
     }
@@ -98,10 +99,8 @@ fn look(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<
     let records = Records::of(&sessions);
     let selections = Selection::of(&records, Thinning::NONE, model);
     let headings = vec![0.0; records.chains.len()];
-    let pass = pass_with_innovations(&records, &selections, model, &noise.loud(), &headings, terms);
-    let (first, others) = pass.runs.split_first()?;
-    let mut total = first.clone();
-    others.iter().for_each(|run| total.add(run, 1.0));
+    let pass = pass_with_innovations(&records, &selections, model, &noise.noise(), &headings, terms, Gate::Open);
+    let total = total(&pass.runs)?;
     let z = pass.innovations.iter().flatten().map(|found| (records.chains[found.chain].run, found.z)).collect();
     Some(Seen { total, z })
 }
@@ -111,18 +110,16 @@ const LENGTH_STEPS: usize = 3;
 
 /// The step of the lengths to their best, without any effect.
 fn to_best_lengths(total: &Evidence, at: &[usize]) -> Option<DVector<f64>> {
-    let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
-        LOUD * total.information[(at[i], at[j])] + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
-    });
-    let gradient = DVector::from_fn(at.len(), |i, _| LOUD * total.gradient[at[i]]);
-    Some(-(matrix.try_inverse()? * gradient))
+    let lengths = Information { matrix: total.block(at, at), gradient: total.gradient_of(at) };
+    let (step, _) = lengths.with_precision(at.iter().map(|_| LENGTHS_SD.powi(-2))).solve()?;
+    Some(step)
 }
 
 /// ½ Σ e² over innovations, e being the mean square of a run's.
 fn scatter(z: &[((usize, usize), f64)]) -> f64 {
     z.chunk_by(|a, b| a.0 == b.0)
         .map(|run| {
-            let sum: f64 = run.iter().map(|(_, z)| LOUD * z * z).sum();
+            let sum: f64 = run.iter().map(|(_, z)| z * z).sum();
             #[allow(clippy::cast_precision_loss)]
             let count = run.len() as f64;
             0.5 * sum * sum / count
@@ -158,7 +155,7 @@ impl Shown {
         let mut at_truth = None;
         let mut seen = look(datasets, &model, noise, &mut terms)?;
         for _ in 0..LENGTH_STEPS {
-            at_truth.get_or_insert(LOUD * seen.total.chi_square);
+            at_truth.get_or_insert(seen.total.chi_square);
             let step = to_best_lengths(&seen.total, &free)?;
             Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
             seen = look(datasets, &model, noise, &mut terms)?;
@@ -181,23 +178,15 @@ impl Shown {
             at.extend(candidate.columns.clone());
             prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.plausible).powi(-2)));
         }
-        // The information of loud looks is less by the same factor as their χ².
-        let matrix = DMatrix::from_fn(at.len(), at.len(), |i, j| {
-            LOUD * self.total.information[(at[i], at[j])] + if i == j { prior[i] } else { 0.0 }
-        });
-        let gradient = DVector::from_fn(at.len(), |i, _| LOUD * self.total.gradient[at[i]]);
-        let size = matrix.diagonal().map(f64::sqrt);
-        let scaled = DMatrix::from_fn(at.len(), at.len(), |i, j| matrix[(i, j)] / (size[i] * size[j]));
-        let Some(inverse) = scaled.cholesky().map(|cholesky| cholesky.inverse()) else { return (0.0, Vec::new()) };
-        let inverse = DMatrix::from_fn(at.len(), at.len(), |i, j| inverse[(i, j)] / (size[i] * size[j]));
-        let step = -(&inverse * &gradient);
-        let values = (self.free.len()..at.len()).map(|k| (step[k], inverse[(k, k)].sqrt())).collect();
-        (-gradient.dot(&step), values)
+        let free = Information { matrix: self.total.block(&at, &at), gradient: self.total.gradient_of(&at) };
+        let Some((step, covariance)) = free.clone().with_precision(prior).solve() else { return (0.0, Vec::new()) };
+        let values = (self.free.len()..at.len()).map(|k| (step[k], covariance[(k, k)].sqrt())).collect();
+        (-free.gradient.dot(&step), values)
     }
 
     /// The signature's χ² with the lengths at their best: noncentrality of the test by the true form.
     pub(crate) fn noncentrality(&self) -> f64 {
-        (LOUD * self.total.chi_square - self.taken_up(&[]).0).max(0.0)
+        (self.total.chi_square - self.taken_up(&[]).0).max(0.0)
     }
 
     /// Whether the drive's lengths take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
@@ -238,15 +227,15 @@ impl Shown {
             .iter()
             .filter(|candidate| candidate.id == id)
             .map(|candidate| {
-                let cross = |i: usize, j: usize| LOUD * self.total.information[(i, j)];
                 let own: Vec<usize> = candidate.columns.clone().collect();
-                let free = DMatrix::from_fn(self.free.len(), self.free.len(), |i, j| {
-                    cross(self.free[i], self.free[j]) + if i == j { LENGTHS_SD.powi(-2) } else { 0.0 }
-                });
-                let between = DMatrix::from_fn(own.len(), self.free.len(), |i, j| cross(own[i], self.free[j]));
-                let matrix = DMatrix::from_fn(own.len(), own.len(), |i, j| cross(own[i], own[j]));
-                let Some(inverse) = free.try_inverse() else { return 0 };
-                let left = matrix - &between * inverse * between.transpose();
+                let free = Information {
+                    matrix: self.total.block(&self.free, &self.free),
+                    gradient: self.total.gradient_of(&self.free),
+                };
+                let free = free.with_precision(self.free.iter().map(|_| LENGTHS_SD.powi(-2)));
+                let between = self.total.block(&own, &self.free);
+                let Some(inverse) = inverse(&free.matrix, 0.0) else { return 0 };
+                let left = self.total.block(&own, &own) - &between * inverse * between.transpose();
                 let plausible = |k: usize| candidate.parameters[k].plausible;
                 let scaled = DMatrix::from_fn(own.len(), own.len(), |i, j| left[(i, j)] * plausible(i) * plausible(j));
                 scaled.symmetric_eigenvalues().iter().filter(|value| **value >= 1.0).count()

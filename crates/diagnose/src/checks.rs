@@ -5,13 +5,14 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
+use estimation::Projected;
 use estimation::{Chain, Innovation};
 use estimation::{JointFit, WHITE_BELOW};
 use kinematics::Side;
 
 use crate::candidate::Choice;
 use crate::document::Check;
-use crate::scan::{Projected, ask, freedom, principal};
+use crate::scan::{ask, freedom, principal};
 use crate::search::Extended;
 use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
 use crate::unlisted::of_cycles;

@@ -3,14 +3,12 @@
 //! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
 //! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
 
-use estimation::JointFit;
-use estimation::{Column, EndError, Evidence, Model};
+use estimation::{Column, EndError, Evidence, JointFit, Model, RIDGE, inverse};
 use model_term::ModelTerm;
 use nalgebra::DVector;
 
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
-use crate::scan::{free_basis, inverse};
 use crate::search::{Extended, left_out_cost};
 use crate::statistics::student_95;
 
@@ -108,7 +106,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         return Err("too few runs, and too few looks in them to be held out in blocks".to_owned());
     }
     let fold_of = folds(fit, &units, blocks);
-    let free = free_basis(fit);
+    let free = fit.free_basis();
     let prior = prior(fit, terms);
     let mut scored: Vec<Unit> = Vec::new();
     let mut models: Vec<Model> = Vec::new();
@@ -123,7 +121,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
             own.matrix[(k, k)] += precision;
             own.gradient[k] += precision * size;
         }
-        let covariance = inverse(&(free.transpose() * &own.matrix * &free))
+        let covariance = inverse(&own.along(&free).matrix, RIDGE)
             .ok_or("the other runs do not determine the model once some are held out")?;
         let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
         let mut model = fit.fit.model.clone();

@@ -10,6 +10,7 @@
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
 use estimation::JointFit;
+use estimation::total;
 use estimation::{Chain, Column, Evidence, Innovation};
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::{Interval, Look, ModelTerm, TermParameter};
@@ -18,7 +19,6 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::candidate::terms;
-use crate::scan::{Projection, total};
 use crate::search::Extended;
 
 /// An innovation this large, in standard deviations, is one that the tails are made of.
@@ -275,7 +275,7 @@ fn seen(model: &Extended<'_>, fit: &JointFit<'_>, large: &[Large]) -> Vec<Seen> 
         all.push(Box::new(Jump { run_id: run_id.clone(), from_s: *from_s, at_s: *at_s }));
     }
     let runs: Vec<Evidence> = fit.scan_parts(&mut all, &vec![COLUMNS; large.len()]);
-    let Some(projection) = total(&runs).and_then(|all| Projection::of(fit, &all)) else { return Vec::new() };
+    let Some(projection) = total(&runs).and_then(|all| fit.eliminated(&all, &[])) else { return Vec::new() };
     let of = |(number, large): (usize, &Large)| {
         let run = runs.iter().find(|run| run.run == large.run)?;
         let own: Vec<usize> = (0..COLUMNS).map(|column| first + number * COLUMNS + column).collect();

@@ -5,8 +5,7 @@
 //! directions that even such a size would not show are left out: they cost power and show nothing.
 //! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
 
-use estimation::JointFit;
-use estimation::{Column, Evidence};
+use estimation::{Column, Evidence, JointFit, Projected, RIDGE, inverse, total};
 use model_term::TermParameter;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -34,107 +33,6 @@ pub(crate) struct Scored {
     pub(crate) sizes: Vec<(f64, f64)>,
     /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
     pub(crate) log_odds: f64,
-}
-
-/// A sum of all runs' evidences.
-pub(crate) fn total(runs: &[Evidence]) -> Option<Evidence> {
-    let (first, others) = runs.split_first()?;
-    let mut sum = first.clone();
-    others.iter().for_each(|run| sum.add(run, 1.0));
-    Some(sum)
-}
-
-/// The basis of what a fit holds free: its columns without the directions that stay nominal.
-pub(crate) fn free_basis(fit: &JointFit<'_>) -> DMatrix<f64> {
-    basis_of(fit, &fit.columns)
-}
-
-/// The same of some of its columns.
-fn basis_of(fit: &JointFit<'_>, columns: &[Column]) -> DMatrix<f64> {
-    let n = columns.len();
-    let identity = DMatrix::identity(n, n);
-    if fit.unseen.is_empty() {
-        return identity;
-    }
-    let held =
-        DMatrix::from_fn(n, fit.unseen.len(), |row, k| fit.unseen[k].get(columns[row].index()).copied().unwrap_or(0.0));
-    let eigen = (&held * held.transpose()).symmetric_eigen();
-    let free: Vec<_> =
-        (0..n).filter(|&k| eigen.eigenvalues[k] < 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
-}
-
-/// What is left of some columns with the free ones at their best: information, gradient, and how much of the raw information is left of each.
-pub(crate) struct Projected {
-    pub(crate) information: DMatrix<f64>,
-    pub(crate) gradient: DVector<f64>,
-    pub(crate) share: Vec<f64>,
-}
-
-/// Takes the free columns out of an evidence.
-pub(crate) struct Projection {
-    free: DMatrix<f64>,
-    indices: Vec<usize>,
-    inverse: DMatrix<f64>,
-    gradient: DVector<f64>,
-}
-
-impl Projection {
-    pub(crate) fn of(fit: &JointFit<'_>, evidence: &Evidence) -> Option<Self> {
-        Self::beside(fit, evidence, &[])
-    }
-
-    /// With some columns, which are asked for, not counted among the free ones.
-    pub(crate) fn beside(fit: &JointFit<'_>, evidence: &Evidence, asked: &[usize]) -> Option<Self> {
-        let columns: Vec<Column> =
-            fit.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
-        let free = basis_of(fit, &columns);
-        let own = evidence.of(&columns);
-        let reduced = free.transpose() * &own.matrix * &free;
-        let inverse = inverse(&reduced)?;
-        let indices = columns.iter().map(|column| column.index()).collect();
-        Some(Self { gradient: free.transpose() * own.gradient, free, indices, inverse })
-    }
-
-    /// The score of one run by some columns, with what the free columns' estimate takes of it, which all runs share, taken out.
-    pub(crate) fn score_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DVector<f64> {
-        let cross =
-            DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| all.information[(columns[i], self.indices[j])])
-                * &self.free;
-        let free = self.free.transpose() * DVector::from_fn(self.indices.len(), |j, _| run.gradient[self.indices[j]]);
-        DVector::from_fn(columns.len(), |i, _| run.gradient[columns[i]]) - cross * &self.inverse * free
-    }
-
-    /// The variance of that score.
-    pub(crate) fn variance_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DMatrix<f64> {
-        let of = |evidence: &Evidence, rows: &[usize], columns: &[usize]| {
-            DMatrix::from_fn(rows.len(), columns.len(), |i, j| evidence.information[(rows[i], columns[j])])
-        };
-        let weights = of(all, columns, &self.indices) * &self.free * &self.inverse * self.free.transpose();
-        let cross = of(run, columns, &self.indices) * weights.transpose();
-        of(run, columns, columns) - &cross - cross.transpose()
-            + &weights * of(run, &self.indices, &self.indices) * weights.transpose()
-    }
-
-    pub(crate) fn of_columns(&self, evidence: &Evidence, columns: &[usize]) -> Projected {
-        let cross = DMatrix::from_fn(columns.len(), self.indices.len(), |i, j| {
-            evidence.information[(columns[i], self.indices[j])]
-        }) * &self.free;
-        let own = DMatrix::from_fn(columns.len(), columns.len(), |i, j| evidence.information[(columns[i], columns[j])]);
-        let gradient = DVector::from_fn(columns.len(), |i, _| evidence.gradient[columns[i]]);
-        let information = &own - &cross * &self.inverse * cross.transpose();
-        let share = (0..columns.len()).map(|k| if own[(k, k)] > 0.0 { information[(k, k)] / own[(k, k)] } else { 0.0 });
-        Projected { share: share.collect(), gradient: gradient - &cross * &self.inverse * &self.gradient, information }
-    }
-}
-
-/// The inverse of an information matrix, with columns of like size; `None` when a direction is not determined.
-pub(crate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = matrix.nrows();
-    let size = matrix.diagonal().map(|diagonal| diagonal.max(f64::MIN_POSITIVE).sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (size[i] * size[j]) + if i == j { 1e-12 } else { 0.0 });
-    let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (size[i] * size[j])))
 }
 
 /// A candidate's information and gradient in units of what is plausible, along its principal directions: eigenvalue and gradient of each.
@@ -231,7 +129,7 @@ fn ask_row_by_row<T: Send>(
         all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
         let sizes: Vec<usize> = parts.iter().map(|(own, _)| *own).collect();
         let Some(evidence) = total(&fit.scan_parts(&mut all, &sizes)) else { return Vec::new() };
-        let Some(projection) = Projection::of(fit, &evidence) else { return Vec::new() };
+        let Some(projection) = fit.eliminated(&evidence, &[]) else { return Vec::new() };
         let of_part = |(own, part): &(usize, &[Choice])| {
             let columns: Vec<usize> = (at..at + own).collect();
             at += own;
@@ -263,7 +161,7 @@ pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice])
         let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
         let log_odds = 0.5 * statistic + log_weight(&explained);
         let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
-        let sizes = inverse(information).map_or(Vec::new(), |covariance| {
+        let sizes = inverse(information, RIDGE).map_or(Vec::new(), |covariance| {
             let step = -(&covariance * gradient);
             step.iter().zip(covariance.diagonal().iter()).map(|(size, var)| (*size, var.sqrt())).collect()
         });

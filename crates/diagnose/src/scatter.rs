@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use effects::Sign;
+use estimation::total;
 use estimation::{Column, NoiseComponent};
 
 use crate::candidate::terms;
@@ -14,7 +15,6 @@ use crate::diagnosis::{Asked, Options, is_covariate};
 use crate::document::{Finding, Value};
 use crate::jumps::{Whose, log_likelihoods};
 use crate::naming;
-use crate::scan::{Projection, total};
 use crate::search::{Extended, cost, count};
 use crate::statistics::{p_of_chi_square, p_of_z};
 
@@ -134,7 +134,7 @@ pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
     let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let Some(evidence) = total(&model.fit.fit.pass.runs) else { return 1.0 };
     let own = [Column::Separation.index()];
-    let Some(projection) = Projection::beside(&model.fit, &evidence, &own) else { return 1.0 };
+    let Some(projection) = model.fit.eliminated(&evidence, &own) else { return 1.0 };
     let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);
     for run in &runs {
         let variance = projection.variance_of(run, &evidence, &own)[(0, 0)];

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use effects::{Effect, effect_of_sizes};
 use estimation::JointFit;
+use estimation::total;
 use estimation::{Column, Evidence, NoiseComponent};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 use crate::candidate::{Choice, terms};
 use crate::checks::CHECKS_LEVEL;
 use crate::gain::gain;
-use crate::scan::{Scored, log_weight, scan, total};
+use crate::scan::{Scored, log_weight, scan};
 use crate::scatter::{TURNS_LEVEL, differs_from_run_to_run};
 use crate::shape::fit_shape;
 use crate::sizes::{RUNS_LEVEL, Test, examine, holds_over_runs, over_names, tests_of};

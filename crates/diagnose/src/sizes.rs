@@ -1,10 +1,11 @@
 //! How well sizes are known: by the likelihood, by how runs differ, by what is not known of shapes, and by what is not known of the names beside them.
 
-use nalgebra::{DMatrix, DVector};
+use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
+use nalgebra::DVector;
 
 use crate::candidate::Choice;
 use crate::gain::LEAST_RUNS;
-use crate::scan::{Projection, freedom, inverse, principal, total};
+use crate::scan::{freedom, principal};
 use crate::search::{Extended, Name, chance};
 use crate::statistics::{p_of_statistic, p_of_student, student_95};
 
@@ -22,7 +23,7 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     let evidence = total(&extended.fit.fit.pass.runs)?;
     let parameters = extended.choices[choice].parameters();
     let own = extended.columns(choice);
-    let projected = Projection::beside(&extended.fit, &evidence, &own)?.of_columns(&evidence, &own);
+    let projected = extended.fit.eliminated(&evidence, &own)?.of_columns(&evidence, &own);
     let sizes = extended.sizes(choice);
     let gradient = &projected.information * &sizes;
     let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
@@ -33,7 +34,7 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     let freedom = freedom(&extended.fit, &evidence);
     let shrink = freedom / evidence.count.max(1.0);
     let statistic = directions.iter().map(|(value, size)| shrink * value * size * size).sum();
-    let covariance = inverse(&projected.information);
+    let covariance = inverse(&projected.information, RIDGE);
     let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
     let test = Test {
         statistic,
@@ -59,7 +60,7 @@ pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64
     }
     let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
     let own = extended.columns(choice);
-    let Some(projection) = Projection::beside(&extended.fit, &evidence, &own) else { return false };
+    let Some(projection) = extended.fit.eliminated(&evidence, &own) else { return false };
     let information = projection.of_columns(&evidence, &own).information;
     let sizes = extended.sizes(choice);
     let stands = sizes.dot(&(&information * &sizes));
@@ -79,18 +80,15 @@ fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
     }
     let evidence = total(&extended.fit.fit.pass.runs)?;
     let own = extended.columns(choice);
-    let projection = Projection::beside(&extended.fit, &evidence, &own)?;
-    let inverse = inverse(&projection.of_columns(&evidence, &own).information)?;
-    let mut scatter = DMatrix::zeros(own.len(), own.len());
-    for run in &runs {
-        let leverage = projection.variance_of(run, &evidence, &own) * &inverse;
-        let others = (DMatrix::identity(own.len(), own.len()) - leverage).try_inverse()?;
-        let without = others * projection.score_of(run, &evidence, &own);
-        scatter += &without * without.transpose();
-    }
+    let projection = extended.fit.eliminated(&evidence, &own)?;
+    let inverse = inverse(&projection.of_columns(&evidence, &own).information, RIDGE)?;
+    let clusters = runs.iter().map(|run| Information {
+        matrix: projection.variance_of(run, &evidence, &own),
+        gradient: projection.score_of(run, &evidence, &own),
+    });
+    let ClusterRobust { covariance, left_out: 0 } = ClusterRobust::of(&inverse, clusters) else { return None };
     #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
-    let covariance = &inverse * scatter * &inverse * ((n - 1.0) / n);
     // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
     let widening = student_95(n - 1.0) / 1.96;
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())

@@ -2,20 +2,23 @@
 
 use std::sync::Arc;
 
-use kinematics::{Increment, Pose, Twist, Wheels, wrap_to_pi};
-use model_term::{Interval, Look, ModelTerm};
+use kinematics::{Pose, Twist, wrap_to_pi};
+use model_term::ModelTerm;
 
+use crate::covariances::Covariances;
 use crate::decimation::Coarse;
 use crate::error::EstimationError;
 use crate::filter::{Gate, Want};
-use crate::group_extrinsics::Instrument;
+use crate::model::Instrument;
 use crate::model::Model;
 use crate::model_fit::JointFit;
 use crate::noise::{LEAST_SIGMA, NoiseComponent};
 use crate::normal_equations::Evidence;
 use crate::optimizer::Fit;
 use crate::pass::pass;
+use crate::propagation::{Propagator, Trail};
 use crate::records::{Chain, Seen};
+use crate::thinning::Leg;
 use crate::wheel_angles::Piece;
 
 /// How far off dead reckoning ends.
@@ -76,12 +79,9 @@ impl JointFit<'_> {
         let (mut seen, mut reckoned) = (None, Pose::IDENTITY);
         for chain in self.records.chains.get(chains)?.iter().filter(|chain| chain.is_displacement()) {
             let (_, _, (_, end)) = chain.ends()?;
-            let Model { m_per_rad, separation_m, .. } = self.fit.model;
             let mounting = self.fit.model.instrument(chain.run).body_from_sensor;
-            let moved = chain.pieces.iter().fold(Pose::IDENTITY, |pose, piece| {
-                let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                pose * Increment::from_travel(travel_m, separation_m).arc()
-            });
+            let turned = |pose: Pose, piece: &Piece| pose * self.fit.model.increment(piece.wheel_rad).arc();
+            let moved = chain.pieces.iter().fold(Pose::IDENTITY, turned);
             seen = Some(seen.unwrap_or(Pose::IDENTITY) * end);
             reckoned = reckoned * (mounting.inverse() * moved * mounting);
         }
@@ -140,90 +140,48 @@ impl JointFit<'_> {
         asked: impl Fn((usize, usize)) -> bool,
         looks: impl Fn(&'b Chain<'b>) -> &'b [Seen],
     ) -> Vec<EndError> {
-        let parameters: usize = terms.iter().map(|term| term.parameters().len()).sum();
-        let mut gradient = vec![Pose::IDENTITY; parameters];
         let mut found = Vec::new();
-        // Where the displacements of a run have led, the last piece, and the way of the session.
-        let mut trail: Option<(Pose, Option<Piece>, f64)> = None;
+        // Where the displacements of a run have led.
+        let mut trail: Option<Trail> = None;
         for chain in self.records.chains.iter().filter(|chain| asked(chain.run)) {
             let Some((start, first, _)) = chain.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
-            let (run_from_chain, mut previous, mut session_m) =
-                trail.take().filter(|_| chain.goes_on).unwrap_or((Pose::IDENTITY, None, chain.session_m));
-            if !chain.goes_on {
-                for term in terms.iter_mut() {
-                    term.restart(chain.info);
-                }
+            let mut propagator = Propagator::new(chain, model, terms);
+            if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
+                propagator.go_on(trail);
             }
-            let twist = |piece: &Piece| {
-                let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, model.separation_m);
-                Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
-            };
-            let seen_from = |terms: &mut [Box<dyn ModelTerm>],
-                             t_s: f64,
-                             body: Pose,
-                             piece: Option<&Piece>,
-                             gradient: &mut [Pose]| {
-                let twist = piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, twist);
-                let look = Look { t_s, world_from_body: run_from_chain * body, twist, run: chain.info };
-                gradient.fill(Pose::IDENTITY);
-                each(terms, gradient, |term, own| term.sight(&look, own));
-                let off = weighed(gradient, &model.sizes);
-                let late = Increment { distance_m: twist.v_m_s, turn_rad: twist.omega_rad_s };
-                (off, Pose::new(-late.distance_m * latency_s, 0.0, -late.turn_rad * latency_s))
+            propagator.restart();
+            // What the terms and the latency add to a measurement, in the frame of the body.
+            let seen_from = |propagator: &mut Propagator<'_, '_>, t_s: f64, body: Pose, piece: Option<&Piece>| {
+                let Twist { v_m_s, omega_rad_s } =
+                    piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| propagator.twist(piece));
+                propagator.sight(body, 0, t_s, Twist { v_m_s, omega_rad_s });
+                let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
+                add(weighed(&propagator.gradients, &model.sizes), late)
             };
             // Where the drive's centre stands at the first look, to first order in what the terms add to it.
             let mounted = start * body_from_sensor.inverse();
-            let (off, late) = seen_from(terms, first.0, mounted, chain.pieces.get(first.1), &mut gradient);
-            let mut pose = mounted * add(off, late).inverse();
-            let (mut wheel_rad, mut length_m) = (chain.wheel_rad, 0.0);
-            let mut at = first.1;
+            let off = seen_from(&mut propagator, first.0, mounted, chain.pieces.get(first.1));
+            let mut pose = mounted * off.inverse();
+            let (start_m, mut at) = (propagator.session_m(), first.1);
             for look in looks(chain) {
-                for piece in &chain.pieces[at..look.after] {
-                    let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                    let mut increment = Increment::from_travel(travel_m, model.separation_m);
-                    let before = previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
-                    let interval = Interval {
-                        t_s: piece.t_s,
-                        dt_s: piece.dt_s,
-                        row_s: piece.row_s,
-                        travel_m,
-                        previous_m: model.m_per_rad.zip_with(before.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
-                        previous_dt_s: before.dt_s,
-                        wheel_separation_m: model.separation_m,
-                        wheel_rad,
-                        turned_rad: piece.wheel_rad,
-                        world_from_body: run_from_chain * pose,
-                        session_m,
-                        run: chain.info,
-                    };
-                    gradient.fill(Pose::IDENTITY);
-                    each(terms, &mut gradient, |term, own| term.motion(&interval, own));
-                    let change = weighed(&gradient, &model.sizes);
-                    session_m += increment.distance_m.abs();
-                    length_m += increment.distance_m.abs();
-                    wheel_rad = wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
-                    increment.distance_m += change.x_m;
-                    increment.turn_rad += change.theta_rad;
-                    pose = pose * increment.arc() * Pose::new(0.0, change.y_m, 0.0);
-                    previous = Some(*piece);
-                }
+                let leg = Leg { pieces: at..look.after, from: 0, look: 0, noise: Covariances::ZERO };
+                pose = pose * propagator.moved(pose, 0, &leg).motion;
                 at = look.after;
                 let Some(theta_rad) = look.theta_rad else { continue };
-                let (off, late) = seen_from(terms, look.t_s, pose, chain.pieces[..at].last(), &mut gradient);
-                let seen = pose * add(off, late) * body_from_sensor;
+                let off = seen_from(&mut propagator, look.t_s, pose, chain.pieces[..at].last());
+                let seen = pose * off * body_from_sensor;
                 let there = Pose::new(look.x_m, look.y_m, theta_rad);
                 let off_rad = wrap_to_pi(seen.theta_rad - theta_rad);
                 found.push(EndError {
                     run: chain.run,
                     position_m: seen.position().distance_m(there.position()),
                     heading_rad: off_rad.abs(),
-                    length_m,
+                    length_m: propagator.session_m() - start_m,
                     off: Pose { theta_rad: off_rad, ..there.to(seen) },
                 });
             }
-            trail = Some((run_from_chain * pose * body_from_sensor, previous, session_m));
+            trail = Some(propagator.trail(pose * body_from_sensor));
         }
         found
     }
@@ -231,19 +189,6 @@ impl JointFit<'_> {
 
 fn add(a: Pose, b: Pose) -> Pose {
     Pose::new(a.x_m + b.x_m, a.y_m + b.y_m, a.theta_rad + b.theta_rad)
-}
-
-fn each(
-    terms: &mut [Box<dyn ModelTerm>],
-    gradient: &mut [Pose],
-    mut visit: impl FnMut(&mut dyn ModelTerm, &mut [Pose]),
-) {
-    let mut rest = gradient;
-    for term in terms {
-        let (own, others) = rest.split_at_mut(term.parameters().len());
-        visit(term.as_mut(), own);
-        rest = others;
-    }
 }
 
 fn weighed(gradient: &[Pose], sizes: &[f64]) -> Pose {

@@ -3,23 +3,20 @@
 //! Scalar updates, one component of a look after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
 //! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
-use kinematics::{Increment, InstructionSet, Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
+use kinematics::{InstructionSet, Kernel, Pose, Twist, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
-use crate::group_extrinsics::Instrument;
+use crate::model::Instrument;
 use crate::model::{Column, Model};
 use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
+use crate::propagation::{Kept, KeptLegs, Legs, Moved, Propagator, Trail};
 use crate::records::{Chain, Start};
 use crate::thinning::Leg;
 use crate::wheel_angles::Piece;
-use propagation::Moved;
-pub(crate) use propagation::{Kept, KeptLegs, Legs};
-
-mod propagation;
 
 /// A look whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
 pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
@@ -42,13 +39,13 @@ pub struct Innovation {
     pub sigma: f64,
 }
 
-/// Whether looks that lie far off are left out.
+/// Whether measurements whose innovation is improbable are rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Gate {
+pub enum Gate {
     /// They are.
     #[default]
     Shut,
-    /// Every look is taken, however far off.
+    /// Every measurement is taken, however far off.
     Open,
 }
 
@@ -91,15 +88,6 @@ impl NoiseScore {
     }
 }
 
-/// Where the displacements of a run have led: the next one's terms go on from there.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Trail {
-    /// The next chain's frame in that of the first.
-    run_from_chain: Pose,
-    session_m: f64,
-    previous: Option<Piece>,
-}
-
 /// The filter of one chain.
 pub(super) struct Filter<'f, 'a> {
     chain: &'f Chain<'a>,
@@ -107,10 +95,8 @@ pub(super) struct Filter<'f, 'a> {
     model: &'f Model,
     instrument: Instrument,
     noise: &'f Noise,
-    terms: &'f mut [Box<dyn ModelTerm>],
+    propagator: Propagator<'f, 'a>,
     want: Want<'f>,
-    /// The chain's frame in that of the run's displacements; the identity for poses.
-    run_from_chain: Pose,
     pose: Pose,
     covariance: Covariance,
     /// ∂pose/∂column.
@@ -118,15 +104,7 @@ pub(super) struct Filter<'f, 'a> {
     /// Derivatives of the covariance and of the pose by the logarithm of each variance.
     covariance_by: Covariances<NOISES>,
     pose_by_noise: [[f64; NOISES]; 3],
-    session_m: f64,
-    wheel_rad: Wheels<f64>,
-    previous: Option<Piece>,
-    goes_on: bool,
-    gradients: Vec<Pose>,
-    /// Where legs come from.
-    pub(super) legs: Legs<'f>,
-    /// Derivatives of the leg in force by the terms' parameters, and of the look's by the same.
-    leg_by_terms: Derivatives,
+    /// Derivatives of the look by the terms' parameters, in the room.
     sights: Derivatives,
     pub(super) sums: Sums<'f>,
     pub(super) innovations: Vec<Innovation>,
@@ -172,21 +150,13 @@ impl<'f, 'a> Filter<'f, 'a> {
             model,
             instrument: model.instrument(chain.run),
             noise,
-            terms,
+            propagator: Propagator::new(chain, model, terms),
             want,
-            run_from_chain: Pose::IDENTITY,
             pose: Pose::IDENTITY,
             covariance: Covariance::ZERO,
             by: Derivatives::zeros(all),
             covariance_by: Covariances::ZERO,
             pose_by_noise: [[0.0; NOISES]; 3],
-            session_m: chain.session_m,
-            wheel_rad: chain.wheel_rad,
-            previous: None,
-            goes_on: false,
-            gradients: vec![Pose::IDENTITY; columns - Column::BASE.len()],
-            legs: Legs::Driven,
-            leg_by_terms: Derivatives::zeros(columns - Column::BASE.len()),
             sights: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
             innovations: Vec::new(),
@@ -198,15 +168,23 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     /// Goes on where the chain before ended.
-    pub(super) fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
-        (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
-        self.goes_on = true;
+    pub(super) fn go_on(&mut self, trail: Trail) {
+        self.propagator.go_on(trail);
     }
 
     /// Where this chain ended.
     pub(super) fn trail(&self) -> Trail {
-        let run_from_sensor = self.run_from_chain * self.pose * self.instrument.body_from_sensor;
-        Trail { run_from_chain: run_from_sensor, session_m: self.session_m, previous: self.previous }
+        self.propagator.trail(self.pose * self.instrument.body_from_sensor)
+    }
+
+    /// Legs come from here, not from the counts.
+    pub(super) fn take_legs(&mut self, legs: Legs<'f>) {
+        self.propagator.legs = legs;
+    }
+
+    /// What the chain said, and its legs where they were to be kept.
+    pub(super) fn into_parts(self) -> (Sums<'f>, Vec<usize>, Vec<Innovation>, NoiseScore, Option<KeptLegs>) {
+        (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.legs.into_kept())
     }
 
     /// Filters the looks at the ends of some legs.
@@ -217,11 +195,7 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     #[inline(always)]
     fn run_over(&mut self, legs: &[Leg], free_heading_rad: f64) {
-        if !self.goes_on {
-            for term in self.terms.iter_mut() {
-                term.restart(self.chain.info);
-            }
-        }
+        self.propagator.restart();
         let Some(first) = legs.first() else {
             let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
             self.start(Pose::IDENTITY, (0.0, 0.0), self.chain.pieces.first().copied(), (0, start_s));
@@ -272,7 +246,7 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     #[inline(always)]
     fn start(&mut self, seen: Pose, (var_xy, var_theta): (f64, f64), next: Option<Piece>, (legs, t_s): (usize, f64)) {
-        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.twist(&piece));
+        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.propagator.twist(&piece));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let theta_rad = seen.theta_rad - ltheta;
@@ -308,30 +282,13 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.pose_by_noise = [[0.0; NOISES]; 3];
     }
 
-    #[inline(always)]
-    fn twist(&self, piece: &Piece) -> Twist {
-        let travel_m = self.model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-        let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.model.separation_m);
-        Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
-    }
-
     /// Finds what the terms add to the look after so many legs at the pose in force, in the room, for each parameter.
     #[inline(always)]
     fn sight(&mut self, legs: usize, t_s: f64, twist: Twist) {
-        if self.gradients.is_empty() {
-            return;
-        }
-        if let Legs::Known(kept, _) = self.legs {
-            self.gradients.copy_from_slice(kept.sight(legs));
-        } else {
-            self.sight_of_terms(t_s, twist);
-        }
-        if let Legs::Kept(kept) = &mut self.legs {
-            kept.keep_sight(legs, &self.gradients);
-        }
+        self.propagator.sight(self.pose, legs, t_s, twist);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let sights = self.sights.x.iter_mut().zip(&mut self.sights.y).zip(&mut self.sights.theta);
-        for (((x, y), theta), gradient) in sights.zip(&self.gradients) {
+        for (((x, y), theta), gradient) in sights.zip(&self.propagator.gradients) {
             *x = cos * gradient.x_m - sin * gradient.y_m;
             *y = sin * gradient.x_m + cos * gradient.y_m;
             *theta = gradient.theta_rad;
@@ -340,7 +297,7 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     #[inline(always)]
     fn predict(&mut self, number: usize, leg: &Leg) {
-        let Moved { motion, by_lengths } = self.moved(number, leg);
+        let Moved { motion, by_lengths } = self.propagator.moved(self.pose, number, leg);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
@@ -348,7 +305,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         for (column, of_leg) in by_lengths.into_iter().enumerate() {
             self.by.set(column, self.by.get(column) + room(of_leg));
         }
-        self.by.add_turned(Column::BASE.len(), (sin, cos), &self.leg_by_terms);
+        self.by.add_turned(Column::BASE.len(), (sin, cos), &self.propagator.leg_by_terms);
         self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
         let noise = leg.noise.turned((sin, cos)).times([
             self.noise.variance[NoiseComponent::Wheel as usize],
@@ -374,7 +331,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     fn update(&mut self, number: usize, leg: &Leg) -> bool {
         let seen = self.chain.looks[leg.look];
         let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
-        let twist = self.twist(&piece);
+        let twist = self.propagator.twist(&piece);
         self.sight(number + 1, seen.t_s, twist);
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;

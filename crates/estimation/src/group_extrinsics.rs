@@ -5,53 +5,10 @@
 //! A weak prior keeps a group that shows nothing of o at what is common to all.
 //! Reference: Schur complement; Neyman & Scott 1948 for what many nuisances of few data do to a variance, and why they must gain on what was held out.
 
-use std::collections::BTreeMap;
-
-use kinematics::Pose;
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{Column, Model};
+use crate::model::{Column, Model, Own};
 use crate::normal_equations::Evidence;
-
-/// Where and how late an instrument looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instrument {
-    /// Its frame on the robot.
-    pub body_from_sensor: Pose,
-    /// How late its looks bear their time, seconds.
-    pub latency_s: f64,
-}
-
-/// Who has an instrument of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Apart {
-    /// Each session.
-    Session,
-    /// Each run.
-    Run,
-}
-
-impl Apart {
-    /// The group of a run: its session, and the run itself where runs stand apart.
-    #[must_use]
-    pub const fn group(self, run: (usize, usize)) -> (usize, usize) {
-        match self {
-            Self::Session => (run.0, 0),
-            Self::Run => run,
-        }
-    }
-}
-
-/// What stands apart, and its values.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Own {
-    /// For whom.
-    pub apart: Apart,
-    /// The columns that do, of mounting and latency.
-    pub columns: Vec<Column>,
-    /// The instruments found, by group.
-    pub of: BTreeMap<(usize, usize), Instrument>,
-}
 
 /// How a group's own columns follow a step of the others: at rest, and by each column of the evidence.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,12 +35,6 @@ impl Follow {
 }
 
 impl Own {
-    /// Values common to all, to start from.
-    #[must_use]
-    pub fn new(apart: Apart, columns: Vec<Column>) -> Self {
-        Self { apart, columns, of: BTreeMap::new() }
-    }
-
     /// Takes the own columns out of the evidences of runs or parts of runs; the model is the one in force.
     pub(crate) fn take_out(&self, evidences: &mut [Evidence], model: &Model) -> Vec<Follow> {
         let at: Vec<usize> = self.columns.iter().map(|column| column.index()).collect();
@@ -97,9 +48,7 @@ impl Own {
                 let mut sum = Evidence::new(group, evidences.first()?.gradient.len());
                 evidences.iter().filter(|evidence| in_group(evidence)).for_each(|evidence| sum.add(evidence, 1.0));
                 let pull = self.pull(model, group);
-                let own = DMatrix::from_fn(at.len(), at.len(), |i, j| {
-                    sum.information[(at[i], at[j])] + if i == j { pull[i].1 } else { 0.0 }
-                });
+                let own = sum.of(&self.columns).with_precision(pull.iter().map(|pull| pull.1)).matrix;
                 let inverse = own.clone().cholesky()?.inverse();
                 let mut cross = DMatrix::from_fn(at.len(), sum.gradient.len(), |i, j| sum.information[(at[i], j)]);
                 at.iter().for_each(|&column| cross.column_mut(column).fill(0.0));

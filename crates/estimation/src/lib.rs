@@ -29,6 +29,7 @@ mod pass;
 mod predicted_information;
 mod products;
 mod profile;
+mod propagation;
 mod records;
 #[cfg(test)]
 mod tests;
@@ -37,13 +38,14 @@ mod wheel_angles;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, refuse_wrapped_counters};
-pub use filter::Innovation;
-pub use group_extrinsics::{Apart, Instrument, Own};
+pub use filter::{Gate, Innovation};
 pub use maximum_likelihood::FitSettings;
-pub use model::{Column, Model};
+pub use model::{Apart, Column, Instrument, Model, Own};
 pub use model_fit::{JointFit, WHITE_BELOW};
 pub use noise::{Noise, NoiseComponent};
-pub use normal_equations::{Evidence, Information};
+pub use normal_equations::{
+    ClusterRobust, Evidence, Information, Projected, RIDGE, SchurComplement, free_basis, inverse, total,
+};
 pub use one_step::{LARGE_ROWS, LargeFit, OneStep, OneStepError, fit_large, is_large};
 pub use optimizer::{Ends, Fit, FitOptions, fit, pass_with_innovations};
 pub use pass::Pass;

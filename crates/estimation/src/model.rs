@@ -1,9 +1,9 @@
 //! The mean parameters: the drive's three lengths, where and how late the instrument looks, and the sizes of further terms.
 
-use kinematics::{DriveGeometry, Pose, Wheels};
-use nalgebra::DVector;
+use std::collections::BTreeMap;
 
-use crate::group_extrinsics::{Instrument, Own};
+use kinematics::{DriveGeometry, Increment, Pose, Wheels};
+use nalgebra::DVector;
 
 /// A mean parameter, in the order of the columns of every normal equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,54 @@ impl Column {
     }
 }
 
+/// Where and how late an instrument looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instrument {
+    /// Its frame on the robot.
+    pub body_from_sensor: Pose,
+    /// How late its looks bear their time, seconds.
+    pub latency_s: f64,
+}
+
+/// Who has an instrument of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Apart {
+    /// Each session.
+    Session,
+    /// Each run.
+    Run,
+}
+
+impl Apart {
+    /// The group of a run: its session, and the run itself where runs stand apart.
+    #[must_use]
+    pub const fn group(self, run: (usize, usize)) -> (usize, usize) {
+        match self {
+            Self::Session => (run.0, 0),
+            Self::Run => run,
+        }
+    }
+}
+
+/// What stands apart, and its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Own {
+    /// For whom.
+    pub apart: Apart,
+    /// The columns that do, of mounting and latency.
+    pub columns: Vec<Column>,
+    /// The instruments found, by group.
+    pub of: BTreeMap<(usize, usize), Instrument>,
+}
+
+impl Own {
+    /// Values common to all, to start from.
+    #[must_use]
+    pub fn new(apart: Apart, columns: Vec<Column>) -> Self {
+        Self { apart, columns, of: BTreeMap::new() }
+    }
+}
+
 /// Values of the mean parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -93,6 +141,14 @@ impl Model {
 
     pub(crate) const fn common_instrument(&self) -> Instrument {
         Instrument { body_from_sensor: self.body_from_sensor, latency_s: self.latency_s }
+    }
+
+    /// Motion of the drive's centre when the wheels turn by this much.
+    #[inline]
+    #[must_use]
+    pub fn increment(&self, wheel_rad: Wheels<f64>) -> Increment {
+        let travel_m = self.m_per_rad.zip_with(wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        Increment::from_travel(travel_m, self.separation_m)
     }
 
     /// Where and how late the instrument looks in a run.

@@ -10,8 +10,8 @@ use crate::error::EstimationError;
 use crate::filter::{Gate, Want};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
-use crate::normal_equations::{Evidence, Information};
-use crate::optimizer::{Ends, Fit, FitOptions, From, basis, fit_from};
+use crate::normal_equations::{ClusterRobust, Evidence, SchurComplement, free_basis};
+use crate::optimizer::{Ends, Fit, FitOptions, From, fit_from};
 use crate::pass::{Pass, pass};
 use crate::records::{Chain, Records};
 use crate::thinning::{Selection, Thinning};
@@ -142,10 +142,14 @@ impl JointFit<'_> {
 
     /// The directions of the free columns that stay nominal.
     pub(crate) fn held(&self) -> Vec<DVector<f64>> {
+        self.fixed_along(&self.columns)
+    }
+
+    /// The same over some of the columns.
+    fn fixed_along(&self, columns: &[Column]) -> Vec<DVector<f64>> {
         let along = |direction: &DVector<f64>, column: &Column| direction.get(column.index()).copied().unwrap_or(0.0);
-        let of = |direction| {
-            DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| along(direction, column)))
-        };
+        let of =
+            |direction| DVector::from_iterator(columns.len(), columns.iter().map(|column| along(direction, column)));
         self.unseen.iter().map(of).collect()
     }
 
@@ -344,42 +348,32 @@ impl JointFit<'_> {
     /// scatter of the runs (the sandwich over runs, each run's leverage taken into account). `terms` are those of the fit.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
-        let information = self.fit.information(&self.columns)?;
         let free = self.free_basis();
-        let reduced = Information {
-            matrix: free.transpose() * &information.matrix * &free,
-            gradient: free.transpose() * &information.gradient,
-        };
-        let (_, inverse) = reduced.solve()?;
-        let model_based = &free * &inverse * free.transpose();
+        let (_, inverse) = self.fit.information(&self.columns)?.along(&free).solve()?;
         let units = self.units(terms);
         let enough = if self.thinning == Thinning::NONE { SCATTER_OF_RUNS } else { free.ncols() + 2 };
         if units.len() < enough {
-            return Some(model_based);
+            return Some(&free * inverse * free.transpose());
         }
-        #[allow(clippy::cast_precision_loss)]
-        let count = units.len() as f64;
-        let mut meat = DMatrix::zeros(free.ncols(), free.ncols());
-        for unit in &units {
-            let of = unit.of(&self.columns);
-            // Each unit's leverage taken into account: its score without itself in the fit.
-            let own = free.transpose() * of.matrix * &free;
-            let gradient = free.transpose() * of.gradient;
-            let Some(others) = (DMatrix::identity(free.ncols(), free.ncols()) - &own * &inverse).try_inverse() else {
-                continue;
-            };
-            let without = others * gradient;
-            meat += &without * without.transpose();
-        }
-        let sandwich = &inverse * (meat * ((count - 1.0) / count)) * &inverse;
-        Some(&free * sandwich * free.transpose())
+        let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
+        Some(&free * ClusterRobust::of(&inverse, clusters).covariance * free.transpose())
     }
 
-    pub(crate) fn free_basis(&self) -> DMatrix<f64> {
-        basis(&FitOptions { held: self.held(), ..FitOptions::of(&self.columns) })
+    /// An orthonormal basis of the directions of the free columns that are observable.
+    #[must_use]
+    pub fn free_basis(&self) -> DMatrix<f64> {
+        free_basis(self.columns.len(), &self.held())
+    }
+
+    /// The Schur complement of the free columns, but for some that are asked for.
+    #[must_use]
+    pub fn eliminated(&self, equations: &Evidence, asked: &[usize]) -> Option<SchurComplement> {
+        let columns: Vec<Column> =
+            self.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
+        let basis = free_basis(columns.len(), &self.fixed_along(&columns));
+        SchurComplement::of(equations, &columns, basis)
     }
 }
-
 /// The directions of the three lengths that a normal equation, which begins with them, does not determine.
 pub(crate) fn unseen(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();

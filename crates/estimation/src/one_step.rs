@@ -13,11 +13,11 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
-use crate::group_extrinsics::{Apart, Instrument};
 use crate::maximum_likelihood::FitSettings;
+use crate::model::{Apart, Instrument};
 use crate::model::{Column, Model};
 use crate::model_fit::{JointFit, unseen};
-use crate::normal_equations::{Evidence, Information, total};
+use crate::normal_equations::{Evidence, total};
 use crate::optimizer::{Ends, pass_settled};
 use crate::records::Records;
 use crate::thinning::Selection;
@@ -282,11 +282,7 @@ impl JointFit<'_> {
         let information = sum.of(&self.columns);
         self.unseen = unseen(&information.matrix);
         let free = self.free_basis();
-        let reduced = Information {
-            matrix: free.transpose() * information.matrix * &free,
-            gradient: free.transpose() * information.gradient,
-        };
-        let (step, covariance) = reduced.solve().ok_or(EstimationError::Diverges)?;
+        let (step, covariance) = information.along(&free).solve().ok_or(EstimationError::Diverges)?;
         let (step, covariance) = (&free * step, &free * covariance * free.transpose());
         let mut moved = DVector::zeros(sum.gradient.len());
         let mut is_near = true;

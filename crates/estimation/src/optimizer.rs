@@ -1,16 +1,17 @@
 //! The fit: Gauss–Newton for the mean parameters and Fisher scoring for the noise, side by side.
 
-use kinematics::{Increment, Pose, unwrap_near};
+use kinematics::{Pose, unwrap_near};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use crate::acceleration::{Acceleration, Size};
 use crate::error::EstimationError;
-use crate::filter::{Gate, Kept, Want};
+use crate::filter::{Gate, Want};
 use crate::model::{Column, Model};
 use crate::noise::{LEAST_SIGMA, Noise, NoisePrior};
-use crate::normal_equations::{Information, total};
+use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
+use crate::propagation::Kept;
 use crate::records::{Chain, Records, Start};
 use crate::thinning::Selection;
 
@@ -157,7 +158,7 @@ pub(crate) fn fit_from(
     let mut model = from.model;
     let mut headings =
         from.free_headings.unwrap_or_else(|| records.chains.iter().map(|chain| start_heading(chain, &model)).collect());
-    let basis = basis(options);
+    let basis = free_basis(options.columns.len(), &options.held);
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
@@ -264,22 +265,9 @@ pub fn pass_with_innovations(
     noise: &Noise,
     free_headings: &[f64],
     terms: &mut [Box<dyn ModelTerm>],
+    gate: Gate,
 ) -> Pass {
-    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, ..Want::default() })
-}
-
-/// An orthonormal basis of the directions that may move.
-pub(crate) fn basis(options: &FitOptions) -> DMatrix<f64> {
-    let n = options.columns.len();
-    if options.held.is_empty() {
-        return DMatrix::identity(n, n);
-    }
-    let held = DMatrix::from_columns(&options.held);
-    // Held directions have eigenvalue 1 or more in H Hᵀ, the others 0.
-    let eigen = (&held * held.transpose()).symmetric_eigen();
-    let free: Vec<_> =
-        (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-9).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
-    if free.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&free) }
+    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, gate, ..Want::default() })
 }
 
 /// A damped Gauss–Newton step of the mean.
@@ -295,18 +283,16 @@ struct MeanStep {
 impl MeanStep {
     fn of(found: &Pass, options: &FitOptions, basis: &DMatrix<f64>) -> Result<Self, EstimationError> {
         let Some(sum) = total(&found.runs) else { return Err(EstimationError::NoMeasurements) };
-        let Information { matrix, gradient } = sum.of(&options.columns);
+        let system = sum.of(&options.columns);
         if options.columns.is_empty() || basis.ncols() == 0 {
-            return Ok(Self { by: DVector::zeros(options.columns.len()), information: matrix, squared: 0.0 });
+            return Ok(Self { by: DVector::zeros(options.columns.len()), information: system.matrix, squared: 0.0 });
         }
-        let reduced = basis.transpose() * &matrix * basis;
-        let m = reduced.nrows();
-        let damping = DVector::from_fn(m, |k, _| DAMPING * reduced[(k, k)] + LEAST_INFORMATION);
-        let damped =
-            Information { matrix: &reduced + DMatrix::from_diagonal(&damping), gradient: basis.transpose() * gradient };
+        let reduced = system.along(basis);
+        let damping = reduced.matrix.diagonal().map(|information| DAMPING * information + LEAST_INFORMATION);
+        let damped = reduced.clone().with_precision(damping.iter().copied());
         let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
-        let squared = (step.transpose() * &reduced * &step)[0];
-        Ok(Self { by: basis * step, information: matrix, squared })
+        let squared = (step.transpose() * &reduced.matrix * &step)[0];
+        Ok(Self { by: basis * step, information: system.matrix, squared })
     }
 }
 
@@ -443,8 +429,7 @@ pub(crate) fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
     let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
     for look in &chain.looks[1..] {
         for piece in &chain.pieces[at..look.after] {
-            let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-            pose = pose * Increment::from_travel(travel_m, model.separation_m).arc();
+            pose = pose * model.increment(piece.wheel_rad).arc();
         }
         at = look.after;
         let (x_m, y_m) = (look.x_m - first.x_m, look.y_m - first.y_m);

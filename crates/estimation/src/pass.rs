@@ -5,12 +5,13 @@ use std::ops::Range;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, Innovation, Kept, KeptLegs, Legs, NoiseScore, Trail, Want};
+use crate::filter::{Filter, Innovation, NoiseScore, Want};
 use crate::group_extrinsics::Follow;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::normal_equations::Evidence;
 use crate::products::Products;
+use crate::propagation::{Kept, KeptLegs, Legs, Trail};
 use crate::records::{Chain, Records, Start};
 use crate::thinning::{Leg, Selection};
 
@@ -88,15 +89,15 @@ pub(crate) fn pass(
                 filter.go_on(trail);
             }
             if let Some((kept, change)) = &known {
-                filter.legs = kept.known(phase, number, change);
+                filter.take_legs(kept.known(phase, number, change));
             } else if want.keep {
-                filter.legs = Legs::kept(legs.len(), columns - Column::BASE.len());
+                filter.take_legs(Legs::kept(legs.len(), columns - Column::BASE.len()));
             }
             filter.run(legs, free_headings[number]);
             *trail = Some(filter.trail());
-            let Filter { sums, outliers, innovations, noise_score, legs, .. } = filter;
+            let (sums, outliers, innovations, noise_score, kept) = filter.into_parts();
             let (evidence, heading) = sums.eliminated(chain.run, columns);
-            (evidence, OfChain { number, heading, innovations, outliers, noise_score, kept: legs.into_kept() })
+            (evidence, OfChain { number, heading, innovations, outliers, noise_score, kept })
         };
     let mut phases = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {

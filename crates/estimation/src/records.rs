@@ -130,10 +130,7 @@ impl Chain<'_> {
             Start::Origin => body_from_sensor.inverse(),
         };
         let end = pose(self.looks.last()?)?;
-        let reckoned = self.pieces.iter().fold(start, |pose, piece| {
-            let travel_m = model.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-            pose * Increment::from_travel(travel_m, model.separation_m).arc()
-        });
+        let reckoned = self.pieces.iter().fold(start, |pose, piece| pose * model.increment(piece.wheel_rad).arc());
         let off_rad = wrap_to_pi(reckoned.theta_rad - end.theta_rad).abs();
         Some((reckoned.position().distance_m(end.position()), off_rad))
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use estimation::JointFit;
+use estimation::total;
 use estimation::{Column, Evidence};
 
 use super::library::Manoeuvre;
@@ -14,7 +15,6 @@ use super::{Part, evidences, words};
 use crate::candidate::{Choice, terms};
 use crate::document::NextExperiment;
 use crate::naming::{FAINT, is_faint};
-use crate::scan::total;
 use crate::search::{Found, without};
 
 /// Two kinds of run must save this share of the time against one to be worth the trouble.

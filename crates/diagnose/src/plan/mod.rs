@@ -14,11 +14,11 @@ mod words;
 use dataset::Dataset;
 use estimation::Evidence;
 use estimation::JointFit;
+use estimation::total;
 use motion_programs::Schedule;
 
 use crate::candidate::{Choice, terms};
 use crate::document::{Blind, NextExperiment};
-use crate::scan::total;
 use crate::search::{Extended, Found};
 
 use library::{Manoeuvre, foreseen, library};

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use estimation::JointFit;
+use estimation::total;
 use estimation::{Column, Evidence, Model, Noise};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
@@ -18,7 +19,6 @@ use super::{Part, evidences, words};
 use crate::blind::SHOWS;
 use crate::candidate::{Choice, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::scan::total;
 use crate::search::Extended;
 
 /// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.

@@ -5,12 +5,12 @@
 
 use estimation::JointFit;
 use estimation::{Column, Evidence};
+use estimation::{RIDGE, inverse};
 use nalgebra::{DMatrix, DVector};
 
 use super::Part;
 use super::library::Manoeuvre;
 use crate::candidate::Choice;
-use crate::scan::inverse;
 use crate::search::reach;
 
 /// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
@@ -81,14 +81,14 @@ impl Frame {
 
     /// Estimates of some columns from evidence, as steps from the model in force, and their covariance.
     pub(crate) fn estimate(&self, evidence: &Evidence, columns: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let covariance = inverse(&self.matrix(evidence, columns))?;
+        let covariance = inverse(&self.matrix(evidence, columns), RIDGE)?;
         let gradient = DVector::from_fn(columns.len(), |k, _| evidence.gradient[columns[k]]);
         Some((-(&covariance * gradient), covariance))
     }
 
     /// The information on some columns with others at their best.
     pub(crate) fn information(&self, evidence: &Evidence, own: &[usize], others: &[usize]) -> Option<DMatrix<f64>> {
-        let inverse = inverse(&self.matrix(evidence, others))?;
+        let inverse = inverse(&self.matrix(evidence, others), RIDGE)?;
         let cross = DMatrix::from_fn(own.len(), others.len(), |i, j| evidence.information[(own[i], others[j])]);
         let raw = DMatrix::from_fn(own.len(), own.len(), |i, j| evidence.information[(own[i], own[j])]);
         Some(raw - &cross * inverse * cross.transpose())

@@ -8,16 +8,17 @@ use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_deri
 use model_term::{Interval, Look, ModelTerm};
 use nalgebra::Vector3;
 
-use super::Filter;
+use crate::derivatives::Derivatives;
 use crate::model::Model;
+use crate::records::Chain;
 use crate::thinning::Leg;
 use crate::wheel_angles::Piece;
 
 /// A leg's motion in the frame of the body at its start, and what it depends on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moved {
-    pub(super) motion: Pose,
-    pub(super) by_lengths: [Vector3<f64>; 3],
+pub(crate) struct Moved {
+    pub(crate) motion: Pose,
+    pub(crate) by_lengths: [Vector3<f64>; 3],
 }
 
 /// Where a filter has its legs from.
@@ -60,11 +61,11 @@ impl Legs<'_> {
 }
 
 impl KeptLegs {
-    pub(super) fn sight(&self, legs: usize) -> &[Pose] {
+    pub(crate) fn sight(&self, legs: usize) -> &[Pose] {
         &self.sights[legs * self.parameters..][..self.parameters]
     }
 
-    pub(super) fn keep_sight(&mut self, legs: usize, gradients: &[Pose]) {
+    pub(crate) fn keep_sight(&mut self, legs: usize, gradients: &[Pose]) {
         self.sights[legs * self.parameters..][..self.parameters].copy_from_slice(gradients);
     }
 }
@@ -101,14 +102,110 @@ impl Kept {
     }
 }
 
-impl Filter<'_, '_> {
-    /// The motion of a leg, and in the filter how it depends on the terms' sizes.
+/// Where the displacements of a run have led: the next one's terms go on from there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Trail {
+    /// The next chain's frame in that of the first.
+    pub(crate) run_from_chain: Pose,
+    pub(crate) session_m: f64,
+    pub(crate) previous: Option<Piece>,
+}
+
+/// The mean model along one chain: what counts and terms say of its motion, and what the terms add to its measurements. One for the filter and for dead reckoning.
+pub(crate) struct Propagator<'f, 'a> {
+    chain: &'f Chain<'a>,
+    pub(crate) model: &'f Model,
+    terms: &'f mut [Box<dyn ModelTerm>],
+    /// The chain's frame in that of the run's displacements; the identity for poses.
+    run_from_chain: Pose,
+    session_m: f64,
+    wheel_rad: Wheels<f64>,
+    previous: Option<Piece>,
+    goes_on: bool,
+    /// What the terms last said, by each of their parameters.
+    pub(crate) gradients: Vec<Pose>,
+    /// Where legs come from.
+    pub(crate) legs: Legs<'f>,
+    /// Derivatives of the leg in force by the terms' parameters.
+    pub(crate) leg_by_terms: Derivatives,
+}
+
+impl<'f, 'a> Propagator<'f, 'a> {
+    pub(crate) fn new(chain: &'f Chain<'a>, model: &'f Model, terms: &'f mut [Box<dyn ModelTerm>]) -> Self {
+        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
+        Self {
+            chain,
+            model,
+            terms,
+            run_from_chain: Pose::IDENTITY,
+            session_m: chain.session_m,
+            wheel_rad: chain.wheel_rad,
+            previous: None,
+            goes_on: false,
+            gradients: vec![Pose::IDENTITY; parameters],
+            legs: Legs::Driven,
+            leg_by_terms: Derivatives::zeros(parameters),
+        }
+    }
+
+    /// Goes on where the chain before ended.
+    pub(crate) fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
+        (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
+        self.goes_on = true;
+    }
+
+    /// How far the centre went in the runs before and in this one, metres.
+    pub(crate) const fn session_m(&self) -> f64 {
+        self.session_m
+    }
+
+    /// Where this chain ended, the instrument standing at a pose of the chain's frame.
+    pub(crate) fn trail(&self, chain_from_sensor: Pose) -> Trail {
+        let run_from_chain = self.run_from_chain * chain_from_sensor;
+        Trail { run_from_chain, session_m: self.session_m, previous: self.previous }
+    }
+
+    /// Forgets what terms remember of the run before, unless the chain goes on.
     #[inline(always)]
-    pub(super) fn moved(&mut self, number: usize, leg: &Leg) -> Moved {
+    pub(crate) fn restart(&mut self) {
+        if !self.goes_on {
+            for term in self.terms.iter_mut() {
+                term.restart(self.chain.info);
+            }
+        }
+    }
+
+    /// Motion of the drive's centre in a piece, per second.
+    #[inline(always)]
+    pub(crate) fn twist(&self, piece: &Piece) -> Twist {
+        let Increment { distance_m, turn_rad } = self.model.increment(piece.wheel_rad);
+        Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
+    }
+
+    /// What the terms add to the look after so many legs, at a pose of the drive's centre, in the frame of the body; it stands in [`Self::gradients`].
+    #[inline(always)]
+    pub(crate) fn sight(&mut self, pose: Pose, legs: usize, t_s: f64, twist: Twist) {
+        if self.gradients.is_empty() {
+            return;
+        }
+        if let Legs::Known(kept, _) = self.legs {
+            self.gradients.copy_from_slice(kept.sight(legs));
+        } else {
+            let look = Look { t_s, world_from_body: self.run_from_chain * pose, twist, run: self.chain.info };
+            self.ask_terms(|term, own| term.sight(&look, own));
+        }
+        if let Legs::Kept(kept) = &mut self.legs {
+            kept.keep_sight(legs, &self.gradients);
+        }
+    }
+
+    /// The motion of a leg from a pose of the drive's centre, and in [`Self::leg_by_terms`] how it depends on the terms' sizes.
+    #[inline(always)]
+    pub(crate) fn moved(&mut self, pose: Pose, number: usize, leg: &Leg) -> Moved {
         if let Legs::Known(kept, change) = self.legs {
             return self.known(kept, change, number);
         }
-        let moved = self.driven(leg);
+        let moved = self.driven(pose, leg);
         if let Legs::Kept(kept) = &mut self.legs {
             kept.moved.push(moved);
             kept.by_terms.extend((0..kept.parameters).map(|column| self.leg_by_terms.get(column)));
@@ -133,14 +230,6 @@ impl Filter<'_, '_> {
         Moved { motion, by_lengths }
     }
 
-    /// What the terms add to a look at the pose in force, in the frame of the body.
-    #[inline(always)]
-    pub(super) fn sight_of_terms(&mut self, t_s: f64, twist: Twist) {
-        let world_from_body = self.run_from_chain * self.pose;
-        let look = Look { t_s, world_from_body, twist, run: self.chain.info };
-        self.ask_terms(|term, own| term.sight(&look, own));
-    }
-
     /// Asks each term for its gradients by its own parameters.
     #[inline(always)]
     fn ask_terms(&mut self, ask: impl Fn(&mut dyn ModelTerm, &mut [Pose])) {
@@ -155,11 +244,11 @@ impl Filter<'_, '_> {
 
     /// The motion of a leg by the counts and the terms.
     #[inline(always)]
-    fn driven(&mut self, leg: &Leg) -> Moved {
+    fn driven(&mut self, pose: Pose, leg: &Leg) -> Moved {
         let Model { m_per_rad, separation_m, .. } = *self.model;
         let mut moved = Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3] };
         self.leg_by_terms.clear();
-        let run_from_start = Frame::from(self.run_from_chain * self.pose);
+        let run_from_start = Frame::from(self.run_from_chain * pose);
         // Those of terms that are only tested have no size, and there are many.
         let sized = self.model.sizes.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
         for piece in &self.chain.pieces[leg.pieces.clone()] {
