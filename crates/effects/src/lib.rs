@@ -8,16 +8,22 @@
 //! is simulated as a [`SparseTerm`].
 
 mod beat;
+mod benchmark;
 mod covariate;
+mod description;
 mod effect;
+mod estimates;
 mod forward;
 mod hypothesis;
 mod memory;
 mod stream;
 mod term;
 
+pub use benchmark::{Benchmark, HostRobot, Needs, OtherForm, SizeLaw, Sizes};
 pub use covariate::{Channel, Covariate};
+pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
 pub use effect::{EffectError, PhysicalEffect};
+pub use estimates::{Estimate, Estimates};
 pub use forward::{Command, Forward, Hooks, Readout, RunStart, SampleClock, Sighting, Step};
 pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
 pub use stream::{Address, Stream, StreamName};
@@ -101,6 +107,15 @@ macro_rules! contents {
         pub fn hypothesis(id: &str) -> Option<Hypothesis> {
             match id {
                 $(stringify!($module) => Some(<$Type as PhysicalEffect>::hypothesis()),)*
+                _ => None,
+            }
+        }
+
+        /// What is known of an effect beside its two faces, by its id; `None` for an unknown id.
+        #[must_use]
+        pub fn description(id: &str) -> Option<Description> {
+            match id {
+                $(stringify!($module) => Some(<$Type as PhysicalEffect>::description()),)*
                 _ => None,
             }
         }
