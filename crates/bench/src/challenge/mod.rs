@@ -8,7 +8,6 @@
 
 mod case;
 mod draw;
-mod forms;
 mod hidden;
 mod looks;
 mod measure;
