@@ -261,7 +261,8 @@ pub(crate) fn of_spans(spans: Option<&Check>) -> Option<Finding> {
     of_scatter(&[], check.p_value, BTreeMap::new(), &what)
 }
 
-/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to be named.
+/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to be
+/// named.
 pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
     let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
     let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;

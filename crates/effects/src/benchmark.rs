@@ -1,8 +1,11 @@
-//! How the blind benchmark hides an effect in a random robot: the law of its sizes, what the records must have for it to show, and another functional form.
+//! How the blind benchmark hides an effect in a random robot: the law of its sizes, what the records must
+//! have for it to show, and another functional form.
 //!
-//! Sizes are drawn as a direction and scaled afterwards to what the data can show, up to the largest of a real robot. The *other form* is a forward face
-//! that departs from the catalogue's, so that the world differs from every hypothesis. It stands in the effect's file and shares no code with the
-//! hypothesis. References: Pacejka 2012 for slip that saturates; Armstrong-Hélouvry et al. 1994 for round corners of friction.
+//! Sizes are drawn as a direction and scaled afterwards to what the data can show, up to the largest of a
+//! real robot. The *other form* is a forward face that departs from the catalogue's, so that the world
+//! differs from every hypothesis. It stands in the effect's file and shares no code with the hypothesis.
+//! References: Pacejka 2012 for slip that saturates; Armstrong-Hélouvry et al. 1994 for round corners of
+//! friction.
 
 use kinematics::Wheels;
 
@@ -52,7 +55,8 @@ impl Needs {
 pub enum SizeLaw {
     /// A random direction in units of what is large by the hypothesis's parameters.
     Direction {
-        /// What stays the same whatever the scale, from the shape parameters of the hypothesis that was drawn; off its grid where any value is possible.
+        /// What stays the same whatever the scale, from the shape parameters of the hypothesis that was
+        /// drawn; off its grid where any value is possible.
         held: fn(Sizes, &HostRobot, &mut Stream) -> Sizes,
         /// A size of the wrong sign counts as none: the direction would not be what it says.
         positive: bool,
@@ -87,7 +91,8 @@ pub struct Benchmark {
     pub other_form: Option<OtherForm>,
     /// Its signature is random in part: one drive with it is not like the next.
     pub has_random_signature: bool,
-    /// The effect without any harm, for records that have what it needs though it is not hidden: so such records tell nothing.
+    /// The effect without any harm, for records that have what it needs though it is not hidden: so such
+    /// records tell nothing.
     pub harmless: Option<fn(&HostRobot) -> Option<Effect>>,
 }
 

@@ -1,7 +1,8 @@
-//! What is known of an effect beside its two faces: its meaning for people, what excites it, how a single large error of it looks, how its fault of the
-//! records is treated, and how the blind benchmark draws it.
+//! What is known of an effect beside its two faces: its meaning for people, what excites it, how a single
+//! large error of it looks, how its fault of the records is treated, and how the blind benchmark draws it.
 //!
-//! Diagnosis, plans, pages and the benchmark ask these properties; none of them compares ids. So a new effect states here all that they must know of it.
+//! Diagnosis, plans, pages and the benchmark ask these properties; none of them compares ids. So a new effect
+//! states here all that they must know of it.
 
 use crate::benchmark::Benchmark;
 use crate::estimates::Estimates;
@@ -9,7 +10,8 @@ use crate::estimates::Estimates;
 /// Properties of an effect, whatever its sizes.
 #[derive(Clone)]
 pub struct Description {
-    /// What is wrong where the effect is, in one line for people: "the wheels lose way in proportion to their speed".
+    /// What is wrong where the effect is, in one line for people: "the wheels lose way in proportion to their
+    /// speed".
     pub meaning: &'static str,
     /// How people are told of it with the sizes that a fit found.
     pub told: Told,
@@ -70,7 +72,8 @@ pub enum Excitation {
     Conditions(&'static str),
 }
 
-/// How a single large error of an effect looks in the innovations at and after it. Each grid holds the scales that the error's size is integrated over.
+/// How a single large error of an effect looks in the innovations at and after it. Each grid holds the scales
+/// that the error's size is integrated over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IsolatedError {
     /// One wheel loses distance, anywhere where it drives: how much, metres.
@@ -78,7 +81,8 @@ pub enum IsolatedError {
         /// Scales of the distance lost, metres.
         scales_m: &'static [f64],
     },
-    /// Wheels lose distance as they become faster and gain it as they become slower, in proportion to the change of speed.
+    /// Wheels lose distance as they become faster and gain it as they become slower, in proportion to the
+    /// change of speed.
     LostWithSpeedChange {
         /// Scales of the distance per change of speed, seconds.
         scales_s: &'static [f64],
@@ -95,11 +99,14 @@ pub enum IsolatedError {
 /// How a fault of the records is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecordFault {
-    /// The log alone can show it. What leaves no trace is possible in any records, and is tried only where the base fit is hard to believe.
+    /// The log alone can show it. What leaves no trace is possible in any records, and is tried only where
+    /// the base fit is hard to believe.
     pub leaves_a_trace: bool,
-    /// The rewriting restores the counts only roughly, so that outliers and scatter that are left say nothing new.
+    /// The rewriting restores the counts only roughly, so that outliers and scatter that are left say nothing
+    /// new.
     pub is_restored_roughly: bool,
-    /// The size by which it multiplies the counts of both wheels: wheels that are calibrated far from nominal by one factor are such a fault.
+    /// The size by which it multiplies the counts of both wheels: wheels that are calibrated far from nominal
+    /// by one factor are such a fault.
     pub counts_factor: Option<&'static str>,
 }
 

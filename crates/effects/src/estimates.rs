@@ -1,4 +1,5 @@
-//! Estimated sizes of an effect, as sentences for people show them: scaled to a handy unit, with as many digits as their standard deviation is worth.
+//! Estimated sizes of an effect, as sentences for people show them: scaled to a handy unit, with as many
+//! digits as their standard deviation is worth.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +41,8 @@ impl Estimates<'_> {
         self.0.get(name).map_or_else(|| "?".to_owned(), |estimate| estimate.shown(scale, unit))
     }
 
-    /// For each wheel whose sine and cosine (`left_sin` and `left_cos`, with a suffix) are significant, `what` and their amplitude; the larger first.
+    /// For each wheel whose sine and cosine (`left_sin` and `left_cos`, with a suffix) are significant,
+    /// `what` and their amplitude; the larger first.
     pub(crate) fn amplitudes(&self, suffix: &str, scale: f64, unit: &str, what: &str) -> String {
         let side = |side: &str| -> Option<(f64, String)> {
             let of = |part: &str| self.0.get(&format!("{side}_{part}{suffix}")[..]);

@@ -35,7 +35,8 @@ const UNDETERMINED: f64 = 0.02;
 /// Kinds of run that a person keeps apart.
 const MOST_KINDS: usize = 6;
 
-/// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite it.
+/// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
+/// it.
 fn conditions(id: &str) -> Option<&'static str> {
     match effects::description(id)?.excitation {
         Excitation::Manoeuvres => None,

@@ -141,7 +141,8 @@ impl ModelTerm for Term {
     }
 }
 
-/// The other form: play with a spring in it, whose lead goes to its limit over the width of the gap instead of at once.
+/// The other form: play with a spring in it, whose lead reaches its limit over the width of the gap instead of
+/// at once.
 struct SpringyPlay {
     half_gap_m: Wheels<f64>,
     lead_m: Wheels<f64>,

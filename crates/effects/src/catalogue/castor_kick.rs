@@ -140,7 +140,8 @@ impl ModelTerm for Term {
     }
 }
 
-/// The other form, a castor by its differential equation: it trails at 0, stands on its head at π, and turns the robot as it flips.
+/// The other form, a castor by its differential equation: it trails at 0, stands on its head at π, and turns the
+/// robot as it flips.
 struct RollingCastor {
     /// Turn of the robot over the castor's.
     gain: f64,
@@ -160,7 +161,7 @@ impl Forward for RollingCastor {
         self.psi_rad = 0.0;
     }
 
-    /// A turn of the robot leaves the castor's direction in the room where it was, and rolling takes it behind.
+    /// A turn of the robot leaves the castor's direction in the room where it was; rolling takes it behind.
     fn floor(&mut self, step: &mut Step) {
         let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
         let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;

@@ -17,7 +17,8 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, Sign, size};
 
-/// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it should, to one that holds nearly nothing.
+/// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it
+/// should, to one that holds nearly nothing.
 const SLIDES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 
 /// Standard gravity, m/s² (CGPM 1901).
@@ -276,7 +277,7 @@ impl Term {
 }
 
 impl ModelTerm for Term {
-    /// Plausible: what a usual floor loses.
+    /// Plausible: what a usual floor loses (u_s = 0.05 m/s) under a tread that trembles by 0.01 m/s.
     fn parameters(&self) -> &'static [TermParameter] {
         &[TermParameter { name: "sliding", unit: "1", plausible: 1.0 }]
     }
