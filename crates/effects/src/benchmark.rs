@@ -166,3 +166,146 @@ pub(crate) fn contact_twist(step: &Step) -> (f64, f64) {
     let Wheels { left, right } = step.contact_speed_m_s();
     (0.5 * (left + right), (right - left) / step.wheel_separation_m)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hypothesis::Hypothesis;
+    use crate::{Address, CATALOGUE, StreamName, description, effect_of_sizes, hypothesis};
+
+    fn host() -> HostRobot {
+        HostRobot {
+            cruise_speed_m_s: 0.3,
+            acceleration_m_s2: 0.5,
+            wheel_separation_m: 0.4,
+            payload_kg: vec![0.0, 5.0],
+            jitter_s: 0.005,
+        }
+    }
+
+    fn stream(run: u32) -> Stream {
+        Address { seed: 3, point: 0, trial: 0, run }.stream(StreamName::new("test"))
+    }
+
+    /// Sizes of an effect as the benchmark draws them, all of a mean's as large as is large; at scale 1.
+    fn drawn(id: &str, run: u32) -> Sizes {
+        let benchmark = description(id).expect("known").benchmark;
+        let mut stream = stream(run);
+        match benchmark.sizes {
+            SizeLaw::Direction { held, .. } => {
+                let shape =
+                    hypothesis(id).and_then(Hypothesis::into_shapes).and_then(|shapes| shapes.into_iter().next());
+                let Some(shape) = shape else { return Vec::new() };
+                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.plausible));
+                large.chain(held(shape.held.clone(), &host(), &mut stream)).collect()
+            }
+            SizeLaw::Scatter(law) => {
+                let (scaled, held) = law(&host(), &mut stream);
+                scaled.into_iter().chain(held).collect()
+            }
+            SizeLaw::Fault(law) => law(Wheels { left: run % 2 == 0, right: true }, &mut stream),
+        }
+    }
+
+    fn acts(benchmark: &Benchmark, id: &str, sizes: &[(&'static str, f64)], scale: f64) -> Option<Effect> {
+        match benchmark.at_scale {
+            Some(at_scale) => at_scale(sizes, scale, &host()).filter(|effect| effect.physical().check().is_ok()),
+            None => effect_of_sizes(id, sizes),
+        }
+    }
+
+    /// Whether a law is that of what a hypothesis shows.
+    fn is_of(law: SizeLaw, hypothesis: &Hypothesis) -> bool {
+        match hypothesis {
+            Hypothesis::Terms(_) => matches!(law, SizeLaw::Direction { .. }),
+            Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => matches!(law, SizeLaw::Scatter(_)),
+            Hypothesis::Records(_) => matches!(law, SizeLaw::Fault(_)),
+            // Never hidden.
+            Hypothesis::Geometry | Hypothesis::Silent => matches!(law, SizeLaw::Direction { .. }),
+        }
+    }
+
+    #[test]
+    fn what_is_drawn_is_physical_and_what_its_hypothesis_is_of() {
+        for id in CATALOGUE {
+            let (benchmark, hypothesis) = (description(id).expect("known").benchmark, hypothesis(id).expect("known"));
+            assert!(is_of(benchmark.sizes, &hypothesis), "{id}");
+            if matches!(hypothesis, Hypothesis::Geometry | Hypothesis::Silent) {
+                continue;
+            }
+            for run in 0..20 {
+                let sizes = drawn(id, run);
+                let effect = acts(&benchmark, id, &sizes, 1.0).unwrap_or_else(|| panic!("{id}: {sizes:?}"));
+                assert_eq!(effect.id(), *id);
+                // A size that the effect has under another name makes none.
+                let renamed: Sizes = sizes.iter().map(|(_, size)| ("another", *size)).collect();
+                assert!(sizes.is_empty() || acts(&benchmark, id, &renamed, 1.0).is_none(), "{id}");
+            }
+        }
+        let fault = Benchmark::of_fault(|_, _| Vec::new());
+        assert!(!is_of(fault.sizes, &Hypothesis::Silent) && !is_of(fault.sizes, &Hypothesis::Scatter(&[])));
+    }
+
+    /// Where a step was left by a form: what differs from a step that it does not act on.
+    fn departs(form: &mut dyn Forward) -> bool {
+        use crate::catalogue::specimen_step;
+        let hooks = form.hooks();
+        if hooks.start_run {
+            form.start_run(stream(0));
+        }
+        // A second ahead, and a second back, so that what follows reversals acts.
+        (0..2000).any(|k| {
+            let sense = if k < 1000 { 1.0 } else { -1.0 };
+            let mut step = specimen_step();
+            step.t_s = 1e-3 * f64::from(k);
+            let speed_m_s = Wheels { left: 0.25 * sense, right: 0.35 * sense };
+            step.rate_rad_s = speed_m_s.map(|speed_m_s| speed_m_s / 0.08);
+            step.acceleration_rad_s2 = Wheels::both(5.0);
+            step.wheel_rad = step.rate_rad_s.map(|rate_rad_s| rate_rad_s * step.dt_s);
+            step.wheel_angle_rad = step.wheel_rad.map(|wheel_rad| f64::from(k) * wheel_rad);
+            step.travel_m = speed_m_s.map(|speed_m_s| speed_m_s * step.dt_s);
+            step.encoder_rad = step.wheel_rad;
+            let before = step.clone();
+            if hooks.wheel {
+                form.wheel(&mut step);
+            }
+            if hooks.floor {
+                form.floor(&mut step);
+            }
+            if hooks.encoder {
+                form.encoder(&mut step);
+            }
+            format!("{step:?}") != format!("{before:?}")
+        })
+    }
+
+    #[test]
+    fn another_form_acts_where_the_size_is_large_and_does_nothing_where_it_is_none() {
+        let mut forms = 0;
+        for id in CATALOGUE {
+            let Some(form) = description(id).expect("known").benchmark.other_form else { continue };
+            forms += 1;
+            let mut sizes = drawn(id, 0);
+            assert!(departs(&mut *(form.forward)(&sizes, &host())), "{id}");
+            let shapes = hypothesis(id).and_then(Hypothesis::into_shapes).expect("a mean");
+            for parameter in shapes[0].term.parameters() {
+                sizes.iter_mut().filter(|(name, _)| *name == parameter.name).for_each(|(_, size)| *size = 0.0);
+            }
+            assert!(!departs(&mut *(form.forward)(&sizes, &host())), "{id} of no size");
+        }
+        assert_eq!(forms, 9);
+    }
+
+    /// Records that have what an effect needs must not tell that it is hidden, so it can be there without any harm.
+    #[test]
+    fn what_needs_something_of_the_records_can_be_there_without_harm() {
+        for id in CATALOGUE {
+            let benchmark = description(id).expect("known").benchmark;
+            assert_eq!(benchmark.needs != Needs::NONE, benchmark.harmless.is_some(), "{id}");
+            let Some(harmless) = benchmark.harmless else { continue };
+            assert!(harmless(&host()).is_some_and(|effect| effect.id() == *id && effect.physical().check().is_ok()));
+            let bare = HostRobot { payload_kg: Vec::new(), jitter_s: 0.0, ..host() };
+            assert_eq!(harmless(&bare), None, "{id}");
+        }
+    }
+}

@@ -10,8 +10,8 @@ use crate::estimates::Estimates;
 /// Properties of an effect, whatever its sizes.
 #[derive(Clone)]
 pub struct Description {
-    /// What is wrong where the effect is, in one line for people: "the wheels lose way in proportion to their
-    /// speed".
+    /// What is wrong where the effect is, in one line for people: "the wheels lose distance in proportion to
+    /// their speed".
     pub meaning: &'static str,
     /// How people are told of it with the sizes that a fit found.
     pub told: Told,
@@ -114,4 +114,69 @@ impl RecordFault {
     /// A fault that the log can show and that a rewriting takes back exactly.
     pub(crate) const WITH_A_TRACE: Self =
         Self { leaves_a_trace: true, is_restored_roughly: false, counts_factor: None };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hypothesis::Hypothesis;
+    use crate::{CATALOGUE, Estimate, description, hypothesis};
+
+    /// What is wrong with a meaning.
+    fn complaint(meaning: &str) -> Option<&'static str> {
+        match meaning {
+            _ if meaning.trim().is_empty() => Some("it is empty"),
+            _ if meaning.contains('\n') => Some("it is more than one line"),
+            _ if meaning.ends_with('.') || meaning.starts_with(char::is_uppercase) => {
+                Some("it is a part of a sentence")
+            }
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn every_meaning_is_one_line_of_its_own() {
+        let mut meanings: Vec<&str> = CATALOGUE.iter().map(|id| description(id).expect("known").meaning).collect();
+        for meaning in &meanings {
+            assert_eq!(complaint(meaning), None, "{meaning}");
+        }
+        meanings.sort_unstable();
+        meanings.dedup();
+        assert_eq!(meanings.len(), CATALOGUE.len(), "two effects mean the same");
+        for wrong in ["", "two\nlines", "Slips", "slips."] {
+            assert!(complaint(wrong).is_some(), "{wrong}");
+        }
+    }
+
+    /// A sentence with sizes names no size that a fit does not have: it would show a question mark.
+    #[test]
+    fn sentences_show_the_sizes_that_a_fit_finds() {
+        let mut with_sizes = 0;
+        for id in CATALOGUE {
+            let description = description(id).expect("known");
+            let Told::WithSizes(told) = description.told else { continue };
+            let shapes =
+                hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_else(|| panic!("{id} has no sizes"));
+            let parameters = shapes.iter().flat_map(|shape| shape.term.parameters().iter().map(|of| of.name));
+            let names = parameters.chain(shapes.iter().flat_map(|shape| shape.held.iter().map(|(name, _)| *name)));
+            let sizes: Estimates<'_> =
+                names.map(|name| (name, Estimate { value: 0.0125, sigma: Some(1e-3) })).collect();
+            let sentence = told(&sizes);
+            assert!(!sentence.contains('?') && sentence.contains("± "), "{id}: {sentence}");
+            assert!(told(&Estimates::default()) != sentence, "{id}: it shows no size");
+            with_sizes += 1;
+        }
+        assert!(with_sizes >= 15, "{with_sizes}");
+    }
+
+    /// Properties of faults are of faults alone, single errors of what scatters alone.
+    #[test]
+    fn properties_are_of_the_effects_that_can_have_them() {
+        for id in CATALOGUE {
+            let (description, hypothesis) = (description(id).expect("known"), hypothesis(id).expect("known"));
+            let is_fault = matches!(hypothesis, Hypothesis::Records(_));
+            assert!(is_fault || description.record_fault == RecordFault::WITH_A_TRACE, "{id}");
+            assert!(!hypothesis.signs().is_empty() || description.isolated_error.is_none(), "{id}");
+        }
+    }
 }

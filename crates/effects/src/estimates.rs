@@ -104,12 +104,12 @@ mod tests {
 
     #[test]
     fn only_a_significant_amplitude_is_shown() {
-        let of = |value: f64| Estimate { value, sigma: Some(1e-3) };
+        let of = |value: f64| Estimate { value, sigma: Some(1.2e-3) };
         let sizes = [("left_sin", 3e-3), ("left_cos", 4e-3), ("right_sin", 1e-3), ("right_cos", 2e-3)];
         let estimates: Estimates<'_> = sizes.map(|(name, value)| (name, of(value))).into_iter().collect();
-        assert_eq!(estimates.amplitudes("", 1e3, "‰", "radius varies"), "the left radius varies by 5.0 ± 1.0 ‰");
+        assert_eq!(estimates.amplitudes("", 1e3, "‰", "radius varies"), "the left radius varies by 5.0 ± 1.2 ‰");
         assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one cannot be told");
-        assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.0 mm");
+        assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.2 mm");
         assert_eq!(estimates.shown("elsewhere", 1e3, "mm"), "?");
     }
 }

@@ -4,8 +4,11 @@
 //! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
 //! The *hypothesis* face ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
 //!
-//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow. What has no name there
-//! is simulated as a [`SparseTerm`].
+//! What everything else must know of an effect, from its meaning to how the blind benchmark draws it, stands in
+//! its [`Description`]: nothing outside of this crate writes an id.
+//!
+//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the
+//! catalogue and the laws follow. What has no name there is simulated as a [`SparseTerm`].
 
 mod beat;
 mod benchmark;

@@ -34,8 +34,8 @@ speed, yaw rate and acceleration of the drive's centre, v_w, a_w those of a whee
 paths: what tells two apart is the path.
 
 *Meaning* is how a report tells of the effect, here with its sizes large. *Large* is what a real robot may have: detection limits and plans are judged by it. What is driven excites
-an effect unless it says otherwise under *Excited by*. *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or of the
-sizes given, and where it has another functional form than the catalogue's, in that on one robot in two.
+an effect unless it says otherwise under *Excited by*. *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or at a
+scale of the sizes given, and where it has another functional form than the catalogue's, in that on one robot in two.
 
 This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test -p effects --test document`.
 ";
@@ -175,11 +175,12 @@ fn benchmark(id: &str, description: &Description) -> Option<String> {
     };
     let law = match (hypothesis(id)?, benchmark.sizes) {
         (Hypothesis::Geometry | Hypothesis::Silent, _) => return None,
+        (_, SizeLaw::Direction { .. }) if benchmark.max_scale == 1.0 => "up to a large size".to_owned(),
         (_, SizeLaw::Direction { .. }) => format!("up to {} times a large size", number(benchmark.max_scale)),
         (_, SizeLaw::Scatter(law)) => {
             let (scaled, _) = law(&host, &mut stream);
             let scaled = scaled.iter().map(|(name, size)| format!("`{name}` {}", number(*size))).collect::<Vec<_>>();
-            format!("{}, and up to {} times as much", scaled.join(", "), number(benchmark.max_scale))
+            format!("{} at scale 1; scales up to {}", scaled.join(", "), number(benchmark.max_scale))
         }
         (_, SizeLaw::Fault(law)) => {
             let drawn = law(kinematics::Wheels::both(true), &mut stream);

@@ -45,7 +45,7 @@ impl PhysicalEffect for CarpetNap {
     fn description() -> Description {
         Description {
             told: Told::ByMeaning,
-            ..Description::of("the floor's pile takes the wheels with it: a drift one way in the room in proportion to the way driven")
+            ..Description::of("the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven")
         }
     }
 

@@ -46,7 +46,7 @@ impl PhysicalEffect for FloorSlope {
     fn description() -> Description {
         Description {
             told: Told::ByMeaning,
-            ..Description::of("the floor slopes: the robot creeps one way in the room, whatever way it looks")
+            ..Description::of("the floor slopes: the robot creeps in one direction of the room, whatever its heading")
         }
     }
 

@@ -15,7 +15,7 @@ use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
 
 /// What it is, in one line.
-const MEANING: &str = "the wheels lose way in proportion to their speed";
+const MEANING: &str = "the wheels lose distance in proportion to their speed";
 
 /// Slip in proportion to speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -46,7 +46,7 @@ impl PhysicalEffect for TruthCorrelatedNoise {
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("sigma_xy_m", 1e-3), ("sigma_theta_rad", 1e-3)], vec![("tau_s", stream.log_uniform(0.3, 3.0))])
             }),
-            ..Description::of("the instrument's errors last for several looks: it is not as precise as its single looks seem")
+            ..Description::of("the instrument's errors are autocorrelated: it is less precise than its single measurements seem")
         }
     }
 

@@ -14,7 +14,7 @@ use crate::forward::{Forward, Hooks, Sighting};
 use crate::hypothesis::{Hypothesis, Shape, size};
 
 /// What it is, in one line.
-const MEANING: &str = "the instrument's looks are late";
+const MEANING: &str = "the instrument's measurements are late";
 
 /// Delay of the instrument's stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

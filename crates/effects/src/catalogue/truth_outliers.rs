@@ -55,7 +55,7 @@ impl PhysicalEffect for TruthOutliers {
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("jump_m", 0.02), ("jump_rad", 0.02)], vec![("probability", stream.log_uniform(0.003, 0.03))])
             }),
-            ..Description::of("single looks of the instrument lie far off")
+            ..Description::of("single measurements of the instrument are outliers")
         }
     }
 
