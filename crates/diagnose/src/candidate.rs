@@ -40,7 +40,7 @@ impl Choice {
     /// Whether it goes by the single rows of the log.
     pub(crate) fn goes_by_rows(&self) -> bool {
         match self {
-            Self::Effect { id, .. } => *id == "interval_error",
+            Self::Effect { id, .. } => effects::description(id).is_some_and(|description| description.goes_by_rows),
             Self::Sparse(sparse) => *sparse == Sparse::of_rows(),
         }
     }

@@ -314,8 +314,10 @@ fn continued(
     // Where the counts do not follow the robot at all, no small effect has a meaning.
     let lost = !follows(&base);
     let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
-    // Counts that were lost are restored roughly: what lies far off by them has its name already.
-    let restored = faults.iter().any(|fault| fault.id == "dropped_samples");
+    // What lies far off by counts that are restored roughly has its name already.
+    let is_rough =
+        |id| effects::description(id).is_some_and(|description| description.record_fault.is_restored_roughly);
+    let restored = faults.iter().any(|fault| is_rough(fault.id));
     let asked = ask(datasets, base, &catalogue, restored);
     let mut findings: Vec<Finding> = faults.iter().map(|fault| naming::of_fault(fault)).collect();
     findings.extend(naming::of_search(&asked.found));

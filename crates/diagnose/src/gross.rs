@@ -64,7 +64,8 @@ pub(crate) fn fault(
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
         let Some(Hypothesis::Records(rewritings)) = hypothesis(id) else { continue };
-        if sound && ALWAYS_POSSIBLE.contains(id) {
+        // What leaves no trace is possible in any records; it is tried where the base fit is hard to believe.
+        if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
         for Form { sizes, sentence, evident, records } in together(datasets, rewritings) {
@@ -102,9 +103,6 @@ pub(crate) fn fault(
     }
     best.map(|(_, fault)| fault)
 }
-
-/// Faults that any records may have; they are tried where the base fit is hard to believe. The others look for their own traces.
-const ALWAYS_POSSIBLE: [&str; 3] = ["swapped_wheels", "reversed_wheel", "wrong_counts_per_turn"];
 
 /// How implausible the lengths of a fit are, as a part of its cost.
 fn implausible(fit: &JointFit<'_>) -> f64 {

@@ -213,7 +213,7 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
         findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
     };
     let unlisted = strongest(findings, |finding| finding.id == "unlisted");
-    let scatter = strongest(findings, |finding| finding.id == "contact_patch_wheelbase");
+    let scatter = strongest(findings, |finding| has_sign(&finding.id, Sign::ScatterWithTurn));
     for finding in findings {
         if finding.id == "unlisted" {
             continue;
@@ -261,16 +261,18 @@ pub(crate) fn of_spans(spans: Option<&Check>) -> Option<Finding> {
     of_scatter(&[], check.p_value, BTreeMap::new(), &what)
 }
 
-/// Wheels that are another robot's by a factor: its counts of a turn, unless that is not to be named.
+/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to be
+/// named.
 pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
-    const ID: &str = "wrong_counts_per_turn";
+    let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
+    let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;
     let what = format!(
         "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
     );
-    let ids: &[&'static str] = if without.iter().any(|out| out == ID) { &[] } else { &[ID] };
+    let ids: &[&'static str] = if without.iter().any(|out| out == id) { &[] } else { &[id] };
     // Logged over true counts: wheels that count twice as often seem half as large.
     let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
-    of_scatter(ids, 0.0, BTreeMap::from([("factor".to_owned(), value)]), &what)
+    of_scatter(ids, 0.0, BTreeMap::from([(size.to_owned(), value)]), &what)
 }
 
 /// The finding of a gross fault.
@@ -298,8 +300,13 @@ pub(crate) fn with_sign(sign: Sign, without: &[String]) -> Vec<&'static str> {
         .iter()
         .copied()
         .filter(|id| !without.iter().any(|out| out == id))
-        .filter(|id| hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign)))
+        .filter(|id| has_sign(id, sign))
         .collect()
+}
+
+/// Whether an effect of the catalogue shows by a sign.
+fn has_sign(id: &str, sign: Sign) -> bool {
+    hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign))
 }
 
 /// A finding of what only scatters.
