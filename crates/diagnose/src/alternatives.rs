@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use crate::document::Finding;
-use crate::search::{Found, SCAN_LEVEL, tests_in};
+use crate::ranking::tests_in;
+use crate::selection::Found;
+use crate::settings::SCAN_LEVEL;
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.

@@ -5,26 +5,37 @@
 //! It never reads what a simulator hid: it depends on the measured records and the hypotheses of [`effects`] alone. docs/diagnose.md says what the numbers mean.
 
 mod alternatives;
-mod blind;
+mod augmented_model;
 mod candidate;
-mod checks;
+mod covariates;
+mod detectability;
 mod diagnosis;
 mod document;
+mod extended_scenario;
+mod finding;
+mod findings;
+mod fit_cache;
 mod gain;
-mod gross;
-mod jumps;
 mod log_rows;
-mod naming;
+mod mean_structure;
+mod model_comparison;
+mod noise_effects;
+mod outlier_attribution;
+mod physical;
 mod plan;
+mod profile;
+mod ranking;
+mod record_faults;
+mod residual_tests;
 mod residuals;
+mod rivals;
+mod run_to_run;
 mod scan;
-mod scatter;
-mod scenario_of;
-mod search;
-mod shape;
-mod sizes;
+mod selection;
+mod settings;
+mod sparse_terms;
 mod statistics;
-mod unlisted;
+mod wald;
 
 pub use alternatives::{Alternative, Fate};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_within};

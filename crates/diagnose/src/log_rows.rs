@@ -54,7 +54,7 @@ struct Rows {
 }
 
 /// Asks the counts of all runs; robots that report no counts are not asked.
-pub(crate) fn check(datasets: &[Dataset]) -> Option<Check> {
+pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<Check> {
     let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
         let of = of_run(&run.odometry, run.info.continuous);
         Rows { all: sum.all + of.all, astray: sum.astray + of.astray }

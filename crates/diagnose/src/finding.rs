@@ -3,17 +3,18 @@
 use std::collections::BTreeMap;
 
 use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
-use estimation::JointFit;
-use estimation::NoiseComponent;
+use estimation::{JointFit, NoiseComponent};
 
 use crate::candidate::Choice;
-use crate::checks::Checked;
-use crate::diagnosis::is_covariate;
 use crate::document::{Check, Finding, UnlistedTerm, Value};
-use crate::gross::Fault;
-use crate::search::{FORM_ERROR, Found, LEAST_REACH, Name, chance};
-use crate::sizes::Test;
+use crate::model_comparison::chance;
+use crate::record_faults::Fault;
+use crate::residual_tests::{Checked, is_covariate};
+use crate::rivals::Name;
+use crate::selection::Found;
+use crate::settings::{FAINT, FORM_ERROR, LEAST_REACH};
 use crate::statistics::{of_trials, z_of_p};
+use crate::wald::Test;
 
 /// The parameters of a choice as found.
 pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<String, Value> {
@@ -173,9 +174,6 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
         or_unlisted(finding, chance, "it does not explain all that is there");
     }
 }
-
-/// What stands out by less than so many standard deviations, after its own trials, may be an accident of the whole catalogue's, or the shadow of something else.
-pub(crate) const FAINT: f64 = 4.5;
 
 /// Chance that then none of the names is right over that one of them is: of such findings of the blind benchmark seven of ten have the right name among theirs, of others
 /// forty-nine of fifty.

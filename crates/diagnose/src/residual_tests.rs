@@ -5,20 +5,18 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::Projected;
-use estimation::{Chain, Innovation};
-use estimation::{JointFit, WHITE_BELOW};
+use estimation::{Chain, Innovation, JointFit, Projected, WHITE_BELOW};
 use kinematics::Side;
 
+use crate::augmented_model::Extended;
 use crate::candidate::Choice;
+use crate::covariates::{of_cycles, of_runs};
 use crate::document::Check;
+use crate::log_rows::{LOG_ROWS, LOG_SPANS};
 use crate::scan::{ask, freedom, principal};
-use crate::search::Extended;
+use crate::settings::CHECKS_LEVEL;
 use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
-use crate::unlisted::of_cycles;
 
-/// Family-wise rate of false alarms of all checks.
-pub(crate) const CHECKS_LEVEL: f64 = 0.01;
 /// Correlations with so many looks before are summed.
 const LAGS: usize = 5;
 /// A look off by this much is an outlier with a chance of 1e-5.
@@ -112,21 +110,6 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
     of_motion.chain([of_reversals, of_bends, of_rows]).chain(of_wheels).collect()
-}
-
-/// The covariates of runs that differ between runs.
-pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
-    let chains = &fit.records.chains;
-    let mut keys: Vec<&String> = chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    keys.into_iter().filter_map(|key| Covariate::of_run(key, &values_of_runs(fit, key))).collect()
-}
-
-/// What each run says of a covariate, 0 where it says nothing.
-pub(crate) fn values_of_runs(fit: &JointFit<'_>, key: &str) -> Vec<f64> {
-    let runs = fit.records.chains.chunk_by(|a, b| a.run == b.run);
-    runs.map(|chains| chains[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
 }
 
 /// Asks the residuals of a model.
@@ -363,6 +346,12 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
             add(name, *statistic, of_trials(*p_value, own.len()));
         }
     }
+}
+
+/// Whether a check asks what residuals go with, not how they scatter.
+pub(crate) fn is_covariate(name: &str) -> bool {
+    !["nis_", "white_", "kurtosis_"].iter().any(|start| name.starts_with(start))
+        && !["outliers", "run_to_run", LOG_ROWS, LOG_SPANS].contains(&name)
 }
 
 #[cfg(test)]

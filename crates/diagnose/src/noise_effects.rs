@@ -6,30 +6,28 @@
 use std::collections::BTreeMap;
 
 use effects::Sign;
-use estimation::total;
-use estimation::{Column, NoiseComponent};
+use estimation::NoiseComponent;
 
+use crate::augmented_model::{cost, count};
 use crate::candidate::terms;
-use crate::checks::{Follows, what_follows};
-use crate::diagnosis::{Asked, Options, is_covariate};
 use crate::document::{Finding, Value};
-use crate::jumps::{Whose, log_likelihoods};
-use crate::naming;
-use crate::search::{Extended, cost, count};
+use crate::finding;
+use crate::mean_structure::MeanStructure;
+use crate::outlier_attribution::{Whose, log_likelihoods};
+use crate::residual_tests::{Follows, is_covariate, what_follows};
+use crate::run_to_run::differs_from_run_to_run;
+use crate::settings::TURNS_LEVEL;
 use crate::statistics::{p_of_chi_square, p_of_z};
 
 /// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
 const SCATTER_LEVEL: f64 = 1e-3;
-/// That of turns that scatter: whatever the model lacks makes turns differ from run to run, so that they must do so beyond any doubt.
-pub(crate) const TURNS_LEVEL: f64 = 1e-7;
-
 /// Where tails are heavy, what residuals seem to go with must do so beyond doubt: few large errors make such a test fail.
 const CERTAINLY: f64 = 1e-6;
 /// With more, it is the model that is off, and not the looks.
 const MOST_OUTLIERS: f64 = 0.2;
 
 /// Scatter that failed checks show.
-pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
+pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let outliers = asked.checked.outliers;
     let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
@@ -39,7 +37,7 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
-    let turns = of_turns(asked, options);
+    let turns = of_turns(asked, without_ids);
     let with_something = asked.checked.checks.iter().filter(|check| !check.passes && is_covariate(&check.name));
     let with_something = with_something.map(|check| check.p_value).fold(1.0, f64::min);
     let tails =
@@ -54,9 +52,9 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.looks + far;
         let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
-        let ids = naming::with_sign(Sign::IsolatedLooks, &options.without);
+        let ids = finding::with_sign(Sign::IsolatedLooks, without_ids);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
-        findings.extend(naming::of_scatter(&ids, outliers.p_value, parameters, &what));
+        findings.extend(finding::of_scatter(&ids, outliers.p_value, parameters, &what));
     }
     if goes_with_something {
         // Other large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
@@ -78,7 +76,7 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         if let Some((p_value, follows, sign)) = jump {
             let named = |signs: &[Sign]| {
                 let mut ids: Vec<&'static str> = Vec::new();
-                for id in signs.iter().flat_map(|sign| naming::with_sign(*sign, &options.without)) {
+                for id in signs.iter().flat_map(|sign| finding::with_sign(*sign, without_ids)) {
                     if !ids.contains(&id) {
                         ids.push(id);
                     }
@@ -105,7 +103,7 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
             let likelihoods = log_likelihoods(asked.model(), &ids, any);
             let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
             let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
-            findings.extend(naming::of_likely_scatter(likely, any, or_unlisted, p_value, what));
+            findings.extend(finding::of_likely_scatter(likely, any, or_unlisted, p_value, what));
         }
     }
     if let Some((coefficient, sigmas)) = asked.correlated
@@ -114,42 +112,19 @@ pub(crate) fn scatter(asked: &Asked<'_>, options: &Options) -> Vec<Finding> {
         let what = format!(
             "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
         );
-        let mut ids = naming::with_sign(Sign::CorrelatedLooks, &options.without);
+        let mut ids = finding::with_sign(Sign::CorrelatedLooks, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
         if !ids.is_empty() && (asked.in_disguise || !asked.found.model.choices.is_empty()) {
             ids.push("unlisted");
         }
-        findings.extend(naming::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
+        findings.extend(finding::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
     }
     findings.extend(turns);
     findings
 }
 
-/// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.
-///
-/// Noise of the turns grows with their root, and is soon lost in that of the wheels; a wheelbase that is drawn for each motion errs in proportion to the turn. u_r being
-/// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
-/// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
-pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
-    let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    let Some(evidence) = total(&model.fit.fit.pass.runs) else { return 1.0 };
-    let own = [Column::Separation.index()];
-    let Some(projection) = model.fit.eliminated(&evidence, &own) else { return 1.0 };
-    let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);
-    for run in &runs {
-        let variance = projection.variance_of(run, &evidence, &own)[(0, 0)];
-        squares += projection.score_of(run, &evidence, &own)[0].powi(2);
-        mean += variance;
-        spread += variance * variance;
-    }
-    if runs.len() < 3 || mean <= 0.0 {
-        return 1.0;
-    }
-    p_of_chi_square(squares * mean / spread, mean * mean / spread)
-}
-
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
-fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
+fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = asked.model();
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
     let most = count(&without).max(count(&model.fit));
@@ -162,5 +137,5 @@ fn of_turns(asked: &Asked<'_>, options: &Options) -> Option<Finding> {
     let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
     let parameters = BTreeMap::from([("turn_sigma_rad_per_sqrt_rad".to_owned(), value)]);
     let what = format!("headings scatter with the turn, by {:.1} mrad for each root of a radian", 1e3 * sigma);
-    naming::of_scatter(&naming::with_sign(Sign::ScatterWithTurn, &options.without), p_value, parameters, &what)
+    finding::of_scatter(&finding::with_sign(Sign::ScatterWithTurn, without_ids), p_value, parameters, &what)
 }
