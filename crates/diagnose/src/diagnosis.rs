@@ -11,8 +11,9 @@ use scenario::Scenario;
 use crate::alternatives::{Alternative, alternatives};
 use crate::augmented_model::Extended;
 use crate::candidate::{Choice, mean_terms};
+use crate::check::TestResult;
 use crate::detectability::blind;
-use crate::document::{Document, Finding, Gain, Verdict};
+use crate::document::{Document, Gain};
 use crate::findings::findings;
 use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
@@ -20,6 +21,7 @@ use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, fault, follows, left_out, sessions};
 use crate::residuals::{Residuals, residuals};
+use crate::text;
 
 /// What to leave out.
 #[derive(Debug, Clone, Default)]
@@ -160,7 +162,6 @@ fn continued(
     let (gain, gain_why_null) = gain_of(&asked.base, model);
     let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.known.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
-    let verdict = verdict(&findings);
     let extended = crate::extended_scenario::scenario_of(datasets, model);
     let residuals = residuals(&asked.base, model);
     let alternatives = alternatives(&asked.found, &findings);
@@ -170,10 +171,10 @@ fn continued(
         .collect();
     let document = Document {
         dataset: Names::of(names.clone()),
-        verdict,
-        sentence: sentence(verdict, &findings, gain.as_ref()),
-        checks: asked.checked.checks.iter().cloned().chain(log).chain(spans).collect(),
-        findings,
+        verdict: text::verdict(&findings),
+        sentence: text::summary(&findings, gain.as_ref()),
+        checks: asked.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
+        findings: findings.iter().map(text::finding).collect(),
         blind_to,
         sensitivity,
         calibration: CalibrationReport {
@@ -199,43 +200,6 @@ fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<S
     match gain(&alone, model) {
         Ok(gain) => (Some(gain), None),
         Err(why) => (None, Some(why)),
-    }
-}
-
-fn verdict(findings: &[Finding]) -> Verdict {
-    if findings.is_empty() {
-        Verdict::Consistent
-    } else if findings.iter().any(|finding| finding.id == "unlisted") {
-        Verdict::Unlisted
-    } else if findings.iter().any(|finding| finding.names.len() > 1) {
-        Verdict::Ambiguous
-    } else {
-        Verdict::Named
-    }
-}
-
-fn sentence(verdict: Verdict, findings: &[Finding], gain: Option<&Gain>) -> String {
-    let names = |finding: &Finding| {
-        let names = finding.names.join(" or ");
-        // What has no name is told by what it goes with.
-        finding.unlisted_term.as_ref().map_or_else(
-            || names.clone(),
-            |term| format!("{names} ({} with {})", term.channel, term.covariates.join(" · ")),
-        )
-    };
-    let names: Vec<String> = findings.iter().map(names).collect();
-    let gains = match gain {
-        Some(gain) if gain.log_score_per_observation.low > 0.0 => "; the extended model predicts unseen runs better",
-        Some(_) => "; on unseen runs the extended model gains nothing that is certain",
-        None => "",
-    };
-    match verdict {
-        Verdict::Consistent => "the calibrated model explains what was measured".to_owned(),
-        Verdict::Named => format!("found: {}{gains}", names.join(", ")),
-        Verdict::Ambiguous => {
-            format!("found, with names that this data cannot tell apart: {}{gains}", names.join("; "))
-        }
-        Verdict::Unlisted => format!("found, and not all of it has a name: {}{gains}", names.join(", ")),
     }
 }
 

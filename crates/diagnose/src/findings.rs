@@ -2,13 +2,14 @@
 
 use dataset::Dataset;
 
-use crate::document::{Check, Finding};
+use crate::cause::Doubt;
+use crate::check::TestResult;
 use crate::finding;
+use crate::finding::Finding;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
-use crate::residual_tests::is_covariate;
 use crate::settings::MOST_EFFECTS;
 use crate::sparse_terms::{Unlisted, lack_of_fit};
 use crate::wald::examine;
@@ -17,7 +18,7 @@ use crate::wald::examine;
 const BEYOND_SCATTER: f64 = 1e-8;
 
 fn is_scatter(finding: &Finding) -> bool {
-    match effects::hypothesis(&finding.id) {
+    match effects::hypothesis(finding.first().id()) {
         Some(effects::Hypothesis::Scatter(_)) => true,
         // Found by its sign it has no sizes.
         Some(effects::Hypothesis::TermsAndScatter(..)) => finding.parameters.is_empty(),
@@ -46,10 +47,10 @@ pub(crate) fn findings(
         findings.extend(test.and_then(|test| finding::of_sparse(&model.choices[place], &test, p_value, trials)));
     }
     if lost {
-        findings.extend(finding::of_lost(&asked.base));
+        findings.push(finding::of_lost(&asked.base));
     } else if !restored {
         // What has a size is not told again by its sign.
-        let told = |sign: &Finding| findings.iter().any(|finding| sign.names.contains(&finding.id));
+        let told = |sign: &Finding| findings.iter().any(|finding| sign.names(finding.first()));
         let signs: Vec<Finding> = scatter(asked, without).into_iter().filter(|sign| !told(sign)).collect();
         findings.extend(signs);
     }
@@ -57,26 +58,26 @@ pub(crate) fn findings(
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let of_log = finding::of_rows_astray(log.as_ref()).into_iter().chain(finding::of_spans(spans.as_ref()));
-    let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(|finding| finding.id == "unlisted");
+    let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(|finding| finding.is_unlisted());
     findings.extend(named);
     if !nameless.is_empty() {
         // With times in other units even a gross fault may be an accident.
         let sound = spans.as_ref().is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
-            finding::or_unlisted(finding, 1.0, "what is wrong with the records may do the same");
+            finding.or_unlisted(1.0, Doubt::FaultyRecords);
         }
     }
     findings.extend(nameless);
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let plainly = |check: &Check| !check.passes && is_covariate(&check.name) && check.p_value < BEYOND_SCATTER;
+    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
-    let told = asked.unlisted.is_some() || findings.iter().any(|finding| finding.id == "unlisted");
+    let told = asked.unlisted.is_some() || findings.iter().any(|finding| finding.is_unlisted());
     if !(restored || scatters || told) {
         findings.extend(finding::of_failed_checks(&asked.checked));
     }
     finding::doubt(&mut findings[faults.len()..], asked.found.model.choices.len() >= MOST_EFFECTS);
     // A term without a name that stands out beside all that was found, though not by enough to be a finding.
-    if findings.iter().any(finding::is_sure)
+    if findings.iter().any(Finding::is_sure)
         && let Some(left) = lack_of_fit(&asked.base, model)
     {
         finding::or_incomplete(&mut findings, left);

@@ -7,6 +7,8 @@
 mod alternatives;
 mod augmented_model;
 mod candidate;
+mod cause;
+mod check;
 mod covariates;
 mod detectability;
 mod diagnosis;
@@ -35,6 +37,7 @@ mod selection;
 mod settings;
 mod sparse_terms;
 mod statistics;
+mod text;
 mod wald;
 
 pub use alternatives::{Alternative, Fate};

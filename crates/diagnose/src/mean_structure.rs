@@ -5,11 +5,12 @@ use estimation::{FitSettings, JointFit};
 
 use crate::augmented_model::Extended;
 use crate::candidate::Choice;
+use crate::check::{Check, TestResult};
 use crate::finding;
 use crate::fit_cache::Known;
 use crate::model_comparison::{chance, evidence, reach};
 use crate::record_faults::sessions;
-use crate::residual_tests::{Checked, check, is_covariate};
+use crate::residual_tests::{Checked, check};
 use crate::selection::{Found, search, search_every_look};
 use crate::settings::{LEAST_REACH, SCAN_LEVEL, UNLISTED_LEVEL};
 use crate::sparse_terms::{Sought, Unlisted, sparse};
@@ -89,12 +90,12 @@ impl<'a> MeanStructure<'a> {
 
     /// Whether more looks lie far off than chance makes.
     fn lie_far_off(&self) -> bool {
-        self.checked.checks.iter().any(|check| check.name == "outliers" && !check.passes)
+        self.checked.checks.iter().any(|test| test.check == Check::Outliers && !test.passes)
     }
 
     /// Whether residuals go with something that was recorded.
     fn goes_with_something(&self) -> bool {
-        self.checked.checks.iter().any(|check| !check.passes && is_covariate(&check.name))
+        self.checked.checks.iter().any(TestResult::shows_dependence)
     }
 }
 

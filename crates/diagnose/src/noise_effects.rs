@@ -10,11 +10,14 @@ use estimation::NoiseComponent;
 
 use crate::augmented_model::{cost, count};
 use crate::candidate::terms;
-use crate::document::{Finding, Value};
+use crate::cause::{Basis, Cause};
+use crate::check::{Check, Component, ResidualPersistence};
+use crate::document::Value;
 use crate::finding;
+use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
 use crate::outlier_attribution::{Whose, log_likelihoods};
-use crate::residual_tests::{Follows, is_covariate, what_follows};
+use crate::residual_tests::what_follows;
 use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::TURNS_LEVEL;
 use crate::statistics::{p_of_chi_square, p_of_z};
@@ -30,7 +33,7 @@ const MOST_OUTLIERS: f64 = 0.2;
 pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let outliers = asked.checked.outliers;
-    let fails = |name: &str| asked.checked.checks.iter().find(|check| check.name == name && !check.passes);
+    let tests = &asked.checked.checks;
     let far = outliers.isolated + outliers.staying;
     #[allow(clippy::cast_precision_loss)]
     if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
@@ -38,11 +41,10 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
         return findings;
     }
     let turns = of_turns(asked, without_ids);
-    let with_something = asked.checked.checks.iter().filter(|check| !check.passes && is_covariate(&check.name));
-    let with_something = with_something.map(|check| check.p_value).fold(1.0, f64::min);
-    let tails =
-        asked.checked.checks.iter().filter(|check| check.name.starts_with("kurtosis_") || check.name == "outliers");
-    let tails = tails.map(|check| check.p_value).fold(1.0, f64::min);
+    let with_something = tests.iter().filter(|test| test.shows_dependence());
+    let with_something = with_something.map(|test| test.p_value).fold(1.0, f64::min);
+    let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
+    let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
     let goes_with_something = with_something < tails.max(CERTAINLY);
     // After the end of a run nothing follows that could be back.
     let followed = asked.base.selections.first().is_some_and(|taken| taken.mean_looks(&asked.base.records) >= 2.0);
@@ -51,10 +53,10 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
         let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.looks + far;
-        let what = format!("{} of {of} looks of the instrument lie far off, and the next are back", outliers.isolated);
-        let ids = finding::with_sign(Sign::IsolatedLooks, without_ids);
+        let causes = with_sign(Sign::IsolatedLooks, without_ids);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
-        findings.extend(finding::of_scatter(&ids, outliers.p_value, parameters, &what));
+        let basis = Basis::IsolatedErrors(outliers.isolated, of);
+        findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
     }
     if goes_with_something {
         // Other large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
@@ -63,15 +65,15 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     }
     if findings.is_empty() {
         // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
-        let tails = [("kurtosis_heading", 2, Sign::HeadingJumps), ("kurtosis_along", 0, Sign::WayJumps)];
-        let kurtosis = |name: &str| {
-            asked.checked.checks.iter().find(|check| check.name == name).map_or(0.0, |check| check.statistic)
-        };
+        let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::WayJumps)];
+        let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
+        let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
         let far_off = outliers.p_value < SCATTER_LEVEL && (outliers.staying > 0 || !followed);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
-        let jump = heaviest.and_then(|(name, component, sign)| {
-            let p_value = fails(name).map(|check| check.p_value).or(far_off.then_some(outliers.p_value))?;
-            Some((p_value, what_follows(&asked.found.model.fit, component), sign))
+        let jump = heaviest.and_then(|(component, number, sign)| {
+            let fails = test(component).filter(|test| !test.passes);
+            let p_value = fails.map(|test| test.p_value).or(far_off.then_some(outliers.p_value))?;
+            Some((p_value, what_follows(&asked.found.model.fit, number), sign))
         });
         if let Some((p_value, follows, sign)) = jump {
             let named = |signs: &[Sign]| {
@@ -87,40 +89,38 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
             let jumps: &[Sign] =
                 if sign == Sign::WayJumps { &[Sign::HeadingJumps, Sign::WayJumps] } else { &[Sign::HeadingJumps] };
             let (stays, errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
-            let (ids, any, what): (_, &[Whose], _) = match follows {
-                Follows::TheSame => (stays, &[Whose::Robot], "single large errors that stay: the robot jumped"),
-                Follows::TheOpposite => {
-                    (errs, &[Whose::Instrument], "single large errors of the instrument, undone in the next look")
-                }
-                Follows::Nothing => (
-                    [&stays[..], &errs].concat(),
-                    &[Whose::Robot, Whose::Instrument],
-                    "errors have a heavier tail than normal ones, and what follows them does not say whose they are",
-                ),
+            let (ids, any): (_, &[Whose]) = match follows {
+                ResidualPersistence::Persistent => (stays, &[Whose::Robot]),
+                ResidualPersistence::Reverting => (errs, &[Whose::Instrument]),
+                ResidualPersistence::Undecided => ([&stays[..], &errs].concat(), &[Whose::Robot, Whose::Instrument]),
             };
             // Tails have many causes.
-            let or_unlisted = follows == Follows::Nothing;
+            let or_unlisted = follows == ResidualPersistence::Undecided;
             let likelihoods = log_likelihoods(asked.model(), &ids, any);
             let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
             let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
-            findings.extend(finding::of_likely_scatter(likely, any, or_unlisted, p_value, what));
+            let basis = Basis::LargeErrors(follows);
+            findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
         }
     }
     if let Some((coefficient, sigmas)) = asked.correlated
         && coefficient > 0.0
     {
-        let what = format!(
-            "looks that follow each other err alike (correlation {coefficient:.2}), and no term that was tried explains it"
-        );
-        let mut ids = finding::with_sign(Sign::CorrelatedLooks, without_ids);
+        let mut causes = with_sign(Sign::CorrelatedLooks, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        if !ids.is_empty() && (asked.in_disguise || !asked.found.model.choices.is_empty()) {
-            ids.push("unlisted");
+        if !causes.is_empty() && (asked.in_disguise || !asked.found.model.choices.is_empty()) {
+            causes.push(Cause::Unknown);
         }
-        findings.extend(finding::of_scatter(&ids, p_of_z(sigmas), BTreeMap::new(), &what));
+        let basis = Basis::Autocorrelated(coefficient);
+        findings.push(finding::of_causes(causes, p_of_z(sigmas), BTreeMap::new(), basis));
     }
     findings.extend(turns);
     findings
+}
+
+/// Effects of the catalogue that show by a sign, without those taken out, as causes.
+fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
+    finding::with_sign(sign, without_ids).into_iter().map(Cause::Effect).collect()
 }
 
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
@@ -136,6 +136,6 @@ fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding
     let sigma = model.fit.fit.noise.sigma(NoiseComponent::Turn);
     let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
     let parameters = BTreeMap::from([("turn_sigma_rad_per_sqrt_rad".to_owned(), value)]);
-    let what = format!("headings scatter with the turn, by {:.1} mrad for each root of a radian", 1e3 * sigma);
-    finding::of_scatter(&finding::with_sign(Sign::ScatterWithTurn, without_ids), p_value, parameters, &what)
+    let causes = with_sign(Sign::ScatterWithTurn, without_ids);
+    Some(finding::of_causes(causes, p_value, parameters, Basis::TurnScatter(sigma)))
 }
