@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use dataset::TermParameter;
 use effects::{
     Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError, SizeLaw,
     Sizes, StreamName, description, hypothesis,
 };
+use model_term::TermParameter;
 
 /// What every header says, in this order.
 const LABELS: [&str; 5] = ["Model", "Signature", "Observability", "Alias", "Reference"];
