@@ -10,7 +10,7 @@ mod case;
 mod draw;
 mod error;
 mod hidden;
-mod looks;
+mod instrument;
 mod measure;
 mod oracle;
 mod planned;
@@ -26,14 +26,14 @@ use rayon::prelude::*;
 
 use case::Case;
 
-pub use case::{OracleView, Round};
+pub use case::{CaseKind, OracleView};
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
-pub use looks::{NoiseClass, TruthKind};
+pub use instrument::{NoiseClass, TruthKind};
 pub use measure::Measure;
 pub use planned::Planned;
 pub use robot::PathFamily;
-pub use score::{CaseResult, Said};
+pub use score::{CaseResult, Reported};
 
 /// What comes of a campaign.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -85,17 +85,17 @@ pub trait PhysicalEffect {
         Ok(0.0)
     }
 
-    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where looks scatter far less, it is another effect.
+    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where measurements scatter far less, it is another effect.
     fn scatter_of_contact_m(&self) -> f64 {
         0.0
     }
 
-    /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
+    /// The simulation model: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
     fn forward(&self) -> Option<Box<dyn Forward>> {
         None
     }
 
-    /// The hypothesis face: how recorded data would show the effect, of whatever size.
+    /// The estimation model: how recorded data would show the effect, of whatever size.
     fn hypothesis() -> Hypothesis
     where
         Self: Sized;
@@ -106,7 +106,7 @@ pub trait PhysicalEffect {
         Self: Sized;
 
     /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make one.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self>
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self>
     where
         Self: Sized,
     {

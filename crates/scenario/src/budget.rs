@@ -4,7 +4,7 @@
 //! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
 //! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
 
-use motion_programs::{Cost, MotionProgram, Pace, Schedule};
+use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
 
 use crate::experiment::{LENGTHS_M, MOST_RUNS, Scenario, ScenarioError};
@@ -113,12 +113,12 @@ impl Budget {
     }
 
     /// Protocols that stay in the room and within the budget.
-    fn fit(&self, protocols: &[Schedule], pace: &Pace) -> Result<Vec<Schedule>, NoFit> {
+    fn fit(&self, protocols: &[Schedule], drive_limits: &DriveLimits) -> Result<Vec<Schedule>, NoFit> {
         let mut parts = Vec::with_capacity(protocols.len());
         for stated in protocols.iter().filter(|stated| stated.runs() > 0) {
             let schedule = self.bounded(*stated)?;
             let pairs = 0.5 * number(schedule.runs());
-            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), pace) });
+            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), drive_limits) });
         }
         let affords = |factor: f64| {
             self.affords(parts.iter().fold(Cost::default(), |sum, part| Cost {
@@ -178,8 +178,8 @@ fn number(runs: u64) -> f64 {
     runs as f64
 }
 
-fn cost(programs: &[MotionProgram], pace: &Pace) -> Cost {
-    programs.iter().map(|program| pace.cost(program)).sum()
+fn cost(programs: &[MotionProgram], drive_limits: &DriveLimits) -> Cost {
+    programs.iter().map(|program| drive_limits.cost(program)).sum()
 }
 
 impl Scenario {
@@ -204,19 +204,19 @@ impl Scenario {
     /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the driving alone.
     #[must_use]
     pub fn cost_of(&self, programs: &[MotionProgram]) -> Cost {
-        cost(programs, &self.pace())
+        cost(programs, &self.drive_limits())
     }
 
     pub(crate) fn fitted(&self, protocols: &[Schedule]) -> Result<Vec<MotionProgram>, NoFit> {
         let fitted = match &self.budget {
-            Some(budget) => budget.fit(protocols, &self.pace())?,
+            Some(budget) => budget.fit(protocols, &self.drive_limits())?,
             None => protocols.to_vec(),
         };
         Ok(fitted.iter().flat_map(Schedule::programs).collect())
     }
 
-    fn pace(&self) -> Pace {
-        Pace {
+    fn drive_limits(&self) -> DriveLimits {
+        DriveLimits {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: self.robot.cruise_speed_m_s,
             acceleration_m_s2: self.robot.acceleration_m_s2,
@@ -252,7 +252,7 @@ mod tests {
     }
 
     fn fit(budget: Budget, protocols: &[Schedule]) -> Result<Vec<Schedule>, NoFit> {
-        budget.fit(protocols, &paper(budget).pace())
+        budget.fit(protocols, &paper(budget).drive_limits())
     }
 
     fn cost_of(budget: Budget, protocols: &[Schedule]) -> Cost {

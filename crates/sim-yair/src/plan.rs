@@ -6,7 +6,7 @@ use motion_programs::{Motion, MotionProgram};
 use scenario::Robot;
 
 use crate::actuator::{Piece, Pieces};
-use crate::foreseen::Course;
+use crate::foreseen::PrecomputedRun;
 
 /// A program made ready for the robot that [`crate::SimulatedRobot::plan`] was asked of.
 #[derive(Debug, Clone)]
@@ -14,7 +14,7 @@ pub struct Plan {
     pub(crate) program: MotionProgram,
     pub(crate) motions: Vec<PlannedMotion>,
     /// The motions once more, where the closed form foresees all of the run.
-    pub(crate) course: Option<Course>,
+    pub(crate) precomputed_run: Option<PrecomputedRun>,
 }
 
 impl Plan {
