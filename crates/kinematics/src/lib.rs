@@ -22,6 +22,7 @@ mod drive;
 mod fleet;
 mod instruction_set;
 mod pose;
+mod trajectory;
 mod trig;
 mod wheels;
 mod whole_log;
