@@ -55,7 +55,7 @@ impl Count for i32 {
 impl Count for i64 {
     const CONVERTS_BY_BITS: bool = true;
 
-    #[allow(clippy::cast_precision_loss)] // 2^53 counts are 10^10 km of wheel travel
+    // 2^53 counts are 10^10 km of wheel travel.
     #[inline(always)]
     fn since(self, earlier: Self) -> f64 {
         self.wrapping_sub(earlier) as f64
@@ -232,7 +232,6 @@ mod tests {
             let (mut counts, mut product) = (Wheels::both(0_i64), Pose::IDENTITY);
             for (l, r) in steps {
                 counts = Wheels { left: counts.left + l, right: counts.right + r };
-                #[allow(clippy::cast_precision_loss)]
                 let travel_m = Wheels { left: 1.0334e-3 * l as f64, right: 1.0322e-3 * r as f64 };
                 product = product * geometry.increment(travel_m).arc();
                 let pose = state.update(counts);
@@ -266,7 +265,6 @@ mod tests {
             state.update(Wheels { left: 3 * k, right: 4 * k });
             summed_rad += (4.0 * 1.0322e-3 - 3.0 * 1.0334e-3) / 0.363;
         }
-        #[allow(clippy::cast_precision_loss)]
         let exact_rad = n as f64 * (4.0 * 1.0322e-3 - 3.0 * 1.0334e-3) / 0.363;
         let error = (state.world_from_body().theta_rad - exact_rad).abs();
         assert!(error <= 8.0 * f64::EPSILON * exact_rad, "{error}");
