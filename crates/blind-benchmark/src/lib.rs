@@ -15,6 +15,7 @@ mod measure;
 mod oracle;
 mod planned;
 mod power;
+mod result;
 mod robot;
 mod score;
 #[cfg(test)]
@@ -31,9 +32,8 @@ pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use looks::{NoiseClass, TruthKind};
 pub use measure::Measure;
-pub use planned::Planned;
+pub use result::{CaseResult, Planned, Said};
 pub use robot::PathFamily;
-pub use score::{CaseResult, Said};
 
 /// What comes of a campaign.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

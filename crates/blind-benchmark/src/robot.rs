@@ -136,7 +136,6 @@ fn session(base: &Scenario, family: PathFamily, share: f64, draw: &mut Draw) -> 
 }
 
 /// `pairs` times a share, at least one.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful
 fn pairs(pairs: f64, share: f64) -> u32 {
     ((pairs * share).round() as u32).max(1)
 }
