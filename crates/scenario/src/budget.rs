@@ -236,9 +236,7 @@ mod tests {
             .iter()
             .zip(&fitted_pairs)
             .zip(steps(1.0))
-            .map(|((part, pairs), step)| {
-                part.with_pairs(*pairs as u32 + u32::from(step <= next * (1.0 + 1e-12)))
-            })
+            .map(|((part, pairs), step)| part.with_pairs(*pairs as u32 + u32::from(step <= next * (1.0 + 1e-12))))
             .collect();
         assert!(!affordable(cost_of(budget, &more)), "{budget:?}: {more:?} would fit too");
     }
