@@ -9,6 +9,7 @@ mod ahead;
 mod counter;
 mod error;
 pub mod import;
+mod imported;
 mod read;
 mod record;
 mod session;
