@@ -98,7 +98,7 @@ pub fn compare(result: &SweepResult, baseline: &SweepResult, place: &str) -> Res
         compared: all.len(),
         largest_z: all.first().map_or(0.0, |largest| largest.z.abs()),
         moved: all.iter().filter(|number| number.z.abs() > z_limit).cloned().collect(),
-        // The same bits, or changed.
+        // Changed where a bit is.
         changed: all.into_iter().filter(|number| number.is != number.was).collect(),
     })
 }
