@@ -131,7 +131,7 @@ fn complaints(source: &str, allowed: &[&str]) -> Vec<Complaint> {
                     complaints.push((line, format!("\"{id}\"")));
                 }
                 Token::Code(code) if matches_on(code, &type_of(id)) => {
-                    complaints.push((line, format!("Effect::{}", type_of(id))))
+                    complaints.push((line, format!("Effect::{}", type_of(id))));
                 }
                 _ => {}
             }

@@ -3,6 +3,8 @@
 use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
 use model_term::{ModelTerm, TermParameter};
 
+use crate::cause::Cause;
+
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
@@ -29,6 +31,14 @@ impl Choice {
         match self {
             Self::Effect { id, .. } => id,
             Self::Sparse(_) => "unlisted",
+        }
+    }
+
+    /// It as a cause; of a product its term is not known before it is estimated.
+    pub(crate) const fn cause(&self) -> Cause {
+        match self {
+            Self::Effect { id, .. } => Cause::Effect(id),
+            Self::Sparse(_) => Cause::Unknown,
         }
     }
 

@@ -13,8 +13,17 @@ use crate::Effect;
 use crate::forward::{Forward, Hooks, Step};
 use crate::stream::Stream;
 
+/// A size by its name.
+pub type NamedSize = (&'static str, f64);
+
 /// Sizes by their names.
-pub type Sizes = Vec<(&'static str, f64)>;
+pub type Sizes = Vec<NamedSize>;
+
+/// The forward face of another form, from sizes of the hypothesis, at which it does about as much.
+pub type FormOf = fn(&[NamedSize], &HostRobot) -> Box<dyn Forward>;
+
+/// The effect of sizes in force at a scale.
+pub type AtScale = fn(&[NamedSize], f64, &HostRobot) -> Option<Effect>;
 
 /// The robot that an effect is hidden in.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,8 +81,8 @@ pub enum SizeLaw {
 pub struct OtherForm {
     /// Which one, for people: "the share lost saturates as tanh of the speed".
     pub what: &'static str,
-    /// The form; sizes are those of the hypothesis, at which it does about as much.
-    pub forward: fn(&[(&'static str, f64)], &HostRobot) -> Box<dyn Forward>,
+    /// The form.
+    pub forward: FormOf,
 }
 
 /// How the blind benchmark draws an effect.
@@ -86,7 +95,7 @@ pub struct Benchmark {
     /// Largest scale of a real robot.
     pub max_scale: f64,
     /// The effect of drawn sizes at a scale, where that is another than `of_sizes` makes of them.
-    pub at_scale: Option<fn(&[(&'static str, f64)], f64, &HostRobot) -> Option<Effect>>,
+    pub at_scale: Option<AtScale>,
     /// Another functional form, of which one robot in two is.
     pub other_form: Option<OtherForm>,
     /// Its signature is random in part: one drive with it is not like the next.
@@ -123,11 +132,7 @@ impl Benchmark {
     }
 
     /// A mean in another form on one robot in two.
-    pub(crate) const fn with_form(
-        self,
-        what: &'static str,
-        forward: fn(&[(&'static str, f64)], &HostRobot) -> Box<dyn Forward>,
-    ) -> Self {
+    pub(crate) const fn with_form(self, what: &'static str, forward: FormOf) -> Self {
         Self { other_form: Some(OtherForm { what, forward }), ..self }
     }
 
@@ -203,11 +208,11 @@ mod tests {
                 let (scaled, held) = law(&host(), &mut stream);
                 scaled.into_iter().chain(held).collect()
             }
-            SizeLaw::Fault(law) => law(Wheels { left: run % 2 == 0, right: true }, &mut stream),
+            SizeLaw::Fault(law) => law(Wheels { left: run.is_multiple_of(2), right: true }, &mut stream),
         }
     }
 
-    fn acts(benchmark: &Benchmark, id: &str, sizes: &[(&'static str, f64)], scale: f64) -> Option<Effect> {
+    fn acts(benchmark: &Benchmark, id: &str, sizes: &[NamedSize], scale: f64) -> Option<Effect> {
         match benchmark.at_scale {
             Some(at_scale) => at_scale(sizes, scale, &host()).filter(|effect| effect.physical().check().is_ok()),
             None => effect_of_sizes(id, sizes),
@@ -265,7 +270,7 @@ mod tests {
             step.wheel_angle_rad = step.wheel_rad.map(|wheel_rad| f64::from(k) * wheel_rad);
             step.travel_m = speed_m_s.map(|speed_m_s| speed_m_s * step.dt_s);
             step.encoder_rad = step.wheel_rad;
-            let before = step.clone();
+            let before = step;
             if hooks.wheel {
                 form.wheel(&mut step);
             }

@@ -22,7 +22,7 @@ mod memory;
 mod stream;
 mod term;
 
-pub use benchmark::{Benchmark, HostRobot, Needs, OtherForm, SizeLaw, Sizes};
+pub use benchmark::{AtScale, Benchmark, FormOf, HostRobot, NamedSize, Needs, OtherForm, SizeLaw, Sizes};
 pub use covariate::{Channel, Covariate};
 pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
 pub use effect::{EffectError, PhysicalEffect};

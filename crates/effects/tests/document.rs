@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use effects::{
     Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError, SizeLaw,
-    StreamName, description, hypothesis,
+    Sizes, StreamName, description, hypothesis,
 };
+use model_term::TermParameter;
 
 /// What every header says, in this order.
 const LABELS: [&str; 5] = ["Model", "Signature", "Observability", "Alias", "Reference"];
@@ -40,8 +41,10 @@ scale of the sizes given, and where it has another functional form than the cata
 This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test -p effects --test document`.
 ";
 
+type Holds = fn(&Hypothesis) -> bool;
+
 /// By what an effect is shown, what that is, and which hypotheses are so.
-const SHOWN_BY: [(&str, &str, fn(&Hypothesis) -> bool); 5] = [
+const SHOWN_BY: [(&str, &str, Holds); 5] = [
     ("geometry", "the three lengths of the drive, which every calibration fits", |of| {
         matches!(of, Hypothesis::Geometry)
     }),
@@ -67,8 +70,11 @@ fn source(id: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
+/// Texts with their labels.
+type Labelled = Vec<(&'static str, String)>;
+
 /// The first line of an effect's header, and what follows each label; the error says what is missing.
-fn header(id: &str, source: &str) -> Result<(String, Vec<(&'static str, String)>), String> {
+fn header(id: &str, source: &str) -> Result<(String, Labelled), String> {
     let lines: Vec<&str> = source.lines().map_while(|line| line.strip_prefix("//!")).map(str::trim).collect();
     let (first, rest) = lines.split_first().ok_or_else(|| format!("{id}: no header"))?;
     let first =
@@ -130,12 +136,12 @@ fn words(name: &str) -> String {
 
 /// The fitted sizes of a hypothesis with what is large and its unit, and its shape parameter with the values
 /// that are tried.
-fn sizes(id: &str) -> (Vec<(&'static str, f64, &'static str)>, Vec<(&'static str, f64)>) {
+fn sizes(id: &str) -> (Vec<TermParameter>, Sizes) {
     let shapes = hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_default();
-    let mut fitted: Vec<(&'static str, f64, &'static str)> = Vec::new();
+    let mut fitted: Vec<TermParameter> = Vec::new();
     for parameter in shapes.iter().flat_map(|shape| shape.term.parameters()) {
-        if fitted.iter().all(|(name, ..)| *name != parameter.name) {
-            fitted.push((parameter.name, parameter.plausible, parameter.unit));
+        if fitted.iter().all(|known| known.name != parameter.name) {
+            fitted.push(*parameter);
         }
     }
     (fitted, shapes.iter().flat_map(|shape| shape.held.clone()).collect())
@@ -144,7 +150,7 @@ fn sizes(id: &str) -> (Vec<(&'static str, f64, &'static str)>, Vec<(&'static str
 /// The meaning with all sizes large, the phases of periodic ones at zero.
 fn meaning(id: &str, description: &Description) -> String {
     let (fitted, tried) = sizes(id);
-    let large = fitted.iter().map(|&(name, large, _)| (name, if name.contains("cos") { 0.0 } else { large }));
+    let large = fitted.iter().map(|of| (of.name, if of.name.contains("cos") { 0.0 } else { of.plausible }));
     let held = tried.get(tried.len() / 2).copied();
     let estimate = |(name, value)| (name, Estimate { value, sigma: None });
     let estimates: Estimates<'_> = large.chain(held).map(estimate).collect();
@@ -202,7 +208,7 @@ fn section(id: &str, source: &str) -> Result<String, String> {
     }
     let (fitted, tried) = sizes(id);
     if !fitted.is_empty() {
-        let each = fitted.iter().map(|(name, large, unit)| format!("`{name}` ({})", with_unit(*large, unit)));
+        let each = fitted.iter().map(|of| format!("`{}` ({})", of.name, with_unit(of.plausible, of.unit)));
         let reason =
             source.lines().find_map(|line| line.trim_start().trim_start_matches('/').trim_start().strip_prefix(LARGE));
         let reason =

@@ -5,10 +5,9 @@
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
-use estimation::NoiseComponent;
-use estimation::{FitSettings, JointFit};
+use estimation::{FitSettings, JointFit, NoiseComponent};
 
-use crate::search::{cost, count};
+use crate::augmented_model::{cost, count};
 
 /// A rewriting must make the data likelier by this factor, e^20, over the records as they are: dozens are tried, and each claims much.
 const GAIN: f64 = 20.0;
@@ -40,6 +39,13 @@ pub(crate) struct Fault {
     pub(crate) records: Vec<Dataset>,
     /// Log of how much likelier the data become.
     pub(crate) gain: f64,
+}
+
+impl Fault {
+    /// Whether counts that were lost are restored only roughly, so that measurements may still lie off.
+    pub(crate) fn is_restored_roughly(&self) -> bool {
+        effects::description(self.id).is_some_and(|description| description.record_fault.is_restored_roughly)
+    }
 }
 
 const PLAIN: FitSettings = FitSettings::GEOMETRY_ONLY;

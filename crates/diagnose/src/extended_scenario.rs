@@ -11,11 +11,11 @@ use estimation::NoiseComponent;
 use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
+use crate::augmented_model::Extended;
 use crate::candidate::Choice;
-use crate::search::Extended;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
-const STAND_IN: &str = include_str!("stand_in.toml");
+const STAND_IN: &str = include_str!("default_actuators.toml");
 /// A controller regulates on counts much finer than most logs' ticks.
 const LEAST_COUNTS: f64 = 40_000.0;
 /// Looks farther apart than this, in a run of a few, are readings of a standing robot.
@@ -109,7 +109,7 @@ fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec
         Covariate::OfRun { key, .. } => Some(key),
         _ => None,
     });
-    own.map(|key| (key.clone(), crate::checks::values_of_runs(&model.fit, key))).collect()
+    own.map(|key| (key.clone(), crate::covariates::values_of_runs(&model.fit, key))).collect()
 }
 
 /// The calibrated lengths as effects on the nominal ones.

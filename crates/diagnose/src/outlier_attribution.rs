@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::augmented_model::Extended;
 use crate::candidate::terms;
-use crate::search::Extended;
 
 /// An innovation this large, in standard deviations, is one that the tails are made of.
 const LARGE: f64 = 3.5;
@@ -383,7 +383,7 @@ mod tests {
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{Whose, log_likelihoods};
-    use crate::search::Extended;
+    use crate::augmented_model::Extended;
 
     const ROW_S: f64 = 0.1;
     const ROWS_A_LOOK: u32 = 10;

@@ -10,15 +10,15 @@ use estimation::{Column, Evidence, JointFit, Model, Noise, total};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
 
-use super::library::{Manoeuvre, library};
-use super::setting::{Limits, Setting};
-use super::weigh::{Frame, with_parts, with_runs};
-use super::words::Predictions;
-use super::{Part, evidences, words};
-use crate::blind::SHOWS;
+use super::constraints::{Limits, Setting};
+use super::manoeuvres::{Manoeuvre, Part, evidences, library};
+use super::rival_odds::{Frame, with_parts, with_runs};
+use super::text;
+use super::text::Predictions;
+use crate::augmented_model::Extended;
 use crate::candidate::{Choice, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::search::Extended;
+use crate::settings::SHOWS;
 
 /// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
 const SHAPES: usize = 3;
@@ -231,7 +231,7 @@ pub(super) fn show(
         ids.join(", "),
         setting.within
     );
-    Ok(words::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
+    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
 }
 
 fn from_size(smallest: &Smallest) -> String {
@@ -355,7 +355,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         shows.len() + blind_to.len(),
         setting.within
     );
-    let next_experiment = words::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
+    let next_experiment = text::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
     Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
 }
 
