@@ -218,7 +218,6 @@ impl Case {
                 }
                 vec![first, second]
             }
-            #[allow(clippy::cast_possible_truncation)]
             CaseKind::LeftOut => vec![all[place as usize % all.len()].0],
         }
     }

@@ -160,10 +160,6 @@ impl Hidden {
             effects::effect_from_estimates(self.id, &sizes)?;
             return self.benchmark.other_form.map(|form| Act::Other((form.forward)(&sizes, &self.host)));
         }
-        let effect = match self.benchmark.at_scale {
-            Some(at_scale) => at_scale(&sizes, self.scale, &self.host).filter(|own| own.physical().check().is_ok()),
-            None => effects::effect_from_estimates(self.id, &sizes),
-        };
-        effect.map(Act::Catalogue)
+        effects::effect_at_scale(self.id, &sizes, self.scale, &self.host).map(Act::Catalogue)
     }
 }

@@ -123,7 +123,6 @@ impl InstrumentModel {
     /// the correlation from measurement to measurement.
     pub(crate) fn variances(&self) -> [f64; 2] {
         let factor = if self.class == NoiseClass::Correlated {
-            #[allow(clippy::cast_precision_loss)]
             let between_s = self.every.min(200) as f64 / super::robot::RATE_HZ;
             let rho = (-between_s / self.lasting.1).exp();
             1.0 + self.lasting.0.powi(2) * (1.0 + rho) / (1.0 - rho)

@@ -15,6 +15,7 @@ mod measure;
 mod oracle;
 mod planned;
 mod power;
+mod result;
 mod robot;
 mod score;
 #[cfg(test)]
@@ -31,9 +32,8 @@ pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};
 pub use measure::Measure;
-pub use planned::Planned;
+pub use result::{CaseResult, Planned, Reported};
 pub use robot::PathFamily;
-pub use score::{CaseResult, Reported};
 
 /// What comes of a campaign.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

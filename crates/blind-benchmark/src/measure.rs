@@ -6,9 +6,8 @@ use super::case::{CaseKind, OracleView};
 use super::draw::Draw;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
-use super::planned::Planned;
 use super::power::limits;
-use super::score::{CaseResult, Reported};
+use super::result::{CaseResult, Planned, Reported};
 
 /// One measure against its bar.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -34,7 +33,6 @@ pub struct Measure {
 fn share(id: &'static str, what: &'static str, (k, n): (usize, usize), bar: f64, at_most: bool) -> Measure {
     let (low, high) = limits(k, n);
     let limit = if at_most { high } else { low };
-    #[allow(clippy::cast_precision_loss)]
     let value = (n > 0).then(|| k as f64 / n as f64);
     let met = if at_most { limit <= bar } else { limit >= bar };
     Measure { id, what, value, limit: value.map(|_| limit), of: n, bar, at_most, met: value.map(|_| met) }
@@ -167,7 +165,6 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
     let sizes: Vec<(f64, f64)> = aliased()
         .filter(|(hidden, _, _)| hidden.kind == EffectKind::Mean)
         .filter_map(|(hidden, _, case)| {
-            #[allow(clippy::cast_precision_loss)]
             Some((case.findings().next()?.names.len() as f64, 1.0 + hidden.aliases.len() as f64))
         })
         .collect();
@@ -207,7 +204,6 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
     let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
     let value = (b > 0.0 && pairs.len() > 1).then(|| a / b);
     let limit = value.map(|value| {
-        #[allow(clippy::cast_precision_loss)]
         let n = pairs.len() as f64;
         let squares: f64 = pairs.iter().map(|pair| (pair.0 - value * pair.1).powi(2)).sum();
         let error = (squares * n / (n - 1.0)).sqrt() / b;
@@ -303,13 +299,11 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
     // Ten bins of equal width.
     let mut bins: BTreeMap<u32, (f64, f64, f64)> = BTreeMap::new();
     for (probability, right) in &findings {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let bin = bins.entry((probability * 10.0).clamp(0.0, 9.0) as u32).or_default();
         bin.0 += probability;
         bin.1 += f64::from(u8::from(*right));
         bin.2 += 1.0;
     }
-    #[allow(clippy::cast_precision_loss)]
     let n = findings.len() as f64;
     let error = (n > 0.0).then(|| bins.values().map(|(stated, right, _)| (stated - right).abs()).sum::<f64>() / n);
     let covered: Vec<bool> =

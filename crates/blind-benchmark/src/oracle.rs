@@ -126,7 +126,6 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
     z.chunk_by(|a, b| a.0 == b.0)
         .map(|run| {
             let sum: f64 = run.iter().map(|(_, z)| z * z).sum();
-            #[allow(clippy::cast_precision_loss)]
             let count = run.len() as f64;
             0.5 * sum * sum / count
         })

@@ -11,32 +11,9 @@ use motion_programs::{DriveLimits, Schedule};
 use super::case::{Case, More};
 use super::hidden::EffectKind;
 use super::power::DISCRIMINATION_LEVEL;
+use super::result::{CaseResult, Planned, Reported, said};
 use super::robot::{SessionPlan, programs_of};
-use super::score::{CaseResult, Reported, said};
 use crate::error::ChallengeError;
-
-/// What came of the planned run of a case whose one mean effect was found among several names.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Planned {
-    /// The set before.
-    pub names: Vec<String>,
-    /// Whether there was a plan that tells names apart.
-    pub planned: bool,
-    /// Whether the oracle tells the right name from all others of the set after the planned runs.
-    pub told_by_plan: bool,
-    /// The same after the battery.
-    pub told_by_battery: bool,
-    /// What was found after the planned runs.
-    pub said: Vec<Reported>,
-}
-
-impl Planned {
-    /// Whether somebody could have driven what tells.
-    #[must_use]
-    pub fn can_be_told(&self) -> bool {
-        self.told_by_plan || self.told_by_battery
-    }
-}
 
 /// Drives as planned, where names were found together and the right one is among them.
 pub(crate) fn planned(
@@ -126,7 +103,6 @@ fn battery(case: &Case) -> Vec<SessionPlan> {
         kinds.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
     }
     let once: f64 = kinds.iter().flat_map(Schedule::programs).map(|program| drive_limits.cost(&program).minutes).sum();
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few
     let pairs = ((MINUTES / once) as u32).max(1);
     let all: Vec<Schedule> = kinds.iter().map(|kind| kind.with_pairs(pairs)).collect();
     vec![session(case, speed_m_s, &all)]

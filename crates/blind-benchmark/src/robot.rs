@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use dataset::{Protocol, ProtocolSettings};
-use effects::{CATALOGUE, Effect, HostRobot, Needs, description};
+use effects::{CATALOGUE, Effect, HostRobot, Needs, harmless};
 use motion_programs::{Motion, MotionProgram, Schedule};
 use scenario::{Log, Scenario};
 
@@ -117,7 +117,7 @@ impl RandomRobot {
     pub(crate) fn harmless(&self, hidden: &[&str]) -> Vec<Effect> {
         let host = self.host();
         let others = CATALOGUE.iter().filter(|id| !hidden.contains(id));
-        others.filter_map(|id| description(id)?.benchmark.harmless?(&host)).collect()
+        others.filter_map(|id| harmless(id, &host)).collect()
     }
 }
 
@@ -136,7 +136,6 @@ fn session(base: &Scenario, family: PathFamily, share: f64, draw: &mut Draw) -> 
 }
 
 /// `pairs` times a share, at least one.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful
 fn pairs(pairs: f64, share: f64) -> u32 {
     ((pairs * share).round() as u32).max(1)
 }

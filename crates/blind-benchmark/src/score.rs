@@ -1,84 +1,17 @@
 //! A diagnosis held against what was hidden.
 
 use dataset::Dataset;
-use diagnose::{Diagnosis, Document, Options, Verdict, diagnose};
+use diagnose::{Diagnosis, Options, Verdict, diagnose};
 use effects::{Hypothesis, Variant, hypothesis};
 use estimation::Model;
 use kinematics::DriveGeometry;
 
-use super::case::{Case, CaseKind, OracleView};
+use super::case::{Case, CaseKind};
 use super::hidden::{EffectKind, kind_of};
-use super::instrument::{NoiseClass, TruthKind};
 use super::oracle::{misfit, misfit_of_form};
-use super::planned::{Planned, planned};
-use super::robot::PathFamily;
+use super::planned::planned;
+use super::result::{CaseResult, said};
 use crate::error::ChallengeError;
-
-/// One finding, as far as it is scored.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Reported {
-    /// Its names, most probable first.
-    pub names: Vec<String>,
-    /// Stated probability of the first name.
-    pub probability: f64,
-    /// Its z.
-    pub z: f64,
-    /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 % interval holds the truth.
-    pub covered: Vec<bool>,
-    /// Its sentence.
-    pub sentence: String,
-}
-
-/// What the case was and what came of it.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct CaseResult {
-    /// The case's number: with the seed, all that it takes to drive it again.
-    pub case: u64,
-    /// What was asked.
-    pub round: CaseKind,
-    /// What was driven.
-    pub paths: PathFamily,
-    /// What the instrument showed.
-    pub truth: TruthKind,
-    /// What the measurements err by.
-    pub noise: NoiseClass,
-    /// Sessions, runs and measurements.
-    pub counts: [usize; 3],
-    /// What was hidden, as the oracle sees it.
-    pub hidden: Vec<OracleView>,
-    /// What was found.
-    pub said: Vec<Reported>,
-    /// Checks that failed at the end.
-    pub failed_checks: Vec<String>,
-    /// Why there is no diagnosis.
-    pub refused: Option<String>,
-    /// Whether the mean was extended.
-    pub extended: bool,
-    /// Gain in log score on the held-out log: of the tool, and of who knows the true term.
-    pub gain: Option<[f64; 2]>,
-    /// Where its effect was found among several names: what the planned run made of them.
-    pub planned: Option<Planned>,
-}
-
-impl CaseResult {
-    /// The findings that are not right anyway because of what the measurements err by.
-    pub(crate) fn findings(&self) -> impl Iterator<Item = &Reported> {
-        let right = self.noise.right_answers();
-        let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
-        self.said
-            .iter()
-            .filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
-    }
-
-    /// What was said of it, in short.
-    pub(crate) fn verdict(&self) -> String {
-        if self.refused.is_some() {
-            return "refused".to_owned();
-        }
-        let names: Vec<String> = self.findings().map(|said| said.names.join("|")).collect();
-        if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
-    }
-}
 
 /// Diagnoses a case and scores it.
 pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeError> {
@@ -129,34 +62,6 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
         }
     }
     Ok(result)
-}
-
-pub(crate) fn said(document: &Document, case: &Case) -> Vec<Reported> {
-    document
-        .findings
-        .iter()
-        .map(|finding| {
-            let hidden = case.hidden.iter().find(|hidden| hidden.id == finding.id);
-            let exact = hidden.filter(|hidden| hidden.kind == EffectKind::Mean && !hidden.other_form);
-            let covered = exact.map_or_else(Vec::new, |hidden| {
-                hidden
-                    .sizes()
-                    .iter()
-                    .filter_map(|(name, truth)| {
-                        let value = finding.parameters.get(*name)?;
-                        Some((value.value - truth).abs() < 1.96 * value.sigma?)
-                    })
-                    .collect()
-            });
-            Reported {
-                names: finding.names.clone(),
-                probability: finding.probability,
-                z: finding.z,
-                covered,
-                sentence: finding.sentence.clone(),
-            }
-        })
-        .collect()
 }
 
 /// What the tool's model gains on the held-out log over the best calibration without the effect, and what the true terms gain there: all of it but what chance makes of

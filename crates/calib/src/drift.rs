@@ -186,7 +186,6 @@ fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
 fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {
     let values = |of: fn(&RunDrift) -> Option<f64>| runs.iter().filter_map(of).collect::<Vec<f64>>();
     let largest = |of| values(of).into_iter().reduce(f64::max);
-    #[allow(clippy::cast_precision_loss)] // counts of runs
     let mean = |of| {
         let values = values(of);
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)

@@ -8,6 +8,7 @@
 mod counter;
 mod error;
 pub mod import;
+mod imported;
 mod prefetch;
 mod read;
 mod record;

@@ -9,7 +9,6 @@ use dataset::{
 use kinematics::Wheels;
 
 fn run(id: &str, rows: usize, measurements: usize) -> Run {
-    #[allow(clippy::cast_precision_loss)]
     let times = |rows: usize, step_s: f64| (0..rows).map(move |row| row as f64 * step_s);
     let counts = |by: i64| (0..i64::try_from(rows).expect("small")).map(move |row| row * by).collect();
     let odometry = Odometry {

@@ -2,6 +2,7 @@
 
 use kinematics::DriveGeometry;
 
+use crate::benchmark::{HostRobot, NamedSize};
 use crate::description::Description;
 use crate::forward::Forward;
 use crate::hypothesis::Hypothesis;
@@ -111,6 +112,26 @@ pub trait PhysicalEffect {
         Self: Sized,
     {
         let _ = sizes;
+        None
+    }
+
+    /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is another
+    /// than [`Self::from_estimates`] makes of them.
+    fn at_scale(sizes: &[NamedSize], scale: f64, robot: &HostRobot) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        let _ = (scale, robot);
+        Self::from_estimates(sizes)
+    }
+
+    /// The effect without any harm, for records that have what it needs though it is not hidden: so such
+    /// records tell nothing.
+    fn harmless(robot: &HostRobot) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        let _ = robot;
         None
     }
 }

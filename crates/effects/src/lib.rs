@@ -22,7 +22,7 @@ mod sampling_period;
 mod stream;
 mod term;
 
-pub use benchmark::{AtScale, Benchmark, FormOf, HostRobot, NamedSize, Needs, OtherForm, SizeLaw, Sizes};
+pub use benchmark::{Benchmark, FormOf, HostRobot, NamedSize, Needs, OtherForm, SizeLaw, Sizes};
 pub use covariate::{Channel, Covariate};
 pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
 pub use effect::{EffectError, PhysicalEffect};
@@ -131,6 +131,25 @@ macro_rules! contents {
                 _ => None,
             }
             .filter(|effect: &Effect| effect.physical().check().is_ok())
+        }
+
+        /// The effect of an id with sizes that the blind benchmark drew, at a scale in a robot; `None` when they do not make a physical one.
+        #[must_use]
+        pub fn effect_at_scale(id: &str, sizes: &[NamedSize], scale: f64, robot: &HostRobot) -> Option<Effect> {
+            match id {
+                $(stringify!($module) => <$Type as PhysicalEffect>::at_scale(sizes, scale, robot).map(Effect::$Type),)*
+                _ => None,
+            }
+            .filter(|effect: &Effect| effect.physical().check().is_ok())
+        }
+
+        /// The effect of an id without any harm, for records of a robot that have what it needs though it is not hidden.
+        #[must_use]
+        pub fn harmless(id: &str, robot: &HostRobot) -> Option<Effect> {
+            match id {
+                $(stringify!($module) => <$Type as PhysicalEffect>::harmless(robot).map(Effect::$Type),)*
+                _ => None,
+            }
         }
 
         /// Every id of the catalogue, in the order in which the effects act.

@@ -10,9 +10,8 @@
 
 use std::collections::BTreeMap;
 
-use dataset::RunInfo;
-use kinematics::{Increment, Pose, Wheels};
-use model_term::{Interval, Measurement, ModelTerm, TermParameter};
+use kinematics::Wheels;
+use model_term::ModelTerm;
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
@@ -22,36 +21,21 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant};
 use crate::motion_history::{MotionHistory, MotionHistoryTracker};
+use recorded::{OfRows, ROW_SHARE, Recorded};
+pub use sparse::Sparse;
+use sparse::{CONSTANT, on_channel, parameter, seen};
 use together::ProductBatch;
 
+mod recorded;
+mod sparse;
 mod together;
 
 /// `kind` of a [`SparseTerm`] in a scenario.
 pub(crate) const TERM: &str = "term";
-/// How a product of no covariates is written.
-const CONSTANT: &str = "1";
 /// Most covariates of a product.
 const MOST_COVARIATES: usize = 3;
 
-/// A channel and the product of covariates that it goes with.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sparse {
-    /// What it adds to.
-    pub channel: Channel,
-    /// The factors; none for a constant.
-    pub covariates: Vec<Covariate>,
-}
-
 impl Sparse {
-    /// The names of its covariates, as findings and scenarios have them.
-    #[must_use]
-    pub fn names(&self) -> Vec<String> {
-        if self.covariates.is_empty() {
-            return vec![CONSTANT.to_owned()];
-        }
-        self.covariates.iter().map(Covariate::name).collect()
-    }
-
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
@@ -67,31 +51,6 @@ impl Sparse {
     #[must_use]
     pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
         all.iter().all(Self::shares_moments).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
-    }
-
-    /// Whether it goes with what is found once for all products of an interval: those do that add to the motion or to the wheels' way, but for what goes with rows.
-    #[must_use]
-    pub fn shares_moments(&self) -> bool {
-        !self.channel.is_seen() && !self.is_of_rows()
-    }
-
-    /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.
-    #[must_use]
-    pub fn of_rows() -> Self {
-        Self { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] }
-    }
-
-    fn is_of_rows(&self) -> bool {
-        self.covariates.iter().any(Covariate::is_of_rows)
-    }
-
-    fn product(&self, at: &KinematicSample<'_>) -> f64 {
-        self.covariates.iter().map(|covariate| covariate.value(at)).product()
-    }
-
-    /// The product for each wheel by what it does itself; 0 for one that the channel leaves alone.
-    fn of_wheels(&self, channel: Channel, at: &KinematicSample<'_>) -> Wheels<f64> {
-        Wheels::from_sides(|side| if channel.is_of(side) { self.product(&at.of_wheel(side)) } else { 0.0 })
     }
 }
 
@@ -328,193 +287,6 @@ impl Forward for State {
     /// What goes with v or ω alone goes with the way or the turn, however fast.
     fn depends_on_speed(&self) -> bool {
         self.size.coefficient != 0.0 && self.sparse.covariates.iter().filter(|of| of.is_a_speed()).count() > 1
-    }
-}
-
-/// A moment at which an instrument looks: twist, heading and time alone are known of it.
-fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> KinematicSample<'static> {
-    static NONE: BTreeMap<String, f64> = BTreeMap::new();
-    KinematicSample {
-        v_m_s,
-        omega_rad_s,
-        acceleration_m_s2: 0.0,
-        yaw_acceleration_rad_s2: 0.0,
-        heading_rad: world_from_body.theta_rad,
-        wheel_m_s: Wheels::both(0.0),
-        wheel_m_s2: Wheels::both(0.0),
-        own_m_s: 0.0,
-        own_m_s2: 0.0,
-        own_since_reversal_m: [f64::INFINITY; 2],
-        wheel_rad: Wheels::both(0.0),
-        turned_rad: Wheels::both(0.0),
-        run_s,
-        session_s: 0.0,
-        session_m: 0.0,
-        since_reversal_m: f64::INFINITY,
-        wheel_since_reversal_m: Wheels::both([f64::INFINITY; 2]),
-        last_turn: 0.0,
-        x_m: 0.0,
-        y_m: 0.0,
-        of_run: &NONE,
-    }
-}
-
-/// A size on a channel that is none of the wheels', by v and ω.
-fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
-    match channel {
-        Channel::Along | Channel::OffsetAlong => Pose::new(size, 0.0, 0.0),
-        Channel::Across | Channel::OffsetAcross => Pose::new(0.0, size, 0.0),
-        Channel::Yaw | Channel::OffsetHeading => Pose::new(0.0, 0.0, size),
-        Channel::MeasurementDelay => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
-        // What both wheels or one of them gain needs their separation: `Sparse::of_wheels`.
-        Channel::Wheels | Channel::LeftWheel | Channel::RightWheel => Pose::IDENTITY,
-    }
-}
-
-/// The estimation model in a run.
-#[derive(Clone)]
-struct Recorded {
-    of: Sparse,
-    own: [TermParameter; 1],
-    past: Past,
-}
-
-/// What moments need to know of the intervals before.
-#[derive(Debug, Clone, Copy)]
-struct Past {
-    memory: MotionHistoryTracker,
-    row: Option<Row>,
-}
-
-/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains add up to the speeds.
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    end_s: f64,
-    wheel_m_s: Wheels<f64>,
-    wheel_m_s2: Wheels<f64>,
-}
-
-/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second; more of what fades after a reversal.
-fn parameter(of: &Sparse) -> TermParameter {
-    let unit = match of.channel {
-        Channel::Yaw => "rad/s",
-        Channel::OffsetAlong | Channel::OffsetAcross => "m",
-        Channel::OffsetHeading => "rad",
-        Channel::MeasurementDelay => "s",
-        _ => "m/s",
-    };
-    let faded: f64 = of.covariates.iter().map(Covariate::fades).product();
-    TermParameter { name: "coefficient", unit, prior_sigma: 0.02 * faded }
-}
-
-impl Past {
-    const NONE: Self = Self { memory: MotionHistoryTracker::NONE, row: None };
-
-    /// The middle of an interval that takes time.
-    fn moment<'i>(&mut self, interval: &Interval<'i>) -> KinematicSample<'i> {
-        let Increment { distance_m, turn_rad } = interval.increment();
-        let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
-        let wheel_m_s = interval.speed_m_s();
-        let [from_s, to_s] = interval.row_s;
-        let row = match self.row {
-            // A measurement between two rows cuts an interval: its speed changed where its row began, and not at the measurement.
-            Some(row) if row.end_s == to_s => row,
-            before => {
-                let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
-                let wheel_m_s2 =
-                    before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
-                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
-            }
-        };
-        self.row = Some(row);
-        let wheel_m_s2 = row.wheel_m_s2;
-        let Wheels { left, right } = wheel_m_s2;
-        let MotionHistory { since_reversal_m, wheel_since_reversal_m, last_turn } =
-            self.memory.after(interval.travel_m, distance_m, turn_rad);
-        KinematicSample {
-            v_m_s,
-            omega_rad_s,
-            acceleration_m_s2: 0.5 * (left + right),
-            yaw_acceleration_rad_s2: (right - left) / interval.wheel_separation_m,
-            heading_rad: interval.world_from_body.theta_rad + 0.5 * turn_rad,
-            wheel_m_s,
-            wheel_m_s2,
-            own_m_s: 0.0,
-            own_m_s2: 0.0,
-            own_since_reversal_m: [f64::INFINITY; 2],
-            wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
-            turned_rad: interval.turned_rad,
-            run_s: interval.t_s,
-            session_s: interval.session_s(),
-            session_m: interval.session_m,
-            since_reversal_m,
-            wheel_since_reversal_m,
-            last_turn,
-            x_m: interval.world_from_body.x_m,
-            y_m: interval.world_from_body.y_m,
-            of_run: &interval.run.covariates,
-        }
-    }
-}
-
-impl Recorded {
-    fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), own: [parameter(of)], past: Past::NONE }
-    }
-}
-
-impl ModelTerm for Recorded {
-    fn parameters(&self) -> &[TermParameter] {
-        &self.own
-    }
-
-    fn restart(&mut self, _run: &RunInfo) {
-        self.past = Past::NONE;
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
-            let at = self.past.moment(interval);
-            gradient[0] = if self.of.channel.is_of_wheels() {
-                interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
-            } else {
-                on_channel(self.of.channel, self.of.product(&at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
-            };
-        }
-    }
-
-    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
-        if self.of.channel.is_seen() {
-            let speeds = (measurement.twist.v_m_s, measurement.twist.omega_rad_s);
-            let product = self.of.product(&seen(speeds, measurement.world_from_body, measurement.t_s));
-            gradient[0] = on_channel(self.of.channel, product, speeds);
-        }
-    }
-}
-
-/// Unit of how much longer a row is than by the beat, as a share of itself.
-const ROW_SHARE: f64 = 0.02;
-
-/// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is false. Which speed it goes with is not that by the same stamps.
-#[derive(Clone)]
-struct OfRows {
-    of: Box<dyn ModelTerm>,
-    own: [TermParameter; 1],
-}
-
-impl ModelTerm for OfRows {
-    fn parameters(&self) -> &[TermParameter] {
-        &self.own
-    }
-
-    fn restart(&mut self, run: &RunInfo) {
-        self.of.restart(run);
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        self.of.motion(interval, gradient);
-        let Pose { x_m, y_m, theta_rad } = gradient[0];
-        gradient[0] = Pose::new(x_m / ROW_SHARE, y_m / ROW_SHARE, theta_rad / ROW_SHARE);
     }
 }
 

@@ -22,6 +22,7 @@ mod fleet;
 mod instruction_set;
 mod pose;
 mod prefetch;
+mod trajectory;
 mod trig;
 mod wheels;
 mod whole_log;

@@ -15,9 +15,9 @@ use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::{SimulatedRobot, SimulationError};
 
-use super::MM_PER_M;
 use super::published::{TABLE_1, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_2::Table2;
+use super::units::MM_PER_M;
 
 /// How many published numbers are fitted.
 const NUMBERS: usize = 5;
@@ -290,7 +290,6 @@ fn predict(
 /// The five published numbers with their standard deviations.
 fn published(table_2: &Table2) -> ([f64; NUMBERS], [f64; NUMBERS]) {
     let umbmark = TABLE_2_UMBMARK.sensitivity;
-    #[allow(clippy::cast_precision_loss)]
     let of_mean = |shape: super::shape::Variant| shape.std / (shape.count as f64).sqrt();
     let simulated = |method, symbol| table_2.cell(method, symbol).map_or(f64::NAN, |cell| cell.sigma);
     let rounding = |half_digit: f64| half_digit / 3_f64.sqrt();
@@ -484,7 +483,6 @@ fn counted_m(run: &Run, robot: &SimulatedRobot) -> [f64; 2] {
     if let (dataset::WheelLog::Ticks(ticks), Some(ticks_per_rev)) = (&run.odometry.wheels, robot.robot().ticks_per_rev)
     {
         for (travel, column) in travel.iter_mut().zip([&ticks.left, &ticks.right]) {
-            #[allow(clippy::cast_precision_loss)]
             let counts = (column.last().unwrap_or(&0) - column.first().unwrap_or(&0)) as f64;
             *travel = std::f64::consts::PI * 0.160 * counts / ticks_per_rev;
         }

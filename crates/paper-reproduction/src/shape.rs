@@ -30,7 +30,6 @@ pub type StatisticRow = (&'static str, fn(&Variant) -> f64);
 
 /// The rows of table 1, in its order.
 pub const ROWS: [StatisticRow; 9] = [
-    #[allow(clippy::cast_precision_loss)]
     ("count", |shape| shape.count as f64),
     ("mean", |shape| shape.mean),
     ("variance", |shape| shape.variance),
@@ -48,7 +47,6 @@ impl Variant {
     /// Skewness and kurtosis are the bias-corrected G₁ and G₂ (Joanes & Gill 1998) that statistics packages print, divided by the standard errors
     /// √(6/n) and √(24/n) of a large normal sample.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // counts of runs
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count < 4 {

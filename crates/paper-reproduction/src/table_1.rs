@@ -17,7 +17,7 @@ use sim_yair::SimulationError;
 
 use super::published::TABLE_1;
 use super::shape::{ROWS, Variant};
-use super::{COUNTS_PER_PULSE, MM_PER_M};
+use super::units::{COUNTS_PER_PULSE, MM_PER_M};
 use bench::Trial;
 
 /// Where the scatter of table 1 comes from.
@@ -91,7 +91,6 @@ const TRIALS_TO_FIT: u64 = 400;
 fn programs(runs: usize) -> Vec<MotionProgram> {
     (0..runs)
         .map(|run| {
-            #[allow(clippy::cast_precision_loss)]
             let length_m = COMMANDED_M + 1e-3 * ((run as f64 * GOLDEN).fract() - 0.5);
             let length_m = if run % 2 == 0 { length_m } else { -length_m };
             MotionProgram {
@@ -220,7 +219,6 @@ fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), S
     let mean_c = 0.5 * (TABLE_1.left.mean + TABLE_1.right.mean);
     let variance = |reading_sigma_m: f64, sensitivity_sigma: f64| -> Result<f64, SimulationError> {
         let variants = variants(&scenario(base, hypothesis, reading_sigma_m, sensitivity_sigma), 0, TRIALS_TO_FIT)?;
-        #[allow(clippy::cast_precision_loss)]
         let n = variants.len() as f64;
         Ok(variants.iter().map(|shape| 0.5 * (shape.left.variance + shape.right.variance)).sum::<f64>() / n)
     };
@@ -243,7 +241,6 @@ fn rows(variants: &[Wheels<Variant>], side: Side) -> Vec<Row> {
             let published = of(&TABLE_1[side]);
             let below = values.iter().filter(|value| **value < published).count();
             let equal = values.iter().filter(|value| **value == published).count();
-            #[allow(clippy::cast_precision_loss)]
             let published_falls_at_percent = 100.0 * (below as f64 + 0.5 * equal as f64) / values.len() as f64;
             let percentiles = [0.025, 0.5, 0.975].map(|share| quantile(&values, share));
             Row { statistic, published, percentiles, published_falls_at_percent }
@@ -253,9 +250,7 @@ fn rows(variants: &[Wheels<Variant>], side: Side) -> Vec<Row> {
 
 /// Quantile of sorted values, interpolated between order statistics (type 7 of Hyndman & Fan 1996).
 pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
     let position = share * (sorted.len() - 1) as f64;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let low = position.floor() as usize;
     let high = (low + 1).min(sorted.len() - 1);
     sorted[low] + position.fract() * (sorted[high] - sorted[low])
@@ -276,7 +271,6 @@ fn features(shape: &Wheels<Variant>) -> Vec<f64> {
 fn log_synthetic_likelihood(variants: &[Wheels<Variant>]) -> f64 {
     let features_of: Vec<DVector<f64>> = variants.iter().map(|shape| DVector::from_vec(features(shape))).collect();
     let size = features_of[0].len();
-    #[allow(clippy::cast_precision_loss)]
     let n = features_of.len() as f64;
     let mean = features_of.iter().fold(DVector::zeros(size), |sum, feature| sum + feature) / n;
     let covariance = features_of.iter().fold(DMatrix::zeros(size, size), |sum, feature| {
@@ -286,7 +280,6 @@ fn log_synthetic_likelihood(variants: &[Wheels<Variant>]) -> f64 {
     let Some(cholesky) = covariance.cholesky() else { return f64::NEG_INFINITY };
     let departure = DVector::from_vec(features(&TABLE_1)) - mean;
     let log_determinant = 2.0 * cholesky.l().diagonal().iter().map(|diagonal| diagonal.ln()).sum::<f64>();
-    #[allow(clippy::cast_precision_loss)]
     let normalisation = size as f64 * std::f64::consts::TAU.ln();
     -0.5 * (departure.dot(&cholesky.solve(&departure)) + log_determinant + normalisation)
 }

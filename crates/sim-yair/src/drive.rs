@@ -11,7 +11,7 @@ use crate::active::ActiveEffects;
 use crate::actuator::{Actuator, Piece, Pieces, ShaftMotion};
 use crate::body::{Body, DriveSetup, DriveStreams, Start};
 use crate::instrument::Observer;
-use crate::plan::PlannedMotion;
+use crate::planned_motion::PlannedMotion;
 use crate::servo::ServoError;
 
 /// Two instants closer than this are one: a nanosecond, far under any sample time and far over the rounding of a long run's clock.

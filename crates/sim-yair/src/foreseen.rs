@@ -11,7 +11,7 @@ use crate::actuator::{ConstantSpeed, Piece};
 use crate::body::{Body, DriveSetup, DriveStreams, Start};
 use crate::drive::SAME_INSTANT_S;
 use crate::instrument::Observer;
-use crate::plan::PlannedMotion;
+use crate::planned_motion::PlannedMotion;
 
 /// What a run does from one standstill to the next.
 #[derive(Debug, Clone)]

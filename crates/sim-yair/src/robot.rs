@@ -12,7 +12,8 @@ use crate::body::{DriveSetup, DriveStreams, Start};
 use crate::drive::Drive;
 use crate::foreseen::PrecomputedRun;
 use crate::instrument::Observer;
-use crate::plan::{Plan, PlannedMotion};
+use crate::plan::Plan;
+use crate::planned_motion::PlannedMotion;
 use crate::servo::ServoError;
 
 /// Why a scenario cannot be simulated.

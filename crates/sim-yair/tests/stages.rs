@@ -50,7 +50,6 @@ fn drive(scenario: &Scenario, effect: Option<Box<dyn Forward>>) -> (Run, Pose) {
 fn counted_m(run: &Run) -> f64 {
     let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("ticks") };
     let counts = ticks.left.last().expect("rows") - ticks.left[0];
-    #[allow(clippy::cast_precision_loss)]
     let turns = counts as f64 / (4.0 * 200.0 * 50.265_482_457_436_69);
     turns * PI * 0.160
 }

@@ -7,13 +7,10 @@
 
 use dataset::MarkedPoint;
 use kinematics::{DriveGeometry, Increment, Point, Pose, WheelNoise, Wheels};
-use motion_programs::Motion;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use scenario::{Engine, Instrument, Robot, Scenario};
 
-use super::filter::Filter;
-use super::timeline::Timeline;
-use super::{Innovation, NoBound};
+use super::error::NoBound;
 
 /// Readings must err by this share of what they are rounded to, for their roundings to be independent to 1 %.
 const LEAST_DITHER: f64 = 1.0 / 3.0;
@@ -67,11 +64,6 @@ impl Model {
             robot: scenario.robot.clone(),
             nominal_geometry: scenario.nominal_geometry()?,
         })
-    }
-
-    /// What the looks of a run add, one by one.
-    pub(super) fn innovations(&self, motions: &[Motion]) -> Result<Vec<Innovation>, NoBound> {
-        Filter::run(self, &Timeline::of(self, motions))
     }
 
     /// Recorded ticks of a wheel turn.

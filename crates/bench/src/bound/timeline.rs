@@ -117,7 +117,7 @@ impl Run<'_> {
         let time_scale = TimeScale::of(longest, speed, self.model.ramps.then_some(acceleration));
         let before = self.phase;
         for side in Side::BOTH {
-            #[allow(clippy::cast_possible_truncation)] // whole counts
+            // Whole counts.
             let travel = counts[side] as i64;
             self.counts[side] += travel;
             let phase = self.counts[side].rem_euclid(i64::from(self.model.counts_per_tick));

@@ -253,7 +253,6 @@ impl SweepPlan {
 }
 
 /// As many chunks as would have taken a wave's time, at most doubled or halved.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn next_wave(wave: usize, chunks: usize, took: Duration) -> usize {
     let wanted = chunks as f64 * WAVE.as_secs_f64() / took.as_secs_f64().max(1e-6);
     (wanted as usize).clamp(wave / 2, wave * 2).clamp(1, LARGEST_WAVE)

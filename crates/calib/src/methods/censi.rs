@@ -219,7 +219,6 @@ impl Censi {
                     (index, residual.x.hypot(residual.y), residual.z.abs())
                 })
                 .collect();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // counts
             let last = ((1.0 - self.trimmed_share) * errors.len() as f64).round() as usize;
             let limit = |of: fn(&(usize, f64, f64)) -> f64| {
                 let mut sorted: Vec<f64> = errors.iter().map(of).collect();
@@ -241,7 +240,6 @@ impl Censi {
                 why: "the instrument sees no translation that stands out from its error; add straight runs".to_owned(),
             });
         }
-        #[allow(clippy::cast_precision_loss)] // counts
         let share = |count: usize| count as f64 / samples.len() as f64;
         Ok(Trimmed { fit: cheap.fit, kept, dropped: (share(dropped.0), share(dropped.1)) })
     }

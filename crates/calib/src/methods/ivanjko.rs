@@ -116,14 +116,12 @@ fn separation_m(spins: &[Spin], at: &GeometryParameters, sign: f64) -> Option<f6
     (products > 0.0).then_some(squares / products)
 }
 
-#[allow(clippy::cast_precision_loss)] // numbers of runs
 fn mean_m(spins: &[Spin], at: &GeometryParameters) -> Option<f64> {
     let ways: Vec<f64> = [1.0, -1.0].into_iter().filter_map(|sign| separation_m(spins, at, sign)).collect();
     (!ways.is_empty()).then(|| ways.iter().sum::<f64>() / ways.len() as f64)
 }
 
 /// Covariance of r_L, r_R and B. Each step's own scatter, and each step's answer moves with the other's.
-#[allow(clippy::cast_precision_loss)] // numbers of runs
 fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<Matrix3<f64>> {
     let normal = DMatrix::from_column_slice(2, 2, step.normal.as_slice());
     let radii = scatter_between_runs(&normal, &step.scores, 1)?;

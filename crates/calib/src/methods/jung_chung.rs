@@ -61,7 +61,7 @@ impl Method for JungChung {
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
-                #[allow(clippy::float_cmp)] // settings, not measurements
+                // Settings, not measurements: compared exactly.
                 if *side_m.get_or_insert(run_side_m) != run_side_m {
                     return Err(Self::not_applicable(
                         "its squares must all have the same side_m; calibrate them apart",

@@ -201,7 +201,6 @@ fn solve(normal: &Matrix2<f64>, right: &Vector2<f64>) -> Option<Vector2<f64>> {
 /// equations the parameters take: n/(n − taken) is the correction of a sample's variance. `None` when nothing is left over.
 ///
 /// Whatever is correlated inside of a run (its start's reading, its random walk) stays inside of a score: only runs have to be independent.
-#[allow(clippy::cast_precision_loss)] // numbers of runs
 pub(super) fn scatter_between_runs(
     slopes: &DMatrix<f64>,
     scores: &[DVector<f64>],

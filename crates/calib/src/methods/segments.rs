@@ -165,7 +165,6 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
 /// Covariance of the factors by leaving out one run at a time: the sandwich A⁻¹(Σ g gᵀ)A⁻¹ with each run's leverage taken into account. `None` for a single run,
 /// and where the others do not determine the factors without one.
 fn covariance(shares: &[Share], normal: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    #[allow(clippy::cast_precision_loss)] // counts of runs
     let runs = shares.len() as f64;
     let without: Vec<Vector3<f64>> = shares
         .iter()

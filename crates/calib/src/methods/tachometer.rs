@@ -101,7 +101,6 @@ impl Method for Tachometer {
             );
             return Err(CalibError::NotApplicable { method: Self::NAME, why });
         }
-        #[allow(clippy::cast_precision_loss)] // a number of runs
         let count = values.len() as f64;
         let mean = Wheels::from_sides(|side| values.iter().map(|value| value[side]).sum::<f64>() / count);
         let scores: Vec<_> = values

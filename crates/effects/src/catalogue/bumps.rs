@@ -7,8 +7,7 @@
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::Effect;
-use crate::benchmark::Benchmark;
+use crate::benchmark::{Benchmark, HostRobot, NamedSize};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
@@ -47,11 +46,6 @@ impl PhysicalEffect for Bumps {
         Description {
             isolated_error: Some(IsolatedError::LostOnTheWay { scales_m: &LOST_M }),
             benchmark: Benchmark {
-                // What a bump costs grows with the power 3/2 of its height.
-                at_scale: Some(|sizes, scale, _| {
-                    let height_m = LARGE_HEIGHT_M * scale.powf(2.0 / 3.0);
-                    Some(Effect::Bumps(Self { per_m: size(sizes, "per_m")?, height_m }))
-                }),
                 ..Benchmark::of_scatter(|_, stream| {
                     (vec![("height_m", LARGE_HEIGHT_M)], vec![("per_m", stream.log_uniform(0.1, 1.0))])
                 })
@@ -62,6 +56,11 @@ impl PhysicalEffect for Bumps {
 
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { per_m: size(sizes, "per_m")?, height_m: size(sizes, "height_m")? })
+    }
+
+    /// What a bump costs grows with the power 3/2 of its height.
+    fn at_scale(sizes: &[NamedSize], scale: f64, _: &HostRobot) -> Option<Self> {
+        Some(Self { per_m: size(sizes, "per_m")?, height_m: LARGE_HEIGHT_M * scale.powf(2.0 / 3.0) })
     }
 }
 

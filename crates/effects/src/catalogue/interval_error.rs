@@ -12,8 +12,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::Effect;
-use crate::benchmark::{Benchmark, Needs};
+use crate::benchmark::{Benchmark, HostRobot, Needs};
 use crate::description::{Description, Excitation, Told};
 use crate::sampling_period::SamplingPeriodEstimator;
 use crate::effect::{EffectError, PhysicalEffect};
@@ -60,10 +59,6 @@ impl PhysicalEffect for IntervalError {
                 needs: Needs { jitter: true, ..Needs::NONE },
                 // A share of one is all there is.
                 max_scale: 1.0,
-                harmless: Some(|robot| {
-                    let none = Self { share: 0.0, jitter_s: robot.jitter_s };
-                    (robot.jitter_s > 0.0).then_some(Effect::IntervalError(none))
-                }),
                 ..Benchmark::of_mean_at(|_, robot, _| vec![("jitter_s", robot.jitter_s)])
             },
             ..Description::of("the logged intervals are not the true ones")
@@ -76,6 +71,10 @@ impl PhysicalEffect for IntervalError {
             share: size(sizes, "share")?.min(1.0),
             jitter_s: size(sizes, "jitter_s").unwrap_or(Self::USUAL_JITTER_S),
         })
+    }
+
+    fn harmless(robot: &HostRobot) -> Option<Self> {
+        (robot.jitter_s > 0.0).then_some(Self { share: 0.0, jitter_s: robot.jitter_s })
     }
 }
 

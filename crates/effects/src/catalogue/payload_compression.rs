@@ -9,8 +9,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::Effect;
-use crate::benchmark::{Benchmark, Needs};
+use crate::benchmark::{Benchmark, HostRobot, NamedSize, Needs};
 use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
@@ -65,15 +64,6 @@ impl PhysicalEffect for PayloadCompression {
             excitation: Excitation::Conditions("drive the same runs with another payload, its covariate stated"),
             benchmark: Benchmark {
                 needs: Needs { payload: true, ..Needs::NONE },
-                at_scale: Some(|sizes, _, robot| {
-                    let unloaded = Self::from_estimates(sizes)?;
-                    Some(Effect::PayloadCompression(Self { payload_kg: robot.payload_kg.clone(), ..unloaded }))
-                }),
-                harmless: Some(|robot| {
-                    let payload_kg = robot.payload_kg.clone();
-                    let none = Self { common_per_kg: 0.0, mismatch_per_kg: 0.0, payload_kg };
-                    (!none.payload_kg.is_empty()).then_some(Effect::PayloadCompression(none))
-                }),
                 ..Benchmark::OF_MEAN
             },
             ..Description::of("the payload presses the tyres flatter")
@@ -84,6 +74,15 @@ impl PhysicalEffect for PayloadCompression {
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (common_per_kg, mismatch_per_kg) = (size(sizes, "common_per_kg")?, size(sizes, "mismatch_per_kg")?);
         Some(Self { common_per_kg, mismatch_per_kg, payload_kg: vec![size(sizes, PAYLOAD).unwrap_or(0.0)] })
+    }
+
+    fn at_scale(sizes: &[NamedSize], _: f64, robot: &HostRobot) -> Option<Self> {
+        Some(Self { payload_kg: robot.payload_kg.clone(), ..Self::from_estimates(sizes)? })
+    }
+
+    fn harmless(robot: &HostRobot) -> Option<Self> {
+        let payload_kg = robot.payload_kg.clone();
+        (!payload_kg.is_empty()).then_some(Self { common_per_kg: 0.0, mismatch_per_kg: 0.0, payload_kg })
     }
 }
 

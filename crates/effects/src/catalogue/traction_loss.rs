@@ -11,8 +11,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::Effect;
-use crate::benchmark::Benchmark;
+use crate::benchmark::{Benchmark, HostRobot, NamedSize};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
@@ -69,14 +68,6 @@ impl PhysicalEffect for TractionLoss {
             isolated_error: Some(IsolatedError::LostWithSpeedChange { scales_s: &SLIDES_S }),
             benchmark: Benchmark {
                 max_scale: 2.5,
-                at_scale: Some(|sizes, _, _| {
-                    let static_friction = size(sizes, "needs")? * (1.0 - size(sizes, "excess")?);
-                    Some(Effect::TractionLoss(Self {
-                        static_friction,
-                        kinetic_friction: 0.7 * static_friction,
-                        stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
-                    }))
-                }),
                 // The share of the acceleration that the floor does not hold.
                 ..Benchmark::of_scatter(|robot, _| {
                     let needs = robot.acceleration_m_s2 / GRAVITY_M_S2;
@@ -95,6 +86,15 @@ impl PhysicalEffect for TractionLoss {
         Some(Self {
             static_friction: size(sizes, "static_friction")?,
             kinetic_friction: size(sizes, "kinetic_friction")?,
+            stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
+        })
+    }
+
+    fn at_scale(sizes: &[NamedSize], _: f64, _: &HostRobot) -> Option<Self> {
+        let static_friction = size(sizes, "needs")? * (1.0 - size(sizes, "excess")?);
+        Some(Self {
+            static_friction,
+            kinetic_friction: 0.7 * static_friction,
             stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
         })
     }

@@ -1,5 +1,8 @@
 //! A term of a scenario: what it adds to a step, to what is seen and to the record, and what makes none.
 
+use dataset::RunInfo;
+use kinematics::Pose;
+
 use super::*;
 use crate::catalogue::specimen_step;
 

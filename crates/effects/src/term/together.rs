@@ -7,7 +7,8 @@ use dataset::RunInfo;
 use kinematics::{Pose, Side, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 
-use super::{Past, Sparse, on_channel, parameter};
+use super::recorded::Past;
+use super::sparse::{Sparse, on_channel, parameter};
 use crate::covariate::{Channel, Covariate, KinematicSample};
 
 /// Products on channels of the motion and of the wheels, a parameter each.

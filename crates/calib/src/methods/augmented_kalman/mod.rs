@@ -103,7 +103,7 @@ impl AugmentedKalman {
     fn first_guess(&self, sessions: &[Session<'_>]) -> NoiseFilter {
         let stated = |of: fn(&Session<'_>) -> Option<f64>| {
             let first = sessions.first().and_then(of)?;
-            #[allow(clippy::float_cmp)] // statements, not measurements
+            // Statements, not measurements: compared exactly.
             (first > 0.0 && sessions.iter().all(|session| of(session) == Some(first))).then_some(first)
         };
         let xy_m = stated(|session| session.truth_noise.sigma_xy_m);
