@@ -32,9 +32,10 @@ doc:
 bench:
     cargo bench --workspace --no-run
 
-# Run the commands of the documents and paste what they print, docs/methods.md's tables of all methods included
+# Run the commands of the documents and paste what they print, docs/methods.md's tables of all methods included; generate docs/effects.md
 documents:
     env YAIR_UPDATE_DOCS=1 cargo test --test architecture the_documents_show_what_the_commands_print
+    env YAIR_UPDATE_DOCS=1 cargo test -p effects --test document
 
 # The blind benchmark of diagnosis against its bars; docs/diagnose.md has its table. It takes a quarter of an hour
 challenge:

@@ -6,6 +6,7 @@
 mod arrows;
 mod commands;
 mod documents;
+mod effect_ids;
 mod files;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,7 +1,7 @@
 //! One case: a random robot, what is hidden in it, what it brings home, and what the oracle knows. Addressed by seed and number alone.
 
 use dataset::{Dataset, Provenance, Run};
-use effects::{Effect, StreamName};
+use effects::{Needs, StreamName};
 use kinematics::DriveGeometry;
 use motion_programs::Platform;
 use scenario::Scenario;
@@ -9,7 +9,7 @@ use sim_yair::SimulatedRobot;
 
 use super::draw::Draw;
 use super::hidden::{Act, EffectKind, Hidden, hideable};
-use super::looks::{NoiseClass, Watching};
+use super::looks::Watching;
 use super::oracle::{Shown, TrueNoise};
 use super::power::{TOLD_APART, detection_limit};
 use super::robot::{RandomRobot, SessionPlan};
@@ -144,8 +144,8 @@ fn drive_session(
     }
     scenario.effects.extend(case.robot.harmless(ids));
     // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
-    if noisy && case.watching.class == NoiseClass::Dropouts && point < HELD_OUT && !ids.contains(&"dropped_samples") {
-        scenario.effects.push(Effect::DroppedSamples(effects::DroppedSamples { probability: 0.02 }));
+    if noisy && point < HELD_OUT {
+        scenario.effects.extend(case.watching.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
     let mut more = Vec::new();
     for hidden in hidden {
@@ -231,10 +231,7 @@ impl Case {
         attempt: u64,
     ) -> Result<Option<Self>, ChallengeError> {
         let mut draw = Draw::of(seed, number, "robot", attempt);
-        let needs = ids.iter().fold(super::robot::Needs::default(), |all, id| {
-            let own = Hidden::needs(id);
-            super::robot::Needs { payload: all.payload || own.payload, jitter: all.jitter || own.jitter }
-        });
+        let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
         let robot = RandomRobot::draw(&mut draw, needs)?;
         let watching = Watching::draw(&mut draw);
         let mut hidden = Vec::new();
@@ -332,7 +329,7 @@ enum Chosen {
 
 /// Whether chance has a part in an effect's signature: where in its gap a wheel was left, which fraction of a count was lost.
 fn by_chance(effect: &Hidden) -> bool {
-    ["backlash", "low_speed_truncation"].contains(&effect.id)
+    effect.benchmark.has_random_signature
 }
 
 /// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it.
@@ -474,7 +471,8 @@ impl Trial {
             let robot = RandomRobot::draw(&mut draw, Hidden::needs(id))?;
             let watching = Watching::draw(&mut draw);
             let Some(mut hidden) = Hidden::draw(id, &robot, &mut draw) else { continue };
-            let plainly = watching.class == NoiseClass::White && watching.kind == super::looks::TruthKind::Dense;
+            let plainly =
+                watching.class == super::looks::NoiseClass::White && watching.kind == super::looks::TruthKind::Dense;
             if !plainly || hidden.other_form {
                 continue;
             }

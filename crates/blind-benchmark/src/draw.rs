@@ -18,12 +18,12 @@ impl Draw {
 
     /// Uniform in [low, high).
     pub(crate) fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.uniform()
+        self.0.uniform_in(low, high)
     }
 
     /// Uniform in its logarithm.
     pub(crate) fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
-        (self.uniform(low.ln(), high.ln())).exp()
+        self.0.log_uniform(low, high)
     }
 
     /// One with this chance.
@@ -32,9 +32,8 @@ impl Draw {
     }
 
     /// A number below `n`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // small and positive
     pub(crate) fn below(&mut self, n: usize) -> usize {
-        ((self.0.uniform() * n as f64) as usize).min(n.saturating_sub(1))
+        self.0.below(n)
     }
 
     /// 1 or −1.

@@ -9,7 +9,6 @@
 mod case;
 mod draw;
 mod error;
-mod forms;
 mod hidden;
 mod looks;
 mod measure;

@@ -4,6 +4,7 @@
 //! disturbed: white, heavy-tailed (Student's t with three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white noise).
 
 use dataset::{Displacement, Run, TruthNoise, TruthSample};
+use effects::{CATALOGUE, DroppedSamples, Effect, Sign, hypothesis};
 use kinematics::Pose;
 
 use super::draw::Draw;
@@ -39,15 +40,30 @@ pub enum NoiseClass {
 impl NoiseClass {
     /// Findings that are right in this class whatever is hidden.
     #[must_use]
-    pub const fn right_answers(self) -> &'static [&'static str] {
+    pub fn right_answers(self) -> Vec<&'static str> {
+        let with_sign = |sign: Sign| {
+            let shows = |id: &&str| hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign));
+            CATALOGUE.iter().copied().filter(shows).collect()
+        };
         match self {
-            Self::White => &[],
-            Self::HeavyTailed => &["truth_outliers"],
-            Self::Correlated => &["truth_correlated_noise"],
-            Self::Dropouts => &["dropped_samples"],
+            Self::White => Vec::new(),
+            Self::HeavyTailed => with_sign(Sign::IsolatedLooks),
+            Self::Correlated => with_sign(Sign::CorrelatedLooks),
+            Self::Dropouts => self.effect().iter().map(Effect::id).collect(),
+        }
+    }
+
+    /// What the log loses in this class, as an effect.
+    pub(crate) const fn effect(self) -> Option<Effect> {
+        match self {
+            Self::Dropouts => Some(Effect::DroppedSamples(DroppedSamples { probability: SHARE_LOST })),
+            Self::White | Self::HeavyTailed | Self::Correlated => None,
         }
     }
 }
+
+/// Share of the log's rows that are lost where some are.
+const SHARE_LOST: f64 = 0.02;
 
 /// How the robot of a case is looked at.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use dataset::{Protocol, ProtocolSettings};
-use effects::{Effect, IntervalError, PayloadCompression};
+use effects::{CATALOGUE, Effect, HostRobot, Needs, description};
 use motion_programs::{Motion, MotionProgram, Schedule};
 use scenario::{Log, Scenario};
 
@@ -53,13 +53,6 @@ pub(crate) struct RandomRobot {
     pub(crate) jitter_s: f64,
 }
 
-/// What a hidden effect asks of the record to show at all.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Needs {
-    pub(crate) payload: bool,
-    pub(crate) jitter: bool,
-}
-
 /// Counts per metre of the shipped robot's drive, at which its controllers are tuned.
 const COUNTS_PER_M: f64 = 80_000.0;
 
@@ -104,21 +97,27 @@ impl RandomRobot {
         Ok(Self { family, sessions, held_out, payload_kg, jitter_s })
     }
 
+    /// The robot as effects know it that are hidden in it.
+    pub(crate) fn host(&self) -> HostRobot {
+        let (cruise_speed_m_s, acceleration_m_s2) =
+            self.sessions.iter().fold((0.0_f64, f64::INFINITY), |(v, a), session| {
+                let robot = &session.scenario.robot;
+                (v.max(robot.cruise_speed_m_s), a.min(robot.acceleration_m_s2))
+            });
+        HostRobot {
+            cruise_speed_m_s,
+            acceleration_m_s2,
+            wheel_separation_m: self.sessions[0].scenario.robot.wheel_separation_m,
+            payload_kg: self.payload_kg.clone(),
+            jitter_s: self.jitter_s,
+        }
+    }
+
     /// The effects that the records need beside what is hidden: loads and jitter without any harm.
     pub(crate) fn harmless(&self, hidden: &[&str]) -> Vec<Effect> {
-        let mut harmless = Vec::new();
-        if !self.payload_kg.is_empty() && !hidden.contains(&"payload_compression") {
-            let payload_kg = self.payload_kg.clone();
-            harmless.push(Effect::PayloadCompression(PayloadCompression {
-                common_per_kg: 0.0,
-                mismatch_per_kg: 0.0,
-                payload_kg,
-            }));
-        }
-        if self.jitter_s > 0.0 && !hidden.contains(&"interval_error") {
-            harmless.push(Effect::IntervalError(IntervalError { share: 0.0, jitter_s: self.jitter_s }));
-        }
-        harmless
+        let host = self.host();
+        let others = CATALOGUE.iter().filter(|id| !hidden.contains(id));
+        others.filter_map(|id| description(id)?.benchmark.harmless?(&host)).collect()
     }
 }
 

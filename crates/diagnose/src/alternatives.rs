@@ -2,8 +2,11 @@
 
 use serde::Serialize;
 
-use crate::document::Finding;
-use crate::search::{Found, SCAN_LEVEL, tests_in};
+use crate::cause::Cause;
+use crate::finding::Finding;
+use crate::ranking::tests_in;
+use crate::selection::Found;
+use crate::settings::SCAN_LEVEL;
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
@@ -47,9 +50,9 @@ pub(crate) fn alternatives(found: &Found<'_>, findings: &[Finding]) -> Vec<Alter
         .map(|entry| {
             let (id, log_odds) = (entry.scored.choice.id(), entry.scored.log_odds);
             let z = if entry.p_value > 1e-290 { z_of_p(entry.p_value) } else { entry.scored.statistic.sqrt() };
-            let fate = if findings.iter().any(|finding| finding.id == id) {
+            let fate = if findings.iter().any(|finding| *finding.first() == Cause::Effect(id)) {
                 Fate::Found
-            } else if findings.iter().any(|finding| finding.names.iter().any(|name| name == id)) {
+            } else if findings.iter().any(|finding| finding.names(&Cause::Effect(id))) {
                 Fate::NotToldApart
             } else if entry.scored.dimensions == 0 {
                 Fate::NotShown

@@ -3,6 +3,8 @@
 use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
 use model_term::{ModelTerm, TermParameter};
 
+use crate::cause::Cause;
+
 /// A mean term with its shape held.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
@@ -32,6 +34,14 @@ impl Choice {
         }
     }
 
+    /// It as a cause; of a product its term is not known before it is estimated.
+    pub(crate) const fn cause(&self) -> Cause {
+        match self {
+            Self::Effect { id, .. } => Cause::Effect(id),
+            Self::Sparse(_) => Cause::Unknown,
+        }
+    }
+
     /// Whether both are the same effect of the catalogue, perhaps in two of its shapes.
     pub(crate) fn is_shape_of(&self, other: &Self) -> bool {
         matches!((self, other), (Self::Effect { id, .. }, Self::Effect { id: of, .. }) if id == of)
@@ -40,7 +50,7 @@ impl Choice {
     /// Whether it goes by the single rows of the log.
     pub(crate) fn goes_by_rows(&self) -> bool {
         match self {
-            Self::Effect { id, .. } => *id == "interval_error",
+            Self::Effect { id, .. } => effects::description(id).is_some_and(|description| description.goes_by_rows),
             Self::Sparse(sparse) => *sparse == Sparse::of_rows(),
         }
     }

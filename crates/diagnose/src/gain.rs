@@ -7,13 +7,12 @@ use estimation::{Column, EndError, Evidence, JointFit, Model, RIDGE, inverse};
 use model_term::ModelTerm;
 use nalgebra::DVector;
 
+use crate::augmented_model::{Extended, left_out_cost};
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
-use crate::search::{Extended, left_out_cost};
+use crate::settings::LEAST_RUNS;
 use crate::statistics::student_95;
 
-/// Fewer runs say nothing of how runs differ; to be held out, they are cut into blocks.
-pub(crate) const LEAST_RUNS: usize = 6;
 const FOLDS: usize = 6;
 
 /// What one held-out unit scores.

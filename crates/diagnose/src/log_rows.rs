@@ -7,7 +7,7 @@
 use dataset::{Dataset, Odometry, Run, WheelLog};
 use statrs::distribution::{DiscreteCDF, Poisson};
 
-use crate::document::Check;
+use crate::check::{Check, TestResult};
 
 /// An increment that is off by so many ranges of the four around it is astray.
 const ASTRAY: f64 = 20.0;
@@ -20,17 +20,11 @@ const STANDS: f64 = 0.1;
 /// Chance at which a log shows that something is wrong with it.
 const LOG_LEVEL: f64 = 1e-6;
 
-/// The check's name.
-pub(crate) const LOG_ROWS: &str = "log_rows";
-
 /// A log that lasts so many times as long as what was seen of the robot, or so many times less, is of another clock.
 const OTHER_CLOCK: f64 = 30.0;
 
-/// The check's name.
-pub(crate) const LOG_SPANS: &str = "log_spans";
-
 /// Whether the log lasts about as long as what was seen: the middle run's ratio. Looks need not begin and end with the log.
-pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<Check> {
+pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let ratio = |run: &Run| {
         let ends = run.displacements.iter().flat_map(|seen| [seen.t0_s, seen.t1_s]);
         let seen_s = run.truth.iter().map(|look| look.t_s).chain(ends);
@@ -43,7 +37,7 @@ pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<Check> {
     let statistic = *ratios.get(ratios.len() / 2)?;
     let passes = (OTHER_CLOCK.recip()..OTHER_CLOCK).contains(&statistic);
     // No chance makes a clock thirty times as fast.
-    Some(Check { name: LOG_SPANS.to_owned(), statistic, p_value: f64::from(u8::from(passes)), passes })
+    Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
 }
 
 /// How many increments a log has, and how many of them are astray.
@@ -54,7 +48,7 @@ struct Rows {
 }
 
 /// Asks the counts of all runs; robots that report no counts are not asked.
-pub(crate) fn check(datasets: &[Dataset]) -> Option<Check> {
+pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
     let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
         let of = of_run(&run.odometry, run.info.continuous);
         Rows { all: sum.all + of.all, astray: sum.astray + of.astray }
@@ -64,7 +58,7 @@ pub(crate) fn check(datasets: &[Dataset]) -> Option<Check> {
     let p_value = rows.astray.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
     #[allow(clippy::cast_precision_loss)]
     let statistic = rows.astray as f64;
-    Some(Check { name: LOG_ROWS.to_owned(), statistic, p_value, passes: p_value >= LOG_LEVEL })
+    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_LEVEL })
 }
 
 fn of_run(odometry: &Odometry, continuous: bool) -> Rows {

@@ -14,8 +14,8 @@ use kinematics::{Pose, Side, wrap_to_pi};
 use model_term::{Interval, Look, ModelTerm, TermParameter};
 use serde::Serialize;
 
+use crate::augmented_model::Extended;
 use crate::candidate::terms;
-use crate::search::Extended;
 use crate::statistics::p_of_chi_square;
 
 /// Bins of a covariate that varies continuously.
@@ -129,7 +129,7 @@ const PLAIN: [(&str, &str, &str, bool, f64); 13] = [
 fn covariates(fit: &JointFit<'_>) -> Vec<Covariate> {
     let plain =
         PLAIN.map(|(key, label, unit, round, least)| Covariate { key: key.to_owned(), label, unit, round, least });
-    let of_runs = crate::checks::of_runs(fit).into_iter().map(|covariate| Covariate {
+    let of_runs = crate::covariates::of_runs(fit).into_iter().map(|covariate| Covariate {
         key: format!("covariate_{}", covariate.name()),
         label: "",
         unit: "",

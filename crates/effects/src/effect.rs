@@ -2,6 +2,7 @@
 
 use kinematics::DriveGeometry;
 
+use crate::description::Description;
 use crate::forward::Forward;
 use crate::hypothesis::Hypothesis;
 
@@ -96,6 +97,11 @@ pub trait PhysicalEffect {
 
     /// The hypothesis face: how recorded data would show the effect, of whatever size.
     fn hypothesis() -> Hypothesis
+    where
+        Self: Sized;
+
+    /// What is known of the effect beside its two faces.
+    fn description() -> Description
     where
         Self: Sized;
 

@@ -4,20 +4,29 @@
 //! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
 //! The *hypothesis* face ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
 //!
-//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the catalogue and the laws follow. What has no name there
-//! is simulated as a [`SparseTerm`].
+//! What everything else must know of an effect, from its meaning to how the blind benchmark draws it, stands in
+//! its [`Description`]: nothing outside of this crate writes an id.
+//!
+//! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the
+//! catalogue and the laws follow. What has no name there is simulated as a [`SparseTerm`].
 
 mod beat;
+mod benchmark;
 mod covariate;
+mod description;
 mod effect;
+mod estimates;
 mod forward;
 mod hypothesis;
 mod memory;
 mod stream;
 mod term;
 
+pub use benchmark::{AtScale, Benchmark, FormOf, HostRobot, NamedSize, Needs, OtherForm, SizeLaw, Sizes};
 pub use covariate::{Channel, Covariate};
+pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
 pub use effect::{EffectError, PhysicalEffect};
+pub use estimates::{Estimate, Estimates};
 pub use forward::{Command, Forward, Hooks, Readout, RunStart, SampleClock, Sighting, Step};
 pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
 pub use stream::{Address, Stream, StreamName};
@@ -101,6 +110,15 @@ macro_rules! contents {
         pub fn hypothesis(id: &str) -> Option<Hypothesis> {
             match id {
                 $(stringify!($module) => Some(<$Type as PhysicalEffect>::hypothesis()),)*
+                _ => None,
+            }
+        }
+
+        /// What is known of an effect beside its two faces, by its id; `None` for an unknown id.
+        #[must_use]
+        pub fn description(id: &str) -> Option<Description> {
+            match id {
+                $(stringify!($module) => Some(<$Type as PhysicalEffect>::description()),)*
                 _ => None,
             }
         }

@@ -214,6 +214,22 @@ impl Stream {
     pub fn uniform_about_zero(&mut self, half_width: f64) -> f64 {
         half_width * (2.0 * self.uniform() - 1.0)
     }
+
+    /// A draw uniform in [low, high).
+    pub fn uniform_in(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    /// A draw uniform in its logarithm, in [low, high).
+    pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
+        (self.uniform_in(low.ln(), high.ln())).exp()
+    }
+
+    /// A whole number below `n`, each as likely.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // small and positive
+    pub fn below(&mut self, n: usize) -> usize {
+        ((self.uniform() * n as f64) as usize).min(n.saturating_sub(1))
+    }
 }
 
 /// A normal draw from its beginning, and the generator after it: by value, so that the common case keeps its generator in registers.

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
 use crate::covariate::{Channel, Covariate, Moment};
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
 use crate::hypothesis::{Hypothesis, Shape};
@@ -218,6 +219,10 @@ impl PhysicalEffect for SparseTerm {
     /// A mean term; of which form, an instance says.
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Vec::new())
+    }
+
+    fn description() -> Description {
+        Description::of("a product of covariates that no effect of the catalogue has")
     }
 }
 

@@ -5,12 +5,10 @@ use std::sync::Arc;
 use kinematics::{Pose, Twist, wrap_to_pi};
 use model_term::ModelTerm;
 
-use crate::covariances::Covariances;
 use crate::decimation::Coarse;
 use crate::error::EstimationError;
 use crate::filter::{Gate, Want};
-use crate::model::Instrument;
-use crate::model::Model;
+use crate::model::{Instrument, Model};
 use crate::model_fit::JointFit;
 use crate::noise::{LEAST_SIGMA, NoiseComponent};
 use crate::normal_equations::Evidence;
@@ -18,7 +16,6 @@ use crate::optimizer::Fit;
 use crate::pass::pass;
 use crate::propagation::{Propagator, Trail};
 use crate::records::{Chain, Seen};
-use crate::thinning::Leg;
 use crate::wheel_angles::Piece;
 
 /// How far off dead reckoning ends.
@@ -157,7 +154,7 @@ impl JointFit<'_> {
                     piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| propagator.twist(piece));
                 propagator.sight(body, 0, t_s, Twist { v_m_s, omega_rad_s });
                 let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
-                add(weighed(&propagator.gradients, &model.sizes), late)
+                add(propagator.from_terms(), late)
             };
             // Where the drive's centre stands at the first look, to first order in what the terms add to it.
             let mounted = start * body_from_sensor.inverse();
@@ -165,8 +162,7 @@ impl JointFit<'_> {
             let mut pose = mounted * off.inverse();
             let (start_m, mut at) = (propagator.session_m(), first.1);
             for look in looks(chain) {
-                let leg = Leg { pieces: at..look.after, from: 0, look: 0, noise: Covariances::ZERO };
-                pose = pose * propagator.moved(pose, 0, &leg).motion;
+                pose = propagator.dead_reckon(pose, at..look.after);
                 at = look.after;
                 let Some(theta_rad) = look.theta_rad else { continue };
                 let off = seen_from(&mut propagator, look.t_s, pose, chain.pieces[..at].last());
@@ -189,14 +185,4 @@ impl JointFit<'_> {
 
 fn add(a: Pose, b: Pose) -> Pose {
     Pose::new(a.x_m + b.x_m, a.y_m + b.y_m, a.theta_rad + b.theta_rad)
-}
-
-fn weighed(gradient: &[Pose], sizes: &[f64]) -> Pose {
-    gradient.iter().zip(sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
-        Pose::new(
-            sum.x_m + size * gradient.x_m,
-            sum.y_m + size * gradient.y_m,
-            sum.theta_rad + size * gradient.theta_rad,
-        )
-    })
 }

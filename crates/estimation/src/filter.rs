@@ -9,8 +9,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
-use crate::model::Instrument;
-use crate::model::{Column, Model};
+use crate::model::{Column, Instrument, Model};
 use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
 use crate::propagation::{Kept, KeptLegs, Legs, Moved, Propagator, Trail};

@@ -5,8 +5,7 @@ use nalgebra::DVector;
 
 use crate::error::EstimationError;
 use crate::filter::Gate;
-use crate::model::Column;
-use crate::model::{Apart, Instrument, Own};
+use crate::model::{Apart, Column, Instrument, Own};
 use crate::model_fit::{FOLDS, JointFit, LEAST_RUNS};
 use crate::normal_equations::{Evidence, total};
 use crate::optimizer::Fit;

@@ -14,8 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
 use crate::maximum_likelihood::FitSettings;
-use crate::model::{Apart, Instrument};
-use crate::model::{Column, Model};
+use crate::model::{Apart, Column, Instrument, Model};
 use crate::model_fit::{JointFit, unseen};
 use crate::normal_equations::{Evidence, total};
 use crate::optimizer::{Ends, pass_settled};

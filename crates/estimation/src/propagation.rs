@@ -4,6 +4,8 @@
 //! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
 //! kept legs; where they end is settled by legs that are driven.
 
+use std::ops::Range;
+
 use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative};
 use model_term::{Interval, Look, ModelTerm};
 use nalgebra::Vector3;
@@ -301,6 +303,34 @@ impl<'f, 'a> Propagator<'f, 'a> {
         let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
         self.leg_by_terms.turn(end);
         moved
+    }
+
+    /// The pose of the drive's centre after some pieces, by exact arcs of what counts and terms say together; without derivatives.
+    pub(crate) fn dead_reckon(&mut self, mut pose: Pose, pieces: Range<usize>) -> Pose {
+        let Model { m_per_rad, separation_m, .. } = *self.model;
+        for piece in &self.chain.pieces[pieces] {
+            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+            let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
+            self.term_gradients(piece, travel_m, self.run_from_chain * pose);
+            let Pose { x_m, y_m, theta_rad } = self.from_terms();
+            let arc = Increment { distance_m: distance_m + x_m, turn_rad: turn_rad + theta_rad }.arc();
+            pose = pose * arc * Pose::new(0.0, y_m, 0.0);
+            self.session_m += distance_m.abs();
+            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
+            self.previous = Some(*piece);
+        }
+        pose
+    }
+
+    /// What the terms last said, at their parameters' values.
+    pub(crate) fn from_terms(&self) -> Pose {
+        self.gradients.iter().zip(&self.model.sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
+            Pose::new(
+                sum.x_m + size * gradient.x_m,
+                sum.y_m + size * gradient.y_m,
+                sum.theta_rad + size * gradient.theta_rad,
+            )
+        })
     }
 
     #[inline(always)]

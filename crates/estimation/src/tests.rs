@@ -10,8 +10,7 @@ use crate::decimation::Coarse;
 use crate::filter::{Gate, Want};
 use crate::normal_equations::total;
 use crate::pass::{LEGS_AT_ONCE, pass};
-use crate::{Column, Model, Noise, Pass, Records, Selection, Thinning};
-use crate::{FitSettings, JointFit};
+use crate::{Column, FitSettings, JointFit, Model, Noise, Pass, Records, Selection, Thinning};
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
 const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];

@@ -36,7 +36,7 @@ pub fn noise_free_umbmark(base: &Scenario, form: Form) -> Result<(Wheels<f64>, f
     scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     scenario.noise.sensitivity_sigma = 0.0;
     scenario.instruments = vec![Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 0.0 }];
-    scenario.effects.retain(|effect| matches!(effect.id(), "wheel_scale" | "wheel_mismatch" | "wheelbase"));
+    scenario.effects.retain(|effect| matches!(effect.hypothesis(), Some(effects::Hypothesis::Geometry)));
     scenario.protocols = vec![Schedule::Squares { side_m: 4.0, runs_each_way: 1 }];
     let measured = sim_yair::simulate(&scenario, scenario.seed, 0)?.dataset;
     let nominal_m = scenario.robot.wheel_diameter_m();

@@ -7,7 +7,6 @@
 
 use calib::methods::direct::{Direct, RunValue};
 use dataset::{Protocol, ProtocolSettings};
-use effects::Effect;
 use kinematics::{Side, Wheels};
 use motion_programs::{Motion, MotionProgram};
 use nalgebra::{DMatrix, DVector};
@@ -111,7 +110,8 @@ fn scenario(base: &Scenario, hypothesis: Hypothesis, reading_sigma_m: f64, sensi
     scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     scenario.noise.sensitivity_sigma = sensitivity_sigma;
     if hypothesis == Hypothesis::Wheels {
-        scenario.effects.retain(|effect| !matches!(effect, Effect::Quantization(_)));
+        // Wheels alone: nothing is rounded.
+        scenario.effects.retain(|effect| !matches!(effect.hypothesis(), Some(effects::Hypothesis::Silent)));
         scenario.instruments = vec![Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 0.0 }];
     } else {
         scenario.instruments = vec![Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }];

@@ -3,18 +3,17 @@
 //! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
 //! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
 
-use estimation::JointFit;
-use estimation::{Column, EndError, Evidence, Model};
+use estimation::{Column, EndError, Evidence, JointFit, Model};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use super::library::{Looks, foreseen_run, of_runs, phase_rad};
-use super::setting::Setting;
-use super::weigh::Rivals;
-use super::{Part, words};
+use super::constraints::Setting;
+use super::manoeuvres::{Looks, Part, Where, foreseen_run, of_runs, phase_rad};
+use super::rival_odds::Rivals;
+use super::text;
+use crate::augmented_model::Extended;
 use crate::candidate::{Choice, terms};
 use crate::document::{Predicted, Value};
-use crate::search::Extended;
 
 /// Instants of a run at which a prediction is made: shares of its duration.
 const INSTANTS: usize = 12;
@@ -29,16 +28,6 @@ struct Seen {
     mean: Vector3<f64>,
     known_var: Vector3<f64>,
     noise_var: Vector3<f64>,
-}
-
-/// Where to look.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Where {
-    pub(super) direction: usize,
-    /// Share of the run's duration.
-    pub(super) share: f64,
-    /// 0 along, 1 across, 2 heading.
-    pub(super) component: usize,
 }
 
 /// A sentence of what is predicted, and the prediction of each name.
@@ -91,12 +80,12 @@ pub(super) fn predictions(
         (candidate.choice.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
     });
     let predicted = Predicted {
-        direction: words::direction(&part.manoeuvre.schedule, at.direction).to_owned(),
+        direction: text::direction(&part.manoeuvre.schedule, at.direction).to_owned(),
         share_of_duration: at.share,
         component: ["along", "across", "heading"][at.component].to_owned(),
         values: values.collect(),
     };
-    let mut sentence = words::where_to_look(&part, &at);
+    let mut sentence = text::where_to_look(&part, &at);
     if sigmas < SHOWS {
         sentence.push_str(" No single look tells them apart: all looks of the runs together do.");
     }

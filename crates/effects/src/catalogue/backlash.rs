@@ -9,10 +9,15 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, SizeLaw};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::stream::Stream;
+
+/// What it is, in one line.
+const MEANING: &str = "there is play between encoder and wheel";
 
 /// Gaps that are tried, metres at the tread.
 const WIDTH_M: [f64; 3] = [0.5e-3, 1.0e-3, 2.0e-3];
@@ -41,6 +46,30 @@ impl PhysicalEffect for Backlash {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::over("width_m", &WIDTH_M, |width_m| Term { width_m, lead: Wheels::both(0.0) }))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let [left, right] = ["left_gap_m", "right_gap_m"].map(|name| sizes.shown(name, 1e3, "mm"));
+                format!("{MEANING}: {left} on the left, {right} on the right")
+            }),
+            benchmark: Benchmark {
+                // No width is held: the gaps themselves are the sizes.
+                sizes: SizeLaw::Direction { held: |_, _, _| Vec::new(), positive: true },
+                // Where in its gap a wheel was left.
+                has_random_signature: true,
+                ..Benchmark::OF_MEAN.with_form(
+                    "play with a spring in it: the lead reaches its limit over the width of the gap",
+                    |sizes, _| {
+                        let half_gap_m = |name| 0.5 * size(sizes, name).unwrap_or(0.0);
+                        let half_gap_m = Wheels { left: half_gap_m("left_gap_m"), right: half_gap_m("right_gap_m") };
+                        Box::new(SpringyPlay { half_gap_m, lead_m: Wheels::default() })
+                    },
+                )
+            },
+            ..Description::of(MEANING)
+        }
     }
 
     /// A wheel whose gap was found negative has none.
@@ -109,6 +138,37 @@ impl ModelTerm for Term {
             let mut lost = Wheels::both(0.0);
             lost[side] = before - self.lead[side];
             *gradient = interval.change(lost);
+        }
+    }
+}
+
+/// The other form: play with a spring in it, whose lead reaches its limit over the width of the gap instead of
+/// at once.
+struct SpringyPlay {
+    half_gap_m: Wheels<f64>,
+    lead_m: Wheels<f64>,
+}
+
+impl Forward for SpringyPlay {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, wheel: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, _stream: Stream) {
+        self.lead_m = Wheels::default();
+    }
+
+    fn wheel(&mut self, step: &mut Step) {
+        for side in Side::BOTH {
+            let half_gap_m = self.half_gap_m[side];
+            if half_gap_m <= 0.0 {
+                continue;
+            }
+            let rolled_m = step.wheel_rad[side] * step.nominal_radius_m[side];
+            let gained_m =
+                (half_gap_m * rolled_m.signum() - self.lead_m[side]) * -(-rolled_m.abs() / half_gap_m).exp_m1();
+            self.lead_m[side] += gained_m;
+            step.wheel_rad[side] -= gained_m / step.nominal_radius_m[side];
         }
     }
 }

@@ -7,10 +7,18 @@
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::Effect;
+use crate::benchmark::Benchmark;
+use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Sign, size};
 use crate::stream::Stream;
+
+/// Height of a bump of scale 1 in the blind benchmark, metres.
+const LARGE_HEIGHT_M: f64 = 3e-3;
+/// Scales of the distance that a wheel loses over a bump, metres: from what no instrument shows to a sill.
+const LOST_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 
 /// Bumps on the floor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,6 +41,23 @@ impl PhysicalEffect for Bumps {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::HeadingJumps])
+    }
+
+    fn description() -> Description {
+        Description {
+            isolated_error: Some(IsolatedError::LostOnTheWay { scales_m: &LOST_M }),
+            benchmark: Benchmark {
+                // What a bump costs grows with the power 3/2 of its height.
+                at_scale: Some(|sizes, scale, _| {
+                    let height_m = LARGE_HEIGHT_M * scale.powf(2.0 / 3.0);
+                    Some(Effect::Bumps(Self { per_m: size(sizes, "per_m")?, height_m }))
+                }),
+                ..Benchmark::of_scatter(|_, stream| {
+                    (vec![("height_m", LARGE_HEIGHT_M)], vec![("per_m", stream.log_uniform(0.1, 1.0))])
+                })
+            },
+            ..Description::of("a wheel drives over cables, sills or crumbs")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

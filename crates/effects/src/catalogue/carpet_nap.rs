@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sin_cos, sinc};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, in_room, size};
@@ -39,6 +40,13 @@ impl PhysicalEffect for CarpetNap {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            ..Description::of("the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

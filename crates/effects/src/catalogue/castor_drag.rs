@@ -9,9 +9,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the castor resists rolling aside";
 
 /// Places of the castor that are tried, metres behind the axle.
 const CASTOR_BEHIND_M: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
@@ -40,6 +45,17 @@ impl PhysicalEffect for CastorDrag {
         Hypothesis::Terms(Shape::along("castor_behind_m", &CASTOR_BEHIND_M, |castor_behind_m| {
             Box::new(Term { castor_behind_m })
         }))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let lost = sizes.shown("drag_rad_m", 1e3, "mrad");
+                format!("{MEANING}: {lost} of turn lost for each metre that it rolls so")
+            }),
+            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("castor_behind_m", stream.uniform_in(0.1, 0.4))]),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -10,11 +10,16 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::memory::{LastSide, Reversals, TURN_RAD};
 use crate::stream::Stream;
+
+/// What it is, in one line.
+const MEANING: &str = "the castor swings round after a reversal and turns the robot";
 
 /// Ways that are tried for a flip, metres: 2 to 4 trails of 15 to 60 mm.
 const DECAY_M: [f64; 4] = [0.03, 0.06, 0.12, 0.24];
@@ -41,6 +46,21 @@ impl PhysicalEffect for CastorKick {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::along("decay_m", &DECAY_M, |decay_m| Box::new(Term::new(decay_m))))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| format!("{MEANING} by {}", sizes.shown("kick_rad", 1e3, "mrad"))),
+            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("decay_m", stream.log_uniform(0.02, 0.2))]).with_form(
+                "a castor by its differential equation, which turns the robot as it flips",
+                |sizes, _| {
+                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                    let (gain, trail_m) = (of("kick_rad") / std::f64::consts::PI, 0.5 * of("decay_m"));
+                    Box::new(RollingCastor { gain, trail_m, psi_rad: 0.0 })
+                },
+            ),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -118,6 +138,41 @@ impl ModelTerm for Term {
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let increment = interval.increment();
         gradient[0].theta_rad = self.flips.after(increment.distance_m, increment.turn_rad, self.decay_m);
+    }
+}
+
+/// The other form, a castor by its differential equation: it trails at 0, stands on its head at π, and turns the
+/// robot as it flips.
+struct RollingCastor {
+    /// Turn of the robot over the castor's.
+    gain: f64,
+    trail_m: f64,
+    psi_rad: f64,
+}
+
+/// How far behind the axle that castor is, metres.
+const CASTOR_BEHIND_M: f64 = 0.15;
+
+impl Forward for RollingCastor {
+    fn hooks(&self) -> Hooks {
+        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+    }
+
+    fn start_run(&mut self, _stream: Stream) {
+        self.psi_rad = 0.0;
+    }
+
+    /// A turn of the robot leaves the castor's direction in the room where it was; rolling takes it behind.
+    fn floor(&mut self, step: &mut Step) {
+        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
+        let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
+        let before_rad = self.psi_rad;
+        let aside_m = CASTOR_BEHIND_M * turn_rad;
+        self.psi_rad -= turn_rad + (aside_m * before_rad.cos() + way_m * before_rad.sin()) / self.trail_m;
+        // Only a flip drags the tail: rolling on behind the robot does not.
+        if way_m * before_rad.cos() < 0.0 {
+            step.extra_turn_rad += self.gain * (before_rad - self.psi_rad);
+        }
     }
 }
 

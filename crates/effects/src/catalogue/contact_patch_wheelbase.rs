@@ -7,6 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Sign, size};
@@ -51,6 +53,13 @@ impl PhysicalEffect for ContactPatchWheelbase {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::ScatterWithTurn])
+    }
+
+    fn description() -> Description {
+        Description {
+            benchmark: Benchmark::of_scatter(|_, _| (vec![("sigma_m", 3e-3)], vec![])),
+            ..Description::of("the distance between the contacts varies from motion to motion")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -6,6 +6,8 @@
 use dataset::{Dataset, WheelLog, suspected_wrap};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, rewrite_wheels, size};
@@ -30,6 +32,13 @@ impl PhysicalEffect for CounterWrap {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            benchmark: Benchmark::of_fault(|_, _| vec![("bits", 16.0)]),
+            ..Description::of("the log keeps only the low bits of the counters")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,9 +8,13 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "forward and backward metres count differently";
 
 /// Asymmetry of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,6 +42,16 @@ impl PhysicalEffect for DirectionAsymmetry {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let [left, right] = ["left_asymmetry", "right_asymmetry"].map(|name| sizes.shown(name, 100.0, "%"));
+                format!("{MEANING}: by {left} on the left wheel, {right} on the right")
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,6 +8,8 @@ use dataset::{Dataset, Odometry, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, median, size};
@@ -34,6 +36,14 @@ impl PhysicalEffect for DroppedSamples {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            record_fault: RecordFault { is_restored_roughly: true, ..RecordFault::WITH_A_TRACE },
+            benchmark: Benchmark::of_fault(|_, stream| vec![("probability", stream.uniform_in(0.01, 0.05))]),
+            ..Description::of("rows are missing, and with them what the wheels did meanwhile")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
@@ -60,6 +61,17 @@ impl PhysicalEffect for EncoderCycle {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::over("cycles", &CYCLES, |cycles| Term { cycles, last: Wheels::both(LastAngle::NONE) }))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let cycles = sizes.value("cycles").map_or_else(|| "some".to_owned(), |cycles| format!("{cycles:.0}"));
+                let off = sizes.amplitudes("_rad", 1e3, "mrad", "encoder is off");
+                format!("an encoder errs {cycles} times a turn: {off}")
+            }),
+            ..Description::of("an encoder errs several times a turn")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

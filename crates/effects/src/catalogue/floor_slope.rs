@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, in_room, size};
@@ -40,6 +41,13 @@ impl PhysicalEffect for FloorSlope {
     fn hypothesis() -> Hypothesis {
         let by = |way| Shape { held: Vec::new(), term: Box::new(Term { way }), at: None };
         Hypothesis::Terms(vec![by(false), by(true)])
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            ..Description::of("the floor slopes: the robot creeps in one direction of the room, whatever its heading")
+        }
     }
 
     /// Creep with time or with the way, by which of them is named.

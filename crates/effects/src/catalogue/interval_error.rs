@@ -12,6 +12,9 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::Effect;
+use crate::benchmark::{Benchmark, Needs};
+use crate::description::{Description, Excitation, Told};
 use crate::beat::Beat;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
@@ -46,6 +49,25 @@ impl PhysicalEffect for IntervalError {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term::default()))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            excitation: Excitation::Conditions("log at intervals that differ"),
+            goes_by_rows: true,
+            benchmark: Benchmark {
+                needs: Needs { jitter: true, ..Needs::NONE },
+                // A share of one is all there is.
+                max_scale: 1.0,
+                harmless: Some(|robot| {
+                    let none = Self { share: 0.0, jitter_s: robot.jitter_s };
+                    (robot.jitter_s > 0.0).then_some(Effect::IntervalError(none))
+                }),
+                ..Benchmark::of_mean_at(|_, robot, _| vec![("jitter_s", robot.jitter_s)])
+            },
+            ..Description::of("the logged intervals are not the true ones")
+        }
     }
 
     /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.

@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sinc};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, FloorForm, contact_twist};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the robot slides outwards in bends";
 
 /// Sideways motion in bends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,25 @@ impl PhysicalEffect for LateralSkid {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("{MEANING}, by {} times speed times yaw rate", sizes.shown("skid_s", 1e3, "ms"))
+            }),
+            // Pacejka 2012: the side force of a tyre saturates with its slip angle.
+            benchmark: Benchmark::OF_MEAN.with_form("skid that saturates with the centripetal acceleration", |sizes, _| {
+                let (skid_s, knee_m_s2) = (size(sizes, "skid_s").unwrap_or(0.0), 0.3);
+                FloorForm::boxed(move |step| {
+                    let (v_m_s, omega_rad_s) = contact_twist(step);
+                    let centripetal_m_s2 = v_m_s * omega_rad_s;
+                    step.lateral_m -=
+                        skid_s * centripetal_m_s2 / (1.0 + centripetal_m_s2.abs() / knee_m_s2) * step.dt_s;
+                })
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     /// A robot slides out of its bend: found negative it is something else.

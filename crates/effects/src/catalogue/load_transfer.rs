@@ -8,9 +8,13 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "in bends the outer tyre is pressed flatter";
 
 /// Compression of the tyres by side force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,6 +35,16 @@ impl PhysicalEffect for LoadTransfer {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let differ = sizes.shown("compression_s2_m", 100.0, "%");
+                format!("{MEANING}: radii differ by {differ} for each m/s² of side acceleration, each way")
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     /// The tyre that carries more is pressed flatter: found negative it is something else.

@@ -10,10 +10,15 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
 use crate::stream::Stream;
+
+/// What it is, in one line.
+const MEANING: &str = "fractions of counts are thrown away step by step";
 
 /// Fractions thrown away.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,6 +46,20 @@ impl PhysicalEffect for LowSpeedTruncation {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("{MEANING}: {} of speed lost", sizes.shown("loss_m_s", 1e3, "mm/s"))
+            }),
+            benchmark: Benchmark {
+                // Which fraction of a count was lost.
+                has_random_signature: true,
+                ..Benchmark::of_mean_at(|_, _, stream| vec![("cycle_s", stream.log_uniform(0.005, 0.05))])
+            },
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

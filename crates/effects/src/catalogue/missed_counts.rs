@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, SizeLaw};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "counts are lost at high speed";
 
 /// Hinge speeds that are tried, m/s: indoor robots.
 const HINGE_M_S: [f64; 6] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.6];
@@ -46,6 +51,34 @@ impl PhysicalEffect for MissedCounts {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::along("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Box::new(Term { hinge_m_s })))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let [left, right] = ["left_lost_share", "right_lost_share"].map(|name| sizes.shown(name, 100.0, "%"));
+                let hinge = sizes.value("hinge_speed_m_s");
+                let hinge = hinge.map_or_else(|| "some speed".to_owned(), |hinge| format!("{hinge:.2} m/s"));
+                format!("{MEANING}: {left} on the left, {right} on the right above {hinge}")
+            }),
+            benchmark: Benchmark {
+                sizes: SizeLaw::Direction {
+                    held: |_, robot, stream| {
+                        vec![("hinge_speed_m_s", stream.uniform_in(0.3, 0.8) * robot.cruise_speed_m_s)]
+                    },
+                    positive: true,
+                },
+                ..Benchmark::OF_MEAN.with_form("a hinge that is round over a tenth of the cruise speed", |sizes, robot| {
+                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                    Box::new(RoundHinge {
+                        lost_share: Wheels { left: of("left_lost_share"), right: of("right_lost_share") },
+                        hinge_m_s: of("hinge_speed_m_s"),
+                        width_m_s: 0.1 * robot.cruise_speed_m_s,
+                    })
+                })
+            },
+            ..Description::of(MEANING)
+        }
     }
 
     /// A counter whose lost share was found negative loses none.
@@ -107,6 +140,30 @@ impl ModelTerm for Term {
         });
         gradient[0] = interval.change(Wheels { left: above_m.left, right: 0.0 });
         gradient[1] = interval.change(Wheels { left: 0.0, right: above_m.right });
+    }
+}
+
+/// The other form: counts lost above a hinge that is round.
+struct RoundHinge {
+    lost_share: Wheels<f64>,
+    hinge_m_s: f64,
+    width_m_s: f64,
+}
+
+impl Forward for RoundHinge {
+    fn hooks(&self) -> Hooks {
+        Hooks { encoder: true, ..Hooks::NONE }
+    }
+
+    fn encoder(&mut self, step: &mut Step) {
+        let speed_m_s = step.contact_speed_m_s();
+        for side in Side::BOTH {
+            let v = speed_m_s[side].abs();
+            if v > 0.0 {
+                let over_m_s = self.width_m_s * ((v - self.hinge_m_s) / self.width_m_s).exp().ln_1p();
+                step.encoder_rad[side] *= 1.0 - self.lost_share[side] * over_m_s / v;
+            }
+        }
     }
 }
 

@@ -9,6 +9,9 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::Effect;
+use crate::benchmark::{Benchmark, Needs};
+use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
@@ -54,6 +57,27 @@ impl PhysicalEffect for PayloadCompression {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            excitation: Excitation::Conditions("drive the same runs with another payload, its covariate stated"),
+            benchmark: Benchmark {
+                needs: Needs { payload: true, ..Needs::NONE },
+                at_scale: Some(|sizes, _, robot| {
+                    let unloaded = Self::of_sizes(sizes)?;
+                    Some(Effect::PayloadCompression(Self { payload_kg: robot.payload_kg.clone(), ..unloaded }))
+                }),
+                harmless: Some(|robot| {
+                    let payload_kg = robot.payload_kg.clone();
+                    let none = Self { common_per_kg: 0.0, mismatch_per_kg: 0.0, payload_kg };
+                    (!none.payload_kg.is_empty()).then_some(Effect::PayloadCompression(none))
+                }),
+                ..Benchmark::OF_MEAN
+            },
+            ..Description::of("the payload presses the tyres flatter")
+        }
     }
 
     /// Unloaded: what the runs carry is the experiment's.

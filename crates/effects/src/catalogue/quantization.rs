@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, size};
@@ -30,6 +31,10 @@ impl PhysicalEffect for Quantization {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Silent
+    }
+
+    fn description() -> Description {
+        Description::of("the log keeps whole ticks of several counts each")
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,6 +8,8 @@ use dataset::{Dataset, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
@@ -35,6 +37,16 @@ impl PhysicalEffect for ReversedWheel {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            record_fault: RecordFault { leaves_a_trace: false, ..RecordFault::WITH_A_TRACE },
+            benchmark: Benchmark::of_fault(|faulty, _| {
+                vec![("left", f64::from(u8::from(faulty.left))), ("right", f64::from(u8::from(faulty.right)))]
+            }),
+            ..Description::of("a counter counts down when its wheel rolls forward")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Shape, size};
@@ -31,6 +32,15 @@ impl PhysicalEffect for SamplingSkew {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("the right counter is read {} after the left one", sizes.shown("right_delay_s", 1e3, "ms"))
+            }),
+            ..Description::of("the right counter is read later than the left one")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

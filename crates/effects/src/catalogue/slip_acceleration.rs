@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, FloorForm};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the ground speed lags behind the wheels'";
 
 /// Slip in proportion to acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,21 @@ impl PhysicalEffect for SlipAcceleration {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| format!("{MEANING} by {}", sizes.shown("kappa_s", 1e3, "ms"))),
+            benchmark: Benchmark::OF_MEAN.with_form("slip that saturates, as tanh of the acceleration", |sizes, robot| {
+                let (kappa_s, knee_m_s2) = (size(sizes, "kappa_s").unwrap_or(0.0), 0.7 * robot.acceleration_m_s2);
+                FloorForm::boxed(move |step| {
+                    let acceleration = step.contact_acceleration_m_s2();
+                    let lost_m = |a: f64| kappa_s * knee_m_s2 * (a / knee_m_s2).tanh() * step.dt_s;
+                    step.travel_m = step.travel_m.zip_with(acceleration, |travel_m, a| travel_m - lost_m(a));
+                })
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     /// The ground lags behind the wheel, and does not lead: found negative it is something else.

@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, FloorForm};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the wheels lose distance in proportion to their speed";
 
 /// Slip in proportion to speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,24 @@ impl PhysicalEffect for SlipSpeed {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("{MEANING}: {} of it for each m/s", sizes.shown("slip_s_m", 100.0, "%"))
+            }),
+            // Pacejka 2012: the force of a tyre saturates with its slip.
+            benchmark: Benchmark::OF_MEAN.with_form("the share lost saturates, as tanh of the speed", |sizes, robot| {
+                let (lost, knee_m_s) = (size(sizes, "slip_s_m").unwrap_or(0.0), 0.7 * robot.cruise_speed_m_s);
+                FloorForm::boxed(move |step| {
+                    let speed_m_s = step.contact_speed_m_s();
+                    let share = |v: f64| 1.0 - lost * knee_m_s * (v.abs() / knee_m_s).tanh();
+                    step.travel_m = step.travel_m.zip_with(speed_m_s, |travel_m, v| travel_m * share(v));
+                })
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     /// Contacts slip back, not ahead: found negative it is something else.

@@ -11,10 +11,15 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, Sign, size};
 use crate::stream::Stream;
+
+/// Scales of the distance by which a contact winds up, metres: from what no instrument shows to a sill.
+const WIND_UPS_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 
 /// Sticking contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +51,16 @@ impl PhysicalEffect for StickSlip {
         let terms =
             Shape::along("stick_speed_m_s", &STICK_SPEEDS_M_S, |stick_speed_m_s| Box::new(Term::new(stick_speed_m_s)));
         Hypothesis::TermsAndScatter(terms, &[Sign::TailsAtLowSpeed])
+    }
+
+    fn description() -> Description {
+        Description {
+            isolated_error: Some(IsolatedError::WoundUp { scales_m: &WIND_UPS_M }),
+            benchmark: Benchmark::of_scatter(|robot, _| {
+                (vec![("breakaway_m", 1e-3)], vec![("stick_speed_m_s", 0.5 * robot.cruise_speed_m_s)])
+            }),
+            ..Description::of("at a creep a wheel winds up before its contact lets go")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -7,6 +7,8 @@ use dataset::{Dataset, WheelLog};
 use kinematics::{Twist, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
@@ -30,6 +32,14 @@ impl PhysicalEffect for SwappedWheels {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            record_fault: RecordFault { leaves_a_trace: false, ..RecordFault::WITH_A_TRACE },
+            benchmark: Benchmark::of_fault(|_, _| vec![("swapped", 1.0)]),
+            ..Description::of("the left and the right counter are exchanged")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the scale drifts with the time of the session";
 
 /// Time constants that are tried, seconds: tyres take from minutes to an hour.
 const TAU_S: [f64; 5] = [150.0, 300.0, 600.0, 1200.0, 3600.0];
@@ -39,6 +44,23 @@ impl PhysicalEffect for ThermalDrift {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::along("tau_s", &TAU_S, |tau_s| Box::new(Term { tau_s })))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("{MEANING}, by {} in the end", sizes.shown("growth", 100.0, "%"))
+            }),
+            excitation: Excitation::Conditions("drive the same runs cold and an hour later"),
+            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("tau_s", stream.log_uniform(60.0, 1000.0))]).with_form(
+                "wheels that warm up hyperbolically: t/(t + τ) for 1 − e^{−t/τ}",
+                |sizes, _| {
+                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                    Box::new(Warming { growth: of("growth"), tau_s: of("tau_s"), session_s: 0.0 })
+                },
+            ),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -91,6 +113,29 @@ impl ModelTerm for Term {
         let warm = 1.0 - (-middle_s / self.tau_s).exp();
         let Wheels { left, right } = interval.travel_m;
         gradient[0] = interval.change(Wheels { left: warm * left, right: warm * right });
+    }
+}
+
+/// The other form: wheels that warm up hyperbolically, t/(t + τ) for 1 − e^{−t/τ}.
+struct Warming {
+    growth: f64,
+    tau_s: f64,
+    session_s: f64,
+}
+
+impl Forward for Warming {
+    fn hooks(&self) -> Hooks {
+        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+    }
+
+    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+        self.session_s = run.session_s;
+    }
+
+    fn wheel(&mut self, step: &mut Step) {
+        let t_s = self.session_s + step.t_s;
+        let factor = 1.0 + self.growth * t_s / (t_s + self.tau_s);
+        step.radius_m = step.radius_m.map(|radius_m| radius_m * factor);
     }
 }
 

@@ -7,6 +7,8 @@
 use dataset::{Dataset, Odometry, Run, WheelLog};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Rewriting, median, size};
@@ -36,6 +38,13 @@ impl PhysicalEffect for TimeUnit {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            benchmark: Benchmark::of_fault(|_, stream| vec![("factor", [1e3, 1e6][stream.below(2)])]),
+            ..Description::of("times are written in another unit than seconds")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

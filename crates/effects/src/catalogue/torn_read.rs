@@ -8,6 +8,8 @@ use dataset::{Dataset, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, median, size};
@@ -40,6 +42,15 @@ impl PhysicalEffect for TornRead {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            benchmark: Benchmark::of_fault(|_, stream| {
+                vec![("probability", stream.uniform_in(0.005, 0.02)), ("jump_counts", [256.0, 65_536.0][stream.below(2)])]
+            }),
+            ..Description::of("a count of several bytes is read while it changes")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

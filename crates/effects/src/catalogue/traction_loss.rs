@@ -11,9 +11,16 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::Effect;
+use crate::benchmark::Benchmark;
+use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, Sign, size};
+
+/// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it
+/// should, to one that holds nearly nothing.
+const SLIDES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 
 /// Standard gravity, m/s² (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -55,6 +62,29 @@ impl PhysicalEffect for TractionLoss {
     fn hypothesis() -> Hypothesis {
         let terms = Shape::along("holds_m_s2", &HOLDS_M_S2, |holds_m_s2| Box::new(Term::new(holds_m_s2)));
         Hypothesis::TermsAndScatter(terms, &[Sign::WayJumps, Sign::HeadingJumps])
+    }
+
+    fn description() -> Description {
+        Description {
+            isolated_error: Some(IsolatedError::LostWithSpeedChange { scales_s: &SLIDES_S }),
+            benchmark: Benchmark {
+                max_scale: 2.5,
+                at_scale: Some(|sizes, _, _| {
+                    let static_friction = size(sizes, "needs")? * (1.0 - size(sizes, "excess")?);
+                    Some(Effect::TractionLoss(Self {
+                        static_friction,
+                        kinetic_friction: 0.7 * static_friction,
+                        stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
+                    }))
+                }),
+                // The share of the acceleration that the floor does not hold.
+                ..Benchmark::of_scatter(|robot, _| {
+                    let needs = robot.acceleration_m_s2 / GRAVITY_M_S2;
+                    (vec![("excess", 0.3)], vec![("needs", needs), ("stribeck_speed_m_s", 0.05)])
+                })
+            },
+            ..Description::of("a wheel that is accelerated harder than the floor holds slides")
+        }
     }
 
     /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's sliding there is beyond it.
@@ -248,7 +278,7 @@ impl Term {
 }
 
 impl ModelTerm for Term {
-    /// Plausible: what a usual floor loses.
+    /// Plausible: what a usual floor loses (u_s = 0.05 m/s) under a tread that trembles by 0.01 m/s.
     fn parameters(&self) -> &'static [TermParameter] {
         &[TermParameter { name: "sliding", unit: "1", plausible: 1.0 }]
     }

@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Sighting};
 use crate::hypothesis::{Hypothesis, Sign, size};
@@ -36,6 +38,16 @@ impl PhysicalEffect for TruthCorrelatedNoise {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::CorrelatedLooks])
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            benchmark: Benchmark::of_scatter(|_, stream| {
+                (vec![("sigma_xy_m", 1e-3), ("sigma_theta_rad", 1e-3)], vec![("tau_s", stream.log_uniform(0.3, 3.0))])
+            }),
+            ..Description::of("the instrument's errors are autocorrelated: it is less precise than its single measurements seem")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

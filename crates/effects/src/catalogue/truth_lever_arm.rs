@@ -8,9 +8,13 @@ use model_term::{Look, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Sighting};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the instrument's marker is not over the axle's centre";
 
 /// Where the instrument's point is on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -34,6 +38,16 @@ impl PhysicalEffect for TruthLeverArm {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                let [ahead, left] = ["lever_x_m", "lever_y_m"].map(|name| sizes.shown(name, 1e3, "mm"));
+                format!("{MEANING}, but {ahead} ahead and {left} to the left: nothing is wrong with the robot")
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

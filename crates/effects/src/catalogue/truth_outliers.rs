@@ -9,6 +9,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, IsolatedError, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Sighting};
 use crate::hypothesis::{Hypothesis, Sign, size};
@@ -44,6 +46,17 @@ impl PhysicalEffect for TruthOutliers {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Scatter(&[Sign::IsolatedLooks])
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            isolated_error: Some(IsolatedError::OfInstrument),
+            benchmark: Benchmark::of_scatter(|_, stream| {
+                (vec![("jump_m", 0.02), ("jump_rad", 0.02)], vec![("probability", stream.log_uniform(0.003, 0.03))])
+            }),
+            ..Description::of("single measurements of the instrument are outliers")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, FloorForm, contact_twist};
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "the faster the robot turns, the farther apart its wheels act";
 
 /// Wheelbase that grows with the yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,22 @@ impl PhysicalEffect for TurnRateWheelbase {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| format!("{MEANING}: {} for each rad/s", sizes.shown("beta_s", 100.0, "%"))),
+            benchmark: Benchmark::OF_MEAN.with_form("a wheelbase that grows with the square of the yaw rate", |sizes, robot| {
+                // The same at the yaw rate of a spin at cruise speed.
+                let beta_s = size(sizes, "beta_s").unwrap_or(0.0);
+                let at_rad_s = 2.0 * robot.cruise_speed_m_s / robot.wheel_separation_m;
+                FloorForm::boxed(move |step| {
+                    let (_, omega_rad_s) = contact_twist(step);
+                    step.wheel_separation_m *= 1.0 + beta_s * omega_rad_s.powi(2) / at_rad_s;
+                })
+            }),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

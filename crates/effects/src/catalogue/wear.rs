@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Shape, size};
@@ -31,6 +32,14 @@ impl PhysicalEffect for Wear {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::ByMeaning,
+            excitation: Excitation::Conditions("drive the same runs again after some kilometres"),
+            ..Description::of("the scale drifts with the distance driven")
+        }
     }
 
     /// A tread wears off: found negative it is something else.

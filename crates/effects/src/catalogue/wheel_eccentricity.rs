@@ -8,9 +8,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
+
+/// What it is, in one line.
+const MEANING: &str = "a wheel is not round or not centred";
 
 /// Eccentricity of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -49,6 +54,27 @@ impl PhysicalEffect for WheelEccentricity {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Terms(Shape::plain(Term { last: Wheels::both(LastAngle::NONE) }))
+    }
+
+    fn description() -> Description {
+        Description {
+            told: Told::WithSizes(|sizes| {
+                format!("{MEANING}: {}", sizes.amplitudes("", 100.0, "%", "wheel's radius varies"))
+            }),
+            benchmark: Benchmark::OF_MEAN.with_form(
+                "a radius that rises and falls linearly with the wheel's angle, a triangle for a sine",
+                |sizes, _| {
+                    let of = |name: &str| size(sizes, name).unwrap_or(0.0);
+                    let amplitude = |side: &str| of(&format!("{side}_sin")).hypot(of(&format!("{side}_cos")));
+                    let phase = |side: &str| of(&format!("{side}_cos")).atan2(of(&format!("{side}_sin")));
+                    Box::new(FlatSpots {
+                        amplitude: Wheels { left: amplitude("left"), right: amplitude("right") },
+                        phase_rad: Wheels { left: phase("left"), right: phase("right") },
+                    })
+                },
+            ),
+            ..Description::of(MEANING)
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
@@ -121,6 +147,26 @@ impl ModelTerm for Term {
                 travel_m[side] = m_per_rad * integral;
                 *gradient = interval.change(travel_m);
             }
+        }
+    }
+}
+
+/// The other form: a radius that rises and falls linearly with the wheel's angle, a triangle for a sine.
+struct FlatSpots {
+    amplitude: Wheels<f64>,
+    phase_rad: Wheels<f64>,
+}
+
+impl Forward for FlatSpots {
+    fn hooks(&self) -> Hooks {
+        Hooks { wheel: true, ..Hooks::NONE }
+    }
+
+    fn wheel(&mut self, step: &mut Step) {
+        for side in Side::BOTH {
+            let angle_rad = step.wheel_angle_rad[side] + 0.5 * step.wheel_rad[side] + self.phase_rad[side];
+            // asin(sin) is a triangle of height π/2, whose first harmonic has the amplitude 4/π.
+            step.radius_m[side] *= 1.0 + self.amplitude[side] * angle_rad.sin().asin() * std::f64::consts::FRAC_PI_4;
         }
     }
 }

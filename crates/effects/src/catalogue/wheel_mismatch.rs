@@ -7,6 +7,7 @@
 use kinematics::{DriveGeometry, Wheels};
 use serde::{Deserialize, Serialize};
 
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, size};
 
@@ -34,6 +35,10 @@ impl PhysicalEffect for WheelMismatch {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn description() -> Description {
+        Description::of("the wheels differ in diameter")
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

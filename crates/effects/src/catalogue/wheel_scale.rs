@@ -7,6 +7,7 @@
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, size};
 
@@ -31,6 +32,10 @@ impl PhysicalEffect for WheelScale {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn description() -> Description {
+        Description::of("both wheels are larger or smaller than believed, by one factor")
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -7,6 +7,7 @@
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
+use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, size};
 
@@ -29,6 +30,10 @@ impl PhysicalEffect for Wheelbase {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Geometry
+    }
+
+    fn description() -> Description {
+        Description::of("the wheels act farther apart or closer together than believed")
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -10,6 +10,8 @@ use dataset::{Dataset, RunView, WheelLog};
 use kinematics::{Pose, Rule, Twist, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::Benchmark;
+use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, Rewriting, median, rewrite_wheels, size};
@@ -63,6 +65,18 @@ impl PhysicalEffect for WrongCountsPerTurn {
 
     fn hypothesis() -> Hypothesis {
         Hypothesis::Records(rewritings)
+    }
+
+    fn description() -> Description {
+        Description {
+            record_fault: RecordFault {
+                leaves_a_trace: false,
+                counts_factor: Some("factor"),
+                ..RecordFault::WITH_A_TRACE
+            },
+            benchmark: Benchmark::of_fault(|_, stream| vec![("factor", [0.25, 0.5, 2.0, 4.0][stream.below(4)])]),
+            ..Description::of("a wheel turn makes another number of counts than the robot believes")
+        }
     }
 
     fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {

@@ -1,12 +1,10 @@
 //! How well sizes are known: by the likelihood, by how runs differ, by what is not known of shapes, and by what is not known of the names beside them.
 
 use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
-use nalgebra::DVector;
 
-use crate::candidate::Choice;
-use crate::gain::LEAST_RUNS;
+use crate::augmented_model::Extended;
 use crate::scan::{freedom, principal};
-use crate::search::{Extended, Name, chance};
+use crate::settings::LEAST_RUNS;
 use crate::statistics::{p_of_statistic, p_of_student, student_95};
 
 /// A test of one choice of a fitted model.
@@ -43,9 +41,6 @@ pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, V
     };
     Some((test, directions))
 }
-
-/// Chance at which a size that is none passes for one over the runs, once it has passed over the looks.
-pub(crate) const RUNS_LEVEL: f64 = 0.05;
 
 /// Whether a choice's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
 /// motion, looks that resemble each other), and a likelihood that takes looks for independent believes them too much.
@@ -92,24 +87,6 @@ fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
     // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
     let widening = student_95(n - 1.0) / 1.96;
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
-}
-
-/// Variances of sizes by what the choice beside them is not known to be: how far they go where it has another of its names, by the names' chances. For each other choice
-/// of the likeliest model, its sizes in turn.
-pub(crate) fn over_names(place: usize, names: &[(Name, Extended<'_>)]) -> Vec<(Choice, Vec<f64>)> {
-    let Some((top, likeliest)) = names.first() else { return Vec::new() };
-    let weights: Vec<f64> = names.iter().map(|(name, _)| chance(name.log_odds, top.log_odds)).collect();
-    let all: f64 = weights.iter().sum();
-    let variances = |other: usize| {
-        let own = likeliest.sizes(other);
-        let moved = |model: &Extended<'_>| (model.sizes(other) - &own).map(|by| by * by);
-        let sum = names
-            .iter()
-            .zip(&weights)
-            .fold(DVector::zeros(own.len()), |sum, ((_, model), weight)| sum + moved(model) * (weight / all));
-        (likeliest.choices[other].clone(), sum.as_slice().to_vec())
-    };
-    (0..likeliest.choices.len()).filter(|other| *other != place).map(variances).collect()
 }
 
 /// Each choice's test beside the others, and by how much what is not known of shapes and names widens its sizes.

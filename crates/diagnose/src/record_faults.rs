@@ -5,10 +5,9 @@
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
-use estimation::NoiseComponent;
-use estimation::{FitSettings, JointFit};
+use estimation::{FitSettings, JointFit, NoiseComponent};
 
-use crate::search::{cost, count};
+use crate::augmented_model::{cost, count};
 
 /// A rewriting must make the data likelier by this factor, e^20, over the records as they are: dozens are tried, and each claims much.
 const GAIN: f64 = 20.0;
@@ -42,6 +41,13 @@ pub(crate) struct Fault {
     pub(crate) gain: f64,
 }
 
+impl Fault {
+    /// Whether counts that were lost are restored only roughly, so that measurements may still lie off.
+    pub(crate) fn is_restored_roughly(&self) -> bool {
+        effects::description(self.id).is_some_and(|description| description.record_fault.is_restored_roughly)
+    }
+}
+
 const PLAIN: FitSettings = FitSettings::GEOMETRY_ONLY;
 
 /// An instrument turned farther than this on the robot is more of a claim than the fault.
@@ -64,7 +70,8 @@ pub(crate) fn fault(
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
         let Some(Hypothesis::Records(rewritings)) = hypothesis(id) else { continue };
-        if sound && ALWAYS_POSSIBLE.contains(id) {
+        // What leaves no trace is possible in any records; it is tried where the base fit is hard to believe.
+        if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
         for Form { sizes, sentence, evident, records } in together(datasets, rewritings) {
@@ -102,9 +109,6 @@ pub(crate) fn fault(
     }
     best.map(|(_, fault)| fault)
 }
-
-/// Faults that any records may have; they are tried where the base fit is hard to believe. The others look for their own traces.
-const ALWAYS_POSSIBLE: [&str; 3] = ["swapped_wheels", "reversed_wheel", "wrong_counts_per_turn"];
 
 /// How implausible the lengths of a fit are, as a part of its cost.
 fn implausible(fit: &JointFit<'_>) -> f64 {

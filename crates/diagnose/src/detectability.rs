@@ -2,12 +2,11 @@
 //!
 //! A size shows with nine chances in ten at a false-alarm rate of 1e-3 when √λ = 4.57 (discovery by a score test; λ = size² of the projected information).
 
+use crate::augmented_model::Extended;
 use crate::candidate::Choice;
 use crate::document::{Blind, Smallest};
-use crate::search::{Extended, Known};
-
-/// √λ for power 0.9 at a two-sided level of 1e-3.
-pub(crate) const SHOWS: f64 = 4.57;
+use crate::fit_cache::Known;
+use crate::settings::SHOWS;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
 pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice], known: &mut Known<'_>) -> (Vec<Blind>, Vec<Blind>) {

@@ -3,16 +3,19 @@
 use std::collections::BTreeMap;
 
 use dataset::{Dataset, Protocol, WheelLog};
-use effects::{Covariate, Effect, Sparse, SparseTerm, effect_of_sizes};
+use effects::{
+    Covariate, Effect, PhysicalEffect, Quantization, Sparse, SparseTerm, WheelMismatch, WheelScale, Wheelbase,
+    effect_of_sizes,
+};
 use estimation::NoiseComponent;
 use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
+use crate::augmented_model::Extended;
 use crate::candidate::Choice;
-use crate::search::Extended;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
-const STAND_IN: &str = include_str!("stand_in.toml");
+const STAND_IN: &str = include_str!("default_actuators.toml");
 /// A controller regulates on counts much finer than most logs' ticks.
 const LEAST_COUNTS: f64 = 40_000.0;
 /// Looks farther apart than this, in a run of a few, are readings of a standing robot.
@@ -56,9 +59,9 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
             lever_theta_rad: mounted.theta_rad,
         }
     };
-    let mut effects = geometry(model)?;
+    let mut effects = geometry(model)?.to_vec();
     if per_tick > 1.0 && nominal.ticks_per_rev.is_some() {
-        effects.extend(effect_of_sizes("quantization", &[("counts_per_tick", per_tick)]));
+        effects.extend(Quantization::of_sizes(&[("counts_per_tick", per_tick)]).map(Effect::Quantization));
     }
     let mut at = 0;
     for choice in &model.choices {
@@ -106,25 +109,22 @@ fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec
         Covariate::OfRun { key, .. } => Some(key),
         _ => None,
     });
-    own.map(|key| (key.clone(), crate::checks::values_of_runs(&model.fit, key))).collect()
+    own.map(|key| (key.clone(), crate::covariates::values_of_runs(&model.fit, key))).collect()
 }
 
 /// The calibrated lengths as effects on the nominal ones.
-fn geometry(model: &Extended<'_>) -> Result<Vec<Effect>, String> {
+fn geometry(model: &Extended<'_>) -> Result<[Effect; 3], String> {
     let (found, nominal) = (&model.fit.fit.model, &model.fit.nominal);
     let mean = |wheels: kinematics::Wheels<f64>| 0.5 * (wheels.left + wheels.right);
     let ratio = |wheels: kinematics::Wheels<f64>| wheels.right / wheels.left;
-    let text = format!(
-        "[[effect]]\nkind = \"wheel_scale\"\nscale = {:?}\n[[effect]]\nkind = \"wheel_mismatch\"\nright_over_left = {:?}\n[[effect]]\nkind = \"wheelbase\"\nratio = {:?}\n",
-        mean(found.m_per_rad) / mean(nominal.m_per_rad),
-        ratio(found.m_per_rad) / ratio(nominal.m_per_rad),
-        found.separation_m / nominal.separation_m,
-    );
-    #[derive(serde::Deserialize)]
-    struct List {
-        effect: Vec<Effect>,
-    }
-    toml::from_str::<List>(&text).map(|list| list.effect).map_err(|error| error.message().to_owned())
+    let right_over_left = ratio(found.m_per_rad) / ratio(nominal.m_per_rad);
+    let effects = [
+        Effect::WheelScale(WheelScale { scale: mean(found.m_per_rad) / mean(nominal.m_per_rad) }),
+        Effect::WheelMismatch(WheelMismatch { right_over_left }),
+        Effect::Wheelbase(Wheelbase { ratio: found.separation_m / nominal.separation_m }),
+    ];
+    effects.iter().try_for_each(|effect| effect.physical().check()).map_err(|error| error.to_string())?;
+    Ok(effects)
 }
 
 /// How fast and how often.

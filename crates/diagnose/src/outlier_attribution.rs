@@ -9,17 +9,16 @@
 //! Jumps and errors in any direction, anywhere, say what a cause without a name would do as well.
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
-use estimation::JointFit;
-use estimation::total;
-use estimation::{Chain, Column, Evidence, Innovation};
+use effects::IsolatedError;
+use estimation::{Chain, Column, Evidence, Innovation, JointFit, total};
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::{Interval, Look, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::augmented_model::Extended;
 use crate::candidate::terms;
-use crate::search::Extended;
 
 /// An innovation this large, in standard deviations, is one that the tails are made of.
 const LARGE: f64 = 3.5;
@@ -36,10 +35,6 @@ const AT_RAMPS: f64 = 0.9;
 /// A look this near to an instant is at it, seconds.
 const AT_S: f64 = 1e-6;
 
-/// Way that a wheel loses over a bump, or that a contact winds up by, metres: from what no instrument shows to a sill.
-const WAYS_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
-/// Way that is lost for each change of speed, seconds: v/2a of a floor that holds little less than it should, to one that holds nearly nothing.
-const SLIDES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 /// Errors of a look, metres and radians.
 const ERRORS: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
 
@@ -347,15 +342,20 @@ impl Seen {
     }
 }
 
-/// For each scale of a cause, what it makes of each large error.
+/// For each scale of a cause, what it makes of each large error; `None` where its errors are not single ones.
 fn of_cause(id: &str, seen: &[Seen], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
     let each = |of: &dyn Fn(&Seen) -> f64| seen.iter().map(of).collect::<Vec<f64>>();
-    Some(match id {
-        "bumps" => WAYS_M.iter().map(|lost_m| each(&|seen| seen.of_bump(*lost_m))).collect(),
-        "traction_loss" => SLIDES_S.iter().map(|slides_s| each(&|seen| seen.of_slide(*slides_s))).collect(),
-        "stick_slip" => WAYS_M.iter().map(|wound_m| each(&|seen| seen.of_wind_up(*wound_m, speed_m_s))).collect(),
-        "truth_outliers" => of_any(Whose::Instrument, seen),
-        _ => return None,
+    Some(match effects::description(id)?.isolated_error? {
+        IsolatedError::LostOnTheWay { scales_m } => {
+            scales_m.iter().map(|lost_m| each(&|seen| seen.of_bump(*lost_m))).collect()
+        }
+        IsolatedError::LostWithSpeedChange { scales_s } => {
+            scales_s.iter().map(|slides_s| each(&|seen| seen.of_slide(*slides_s))).collect()
+        }
+        IsolatedError::WoundUp { scales_m } => {
+            scales_m.iter().map(|wound_m| each(&|seen| seen.of_wind_up(*wound_m, speed_m_s))).collect()
+        }
+        IsolatedError::OfInstrument => of_any(Whose::Instrument, seen),
     })
 }
 
@@ -383,7 +383,7 @@ mod tests {
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{Whose, log_likelihoods};
-    use crate::search::Extended;
+    use crate::augmented_model::Extended;
 
     const ROW_S: f64 = 0.1;
     const ROWS_A_LOOK: u32 = 10;

@@ -2,20 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use estimation::JointFit;
-use estimation::total;
-use estimation::{Column, Evidence};
+use estimation::{Column, Evidence, JointFit, total};
 
-use super::library::Manoeuvre;
+use super::constraints::Setting;
+use super::manoeuvres::{Manoeuvre, Part, evidences};
 use super::predict::predictions;
-use super::setting::Setting;
-use super::weigh::{Candidate, Frame, Rivals, Sure, with_parts, with_runs};
-use super::words::Predictions;
-use super::{Part, evidences, words};
+use super::rival_odds::{Candidate, Frame, Rivals, Sure, with_parts, with_runs};
+use super::text;
+use super::text::Predictions;
+use crate::augmented_model::without;
 use crate::candidate::{Choice, terms};
 use crate::document::NextExperiment;
-use crate::naming::{FAINT, is_faint};
-use crate::search::{Found, without};
+use crate::finding::is_faint;
+use crate::selection::Found;
+use crate::settings::FAINT;
 
 /// Two kinds of run must save this share of the time against one to be worth the trouble.
 const WORTH_TWO_KINDS: f64 = 0.8;
@@ -78,7 +78,7 @@ pub(super) fn tell_apart(
         "it takes {minutes:.1} min and {tell} {tells} by {sigmas:.1} standard deviations or more, sought {}. Diagnose the new runs together with the old ones.{still}{what}",
         setting.within
     );
-    Ok(words::next_experiment(&parts, setting, minutes, &why, predicts))
+    Ok(text::next_experiment(&parts, setting, minutes, &why, predicts))
 }
 
 fn parameters(choices: &[Choice]) -> usize {
@@ -154,7 +154,7 @@ impl Asked<'_> {
         match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((manoeuvre, sigmas)) => format!(
                 "{what}: the best, {}, leaves them {sigmas:.1} standard deviations from each other",
-                words::manoeuvre(&manoeuvre)
+                text::manoeuvre(&manoeuvre)
             ),
             None => what,
         }
@@ -253,9 +253,9 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::plan::library::library;
-    use crate::plan::library::tests::setting;
-    use crate::plan::weigh::tests::{evidence, rivals};
+    use crate::plan::manoeuvres::library;
+    use crate::plan::manoeuvres::tests::setting;
+    use crate::plan::rival_odds::tests::{evidence, rivals};
 
     /// Where a kind of run says much of what both names have in common, each run raises what is asked of them by more than it tells them apart: few runs tell, many do not.
     #[test]

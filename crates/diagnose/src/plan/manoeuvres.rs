@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use dataset::{Dataset, Displacement, Odometry, Provenance, Run, RunInfo};
-use dataset::{TruthNoise, TruthSample, WheelLog};
-use estimation::Model;
+use dataset::{Dataset, Displacement, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+use estimation::{Evidence, JointFit, Model, total};
 use kinematics::{Increment, Pose, Wheels};
 use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 
-use super::setting::{Reading, Setting};
+use super::constraints::{Reading, Setting};
+use crate::candidate::{Choice, terms};
 
 /// Shares of the largest size and of the top speed that are tried.
 const SIZES: [f64; 2] = [1.0, 0.5];
@@ -302,6 +302,46 @@ pub(crate) fn of_runs(setting: &Setting, runs: Vec<Run>) -> Dataset {
         points: Vec::new(),
         runs,
     }
+}
+
+/// Runs of one manoeuvre.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Part {
+    pub(crate) manoeuvre: Manoeuvre,
+    pub(crate) pairs: u32,
+}
+
+impl Part {
+    pub(crate) fn schedule(&self) -> Schedule {
+        self.manoeuvre.schedule.with_pairs(self.pairs)
+    }
+}
+
+/// The evidence of a pair of runs of each manoeuvre for a fit's own terms and some more.
+pub(crate) fn evidences(
+    fit: &JointFit<'_>,
+    all: &[Choice],
+    setting: &Setting,
+    manoeuvres: &[Manoeuvre],
+) -> Vec<(Manoeuvre, Evidence)> {
+    manoeuvres
+        .iter()
+        .filter_map(|manoeuvre| {
+            let dataset = foreseen(manoeuvre, setting, &fit.fit.model);
+            let foreseen = fit.foreseeing(&[dataset.session()]);
+            Some((*manoeuvre, total(&foreseen.scan(&mut terms(all)).runs)?))
+        })
+        .collect()
+}
+
+/// Where to look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Where {
+    pub(super) direction: usize,
+    /// Share of the run's duration.
+    pub(super) share: f64,
+    /// 0 along, 1 across, 2 heading.
+    pub(super) component: usize,
 }
 
 #[cfg(test)]

@@ -3,15 +3,12 @@
 //! With Î the information of old and planned runs together, n what is free beside and b another name's sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s,
 //! the noncentrality of the test of b against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
 
-use estimation::JointFit;
-use estimation::{Column, Evidence};
-use estimation::{RIDGE, inverse};
+use estimation::{Column, Evidence, JointFit, RIDGE, inverse};
 use nalgebra::{DMatrix, DVector};
 
-use super::Part;
-use super::library::Manoeuvre;
+use super::manoeuvres::{Manoeuvre, Part};
 use crate::candidate::Choice;
-use crate::search::reach;
+use crate::model_comparison::reach;
 
 /// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
 /// mounting, seconds.

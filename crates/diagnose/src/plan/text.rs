@@ -6,10 +6,8 @@ use std::f64::consts::TAU;
 use motion_programs::Schedule;
 use serde::Serialize;
 
-use super::Part;
-use super::library::Manoeuvre;
-use super::predict::Where;
-use super::setting::Setting;
+use super::constraints::Setting;
+use super::manoeuvres::{Manoeuvre, Part, Where};
 use crate::document::{NextExperiment, PlannedSession, Predicted, Value};
 
 /// What is driven, of any number of runs.

@@ -4,8 +4,8 @@ use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Point, Pose, Rule};
 use scenario::{Budget, Instrument, Scenario};
 
-use crate::scenario_of::{Pace, READ_STANDING_S};
-use crate::search::Extended;
+use crate::augmented_model::Extended;
+use crate::extended_scenario::{Pace, READ_STANDING_S};
 
 /// What the user allows; `None` is taken from the data or the scenario.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -5,15 +5,15 @@ use estimation::JointFit;
 use kinematics::Side;
 use rayon::prelude::*;
 
+use crate::augmented_model::{Extended, refit};
 use crate::candidate::Choice;
-use crate::checks::of_runs;
+use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
+use crate::model_comparison::{closed_again, evidence};
 use crate::scan::{Scored, scan};
-use crate::search::{Extended, evidence, refit};
+use crate::settings::UNLISTED_LEVEL;
 use crate::statistics::of_trials;
 
-/// Rate of false alarms of the search for a sparse term.
-pub(crate) const UNLISTED_LEVEL: f64 = 0.005;
 /// Refits of the best by their scores.
 const TRIED: usize = 3;
 
@@ -64,7 +64,7 @@ impl<'a> Unlisted<'a> {
         let first = sparse(&open, &Extended::alone(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
         let all = Self::from(&open, first);
         let paid = all.paid();
-        Some(Self { model: all.model.closed_again(base, &Extended::alone(base), paid)?, tried: all.tried })
+        Some(Self { model: closed_again(all.model, base, &Extended::alone(base), paid)?, tried: all.tried })
     }
 
     /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
@@ -145,16 +145,6 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
     });
     let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Choice::Sparse);
     moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(Sparse::of_rows())]).collect()
-}
-
-/// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.
-const CYCLES: [u8; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24];
-
-/// What a wheel may do several times in each turn.
-pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
-    let channel = if side == Side::Left { Channel::LeftWheel } else { Channel::RightWheel };
-    let phases = |cycles| [Covariate::CosPhase(side, cycles), Covariate::SinPhase(side, cycles)];
-    CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
 }
 
 /// What wheels may do by themselves. Their way alone is their size, which every fit has.

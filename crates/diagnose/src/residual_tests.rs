@@ -5,20 +5,17 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::Projected;
-use estimation::{Chain, Innovation};
-use estimation::{JointFit, WHITE_BELOW};
+use estimation::{Chain, Innovation, JointFit, Projected, WHITE_BELOW};
 use kinematics::Side;
 
+use crate::augmented_model::Extended;
 use crate::candidate::Choice;
-use crate::document::Check;
+use crate::check::{Check, Component, ResidualPersistence, TestResult};
+use crate::covariates::{of_cycles, of_runs};
 use crate::scan::{ask, freedom, principal};
-use crate::search::Extended;
+use crate::settings::CHECKS_LEVEL;
 use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
-use crate::unlisted::of_cycles;
 
-/// Family-wise rate of false alarms of all checks.
-pub(crate) const CHECKS_LEVEL: f64 = 0.01;
 /// Correlations with so many looks before are summed.
 const LAGS: usize = 5;
 /// A look off by this much is an outlier with a chance of 1e-5.
@@ -37,7 +34,7 @@ const UNDONE: f64 = 0.5;
 pub(crate) struct Checked {
     /// Displacements that fail to be white: they resemble each other for longer, and less plainly, than what a filter leaves of looks.
     pub(crate) resemble: bool,
-    pub(crate) checks: Vec<Check>,
+    pub(crate) checks: Vec<TestResult>,
     /// Correlation of innovations that follow each other: coefficient at lag one, and standard errors.
     pub(crate) correlation: (f64, f64),
     pub(crate) outliers: Outliers,
@@ -114,39 +111,24 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
     of_motion.chain([of_reversals, of_bends, of_rows]).chain(of_wheels).collect()
 }
 
-/// The covariates of runs that differ between runs.
-pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
-    let chains = &fit.records.chains;
-    let mut keys: Vec<&String> = chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    keys.into_iter().filter_map(|key| Covariate::of_run(key, &values_of_runs(fit, key))).collect()
-}
-
-/// What each run says of a covariate, 0 where it says nothing.
-pub(crate) fn values_of_runs(fit: &JointFit<'_>, key: &str) -> Vec<f64> {
-    let runs = fit.records.chains.chunk_by(|a, b| a.run == b.run);
-    runs.map(|chains| chains[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
-}
-
 /// Asks the residuals of a model.
 pub(crate) fn check(model: &Extended<'_>) -> Checked {
     let fit = &model.fit;
     let mut checks = Vec::new();
-    let mut add = |name: &str, statistic: f64, p_value: f64| {
-        checks.push(Check { name: name.to_owned(), statistic, p_value, passes: true });
+    let mut add = |check: Check, statistic: f64, p_value: f64| {
+        checks.push(TestResult { check, statistic, p_value, passes: true });
     };
     size(fit, &mut add);
     let correlation = whiteness(fit, &mut add);
     tails(fit, &mut add);
     let outliers = outliers(fit);
     #[allow(clippy::cast_precision_loss)]
-    add("outliers", (outliers.isolated + outliers.staying) as f64, outliers.p_value);
+    add(Check::Outliers, (outliers.isolated + outliers.staying) as f64, outliers.p_value);
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
     let is_displaced = fit.records.chains.iter().all(Chain::is_displacement);
-    let fails_to_be_white = checks.iter().any(|check| check.name.starts_with("white_") && !check.passes);
+    let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
     let resemble = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
     Checked { resemble, checks, correlation, outliers }
 }
@@ -158,8 +140,8 @@ fn innovations<'f>(fit: &'f JointFit<'_>, component: usize) -> Vec<&'f Innovatio
 }
 
 /// Σz² over the looks, and how it differs between runs: the noise is one for all.
-fn size(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
-    for (component, name) in ["nis_along", "nis_across", "nis_heading"].into_iter().enumerate() {
+fn size(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+    for (component, name) in Component::ALL.into_iter().enumerate() {
         let squares: Vec<f64> = innovations(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
         #[allow(clippy::cast_precision_loss)]
         let n = squares.len() as f64;
@@ -170,7 +152,7 @@ fn size(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
         // The noise is fitted to all three together: one of them can still be off. Its own tails say how well a mean square is known.
         let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let z = (mean - 1.0) / (variance.max(2.0) / n).sqrt();
-        add(name, mean, p_of_z(z));
+        add(Check::InnovationSize(name), mean, p_of_z(z));
     }
     let runs: Vec<_> = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let (sum, count) = runs.iter().fold((0.0, 0.0), |(sum, count), run| (sum + run.chi_square, count + run.count));
@@ -185,15 +167,15 @@ fn size(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
             })
             .sum();
         #[allow(clippy::cast_precision_loss)]
-        add("run_to_run", squares, p_of_chi_square(squares, runs.len() as f64 - 1.0));
+        add(Check::RunToRun, squares, p_of_chi_square(squares, runs.len() as f64 - 1.0));
     }
 }
 
 /// Ljung & Box over the looks of each chain and the displacements of each run; returns the correlation that stands out most: its
 /// coefficient at lag one, and its standard errors.
-fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) -> (f64, f64) {
+fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64, f64) {
     let mut strongest = (0.0, 0.0_f64);
-    for (component, name) in ["white_along", "white_across", "white_heading"].into_iter().enumerate() {
+    for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         #[allow(clippy::cast_precision_loss)]
         let n = series.len() as f64;
@@ -229,14 +211,14 @@ fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) -> (f64, 
             if z.abs() > f64::abs(strongest.1) {
                 strongest = (coefficient, z);
             }
-            add(name, statistic, p_of_chi_square(statistic, lags));
+            add(Check::Whiteness(name), statistic, p_of_chi_square(statistic, lags));
         }
     }
     strongest
 }
 
-fn tails(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
-    for (component, name) in ["kurtosis_along", "kurtosis_across", "kurtosis_heading"].into_iter().enumerate() {
+fn tails(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+    for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         #[allow(clippy::cast_precision_loss)]
         let n = series.len() as f64;
@@ -246,7 +228,7 @@ fn tails(fit: &JointFit<'_>, add: &mut impl FnMut(&str, f64, f64)) {
         let moment = |power: i32| series.iter().map(|innovation| innovation.z.powi(power)).sum::<f64>() / n;
         let kurtosis = moment(4) / moment(2).powi(2);
         // Anscombe & Glynn 1983: kurtosis is skewed until n is in the thousands.
-        add(name, kurtosis, p_of_z(anscombe_glynn(kurtosis, n)));
+        add(Check::Tails(name), kurtosis, p_of_z(anscombe_glynn(kurtosis, n)));
     }
 }
 
@@ -311,20 +293,9 @@ fn undo(fit: &JointFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
     fit.records.goes_on(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
 }
 
-/// What follows large innovations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Follows {
-    /// The next are off the same way: the robot jumped.
-    TheSame,
-    /// The next are off the other way: one look erred.
-    TheOpposite,
-    /// Neither beyond chance.
-    Nothing,
-}
-
 /// What follows large innovations of a component: the mean of the next in the direction of the large one, in standard errors. After a displacement, which starts
 /// anew, there is nothing to stay: the same says that errors last, and not whose they are.
-pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
+pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
     let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
@@ -335,16 +306,16 @@ pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> Follows {
     let of_looks = follows(&|chain, next| next == chain);
     let of_displacements = follows(&|chain, next| next == chain + 1 && fit.records.goes_on(next));
     if of_looks > FOLLOWS {
-        Follows::TheSame
+        ResidualPersistence::Persistent
     } else if of_looks.min(of_displacements) < -FOLLOWS {
-        Follows::TheOpposite
+        ResidualPersistence::Reverting
     } else {
-        Follows::Nothing
+        ResidualPersistence::Undecided
     }
 }
 
 /// Score tests of every question.
-fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
+fn covariates(model: &Extended<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     let questions = questions(&model.fit);
     let parts: Vec<&[Choice]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
     // Statistic and chance of each group that can be seen.
@@ -360,7 +331,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(&str, f64, f64)) {
     for Question { name, groups } in &questions {
         let own: Vec<(f64, f64)> = answers.by_ref().take(groups.len()).flatten().collect();
         if let Some((statistic, p_value)) = own.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            add(name, *statistic, of_trials(*p_value, own.len()));
+            add(Check::Covariate(name.clone()), *statistic, of_trials(*p_value, own.len()));
         }
     }
 }

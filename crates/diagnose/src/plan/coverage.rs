@@ -5,21 +5,20 @@
 
 use std::collections::BTreeMap;
 
-use estimation::JointFit;
-use estimation::total;
-use estimation::{Column, Evidence, Model, Noise};
+use effects::{CATALOGUE, Excitation};
+use estimation::{Column, Evidence, JointFit, Model, Noise, total};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
 
-use super::library::{Manoeuvre, library};
-use super::setting::{Limits, Setting};
-use super::weigh::{Frame, with_parts, with_runs};
-use super::words::Predictions;
-use super::{Part, evidences, words};
-use crate::blind::SHOWS;
+use super::constraints::{Limits, Setting};
+use super::manoeuvres::{Manoeuvre, Part, evidences, library};
+use super::rival_odds::{Frame, with_parts, with_runs};
+use super::text;
+use super::text::Predictions;
+use crate::augmented_model::Extended;
 use crate::candidate::{Choice, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::search::Extended;
+use crate::settings::SHOWS;
 
 /// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
 const SHAPES: usize = 3;
@@ -34,17 +33,17 @@ const UNDETERMINED: f64 = 0.02;
 /// Kinds of run that a person keeps apart.
 const MOST_KINDS: usize = 6;
 
-/// Effects that go with other things than what is driven, and what shows them.
-const NOT_BY_DRIVING: [(&str, &str); 5] = [
-    ("payload_compression", "drive the same runs with another payload, its covariate stated"),
-    ("thermal_drift", "drive the same runs cold and an hour later"),
-    ("wear", "drive the same runs again after some kilometres"),
-    ("interval_error", "log at intervals that differ"),
-    ("clock_rate", "log speeds beside an instrument with a clock of its own"),
-];
+/// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
+/// it.
+fn conditions(id: &str) -> Option<&'static str> {
+    match effects::description(id)?.excitation {
+        Excitation::Manoeuvres => None,
+        Excitation::Conditions(how) => Some(how),
+    }
+}
 
 fn is_driven(choice: &Choice) -> bool {
-    NOT_BY_DRIVING.iter().all(|(id, _)| *id != choice.id())
+    conditions(choice.id()).is_none()
 }
 
 /// What stays out of sight, and what would show it.
@@ -52,8 +51,8 @@ fn out_of_sight(ids: &[&str]) -> String {
     if ids.is_empty() {
         return String::new();
     }
-    let each = ids.iter().map(|id| match NOT_BY_DRIVING.iter().find(|(of, _)| of == id) {
-        Some((_, how)) => format!("{id} ({how})"),
+    let each = ids.iter().map(|id| match conditions(id) {
+        Some(how) => format!("{id} ({how})"),
         None => (*id).to_owned(),
     });
     format!(" Still out of sight: {}.", each.collect::<Vec<_>>().join(", "))
@@ -232,7 +231,7 @@ pub(super) fn show(
         ids.join(", "),
         setting.within
     );
-    Ok(words::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
+    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
 }
 
 fn from_size(smallest: &Smallest) -> String {
@@ -333,8 +332,9 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     };
     let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
     let mut blind_to: Vec<Blind> = blind.into_iter().map(entry).collect();
-    blind_to.extend(NOT_BY_DRIVING.iter().map(|(id, how)| Blind {
-        id: (*id).to_owned(),
+    let not_driven = CATALOGUE.iter().filter_map(|id| Some((*id, conditions(id)?)));
+    blind_to.extend(not_driven.map(|(id, how)| Blind {
+        id: id.to_owned(),
         why: format!("it does not go with what is driven: {how}"),
         smallest_detectable: None,
     }));
@@ -355,7 +355,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         shows.len() + blind_to.len(),
         setting.within
     );
-    let next_experiment = words::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
+    let next_experiment = text::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
     Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
 }
 

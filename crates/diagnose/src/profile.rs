@@ -8,7 +8,7 @@
 
 use estimation::JointFit;
 
-use crate::search::{Extended, cost, count, refit};
+use crate::augmented_model::{Extended, cost, count, refit};
 
 /// Times that the parabola is drawn anew, each time closer.
 const ROUNDS: usize = 2;

@@ -1,0 +1,76 @@
+//! Causes of what a calibrated model gets wrong, what they were found by, and why one is not alone.
+
+use crate::check::{Check, ResidualPersistence};
+use crate::document::UnlistedTerm;
+
+/// A candidate cause.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cause {
+    /// An effect of the catalogue, by its id.
+    Effect(&'static str),
+    /// A term that is in no catalogue.
+    Term(UnlistedTerm),
+    /// Something that is in no catalogue, and of no known form.
+    Unknown,
+}
+
+impl Cause {
+    /// Its id in JSON.
+    pub(crate) const fn id(&self) -> &'static str {
+        match self {
+            Self::Effect(id) => id,
+            Self::Term(_) | Self::Unknown => "unlisted",
+        }
+    }
+
+    /// Whether it is in no catalogue.
+    pub(crate) const fn is_unlisted(&self) -> bool {
+        !matches!(self, Self::Effect(_))
+    }
+}
+
+/// What a finding was found by.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Basis {
+    /// A mean effect of the catalogue in the augmented model.
+    Mean,
+    /// The best of so many products of covariates.
+    Products(usize),
+    /// Failed tests of the residuals that nothing explains.
+    FailedTests(Vec<Check>),
+    /// Odometry is uncorrelated with what the instrument measured: noise of wheel, turn, position and heading to the best fit.
+    Uncorrelated([f64; 4]),
+    /// So many outlying rows of the log.
+    OutlyingRows(f64),
+    /// The log lasts so many times as long as the measurements.
+    OtherClock(f64),
+    /// Calibrated wheels are so many times as large as nominal ones.
+    WheelFactor(f64),
+    /// A fault of the records, in words.
+    RecordFault(String),
+    /// So many isolated errors of the instrument among so many measurements.
+    IsolatedErrors(usize, usize),
+    /// Large errors, by what follows them.
+    LargeErrors(ResidualPersistence),
+    /// Autocorrelated errors with this coefficient.
+    Autocorrelated(f64),
+    /// Headings scatter with the turn, rad/√rad.
+    TurnScatter(f64),
+}
+
+/// Why a cause is not alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// One uncatalogued term explains the data as well.
+    TermDoesAsWell,
+    /// Something is left that it does not explain.
+    Incomplete,
+    /// It is of low significance.
+    LowSignificance,
+    /// It may be part of an uncatalogued effect.
+    PartOfUnlisted,
+    /// It is more probably part of an uncatalogued effect than itself.
+    ProbablyPartOfUnlisted,
+    /// A fault of the records may do the same.
+    FaultyRecords,
+}

@@ -1,0 +1,30 @@
+//! Covariates that depend on the records: those of runs, and cycles of a wheel's turn.
+
+use effects::{Channel, Covariate, Sparse};
+use estimation::JointFit;
+use kinematics::Side;
+
+/// The covariates of runs that differ between runs.
+pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
+    let chains = &fit.records.chains;
+    let mut keys: Vec<&String> = chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter().filter_map(|key| Covariate::of_run(key, &values_of_runs(fit, key))).collect()
+}
+
+/// What each run says of a covariate, 0 where it says nothing.
+pub(crate) fn values_of_runs(fit: &JointFit<'_>, key: &str) -> Vec<f64> {
+    let runs = fit.records.chains.chunk_by(|a, b| a.run == b.run);
+    runs.map(|chains| chains[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
+}
+
+/// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.
+const CYCLES: [u8; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24];
+
+/// What a wheel may do several times in each turn.
+pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
+    let channel = if side == Side::Left { Channel::LeftWheel } else { Channel::RightWheel };
+    let phases = |cycles| [Covariate::CosPhase(side, cycles), Covariate::SinPhase(side, cycles)];
+    CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
+}

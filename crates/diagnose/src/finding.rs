@@ -1,0 +1,395 @@
+//! Findings: candidate causes with their probabilities, significance and parameter values, and the doubts that are on them.
+
+use std::collections::BTreeMap;
+
+use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
+use estimation::{JointFit, NoiseComponent};
+
+use crate::candidate::Choice;
+use crate::cause::{Basis, Cause, Doubt};
+use crate::check::{Check, TestResult};
+use crate::document::{UnlistedTerm, Value};
+use crate::model_comparison::chance;
+use crate::record_faults::Fault;
+use crate::residual_tests::Checked;
+use crate::rivals::Name;
+use crate::selection::Found;
+use crate::settings::{FAINT, FORM_ERROR, LEAST_REACH};
+use crate::statistics::{of_trials, z_of_p};
+use crate::wald::Test;
+
+/// Something that the calibrated model gets wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Finding {
+    /// The ambiguity set: causes that this data cannot discriminate, most probable first; never empty.
+    pub(crate) causes: Vec<Cause>,
+    /// Of the first cause, among all that were tried.
+    pub(crate) probability: f64,
+    /// The standard normal quantile of `p_value`.
+    pub(crate) z: f64,
+    /// Probability of so large an effect where there is none; multiplicity corrected.
+    pub(crate) p_value: f64,
+    /// Parameter values of the first cause.
+    pub(crate) parameters: BTreeMap<String, Value>,
+    pub(crate) basis: Basis,
+    pub(crate) doubts: Vec<Doubt>,
+}
+
+impl Finding {
+    /// The most probable cause.
+    pub(crate) fn first(&self) -> &Cause {
+        self.causes.first().unwrap_or(&Cause::Unknown)
+    }
+
+    /// Whether the most probable cause is in no catalogue.
+    pub(crate) fn is_unlisted(&self) -> bool {
+        self.first().is_unlisted()
+    }
+
+    /// Whether an uncatalogued cause is among the candidates.
+    pub(crate) fn has_unlisted(&self) -> bool {
+        self.causes.iter().any(Cause::is_unlisted)
+    }
+
+    /// Whether a cause of this id is among the candidates.
+    pub(crate) fn names(&self, cause: &Cause) -> bool {
+        self.causes.iter().any(|own| own.id() == cause.id())
+    }
+
+    /// Whether it is a mean effect with parameter values.
+    fn is_mean(&self) -> bool {
+        hypothesis(self.first().id()).and_then(Hypothesis::into_shapes).is_some() && !self.parameters.is_empty()
+    }
+
+    /// Whether it is a mean effect that no uncatalogued cause is held to explain as well.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.is_mean() && !self.has_unlisted()
+    }
+
+    /// An uncatalogued cause may do the same, with so much probability relative to that of the causes here.
+    pub(crate) fn or_unlisted(&mut self, odds: f64, doubt: Doubt) {
+        if !matches!(self.causes[..], [Cause::Term(_)]) {
+            self.causes.retain(|cause| !cause.is_unlisted());
+            self.causes.push(Cause::Unknown);
+        }
+        self.probability /= 1.0 + odds;
+        self.doubts.push(doubt);
+    }
+}
+
+/// The parameters of a choice as found.
+pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<String, Value> {
+    let held = choice.held().into_iter().map(|(name, value)| {
+        let unit = name.rsplit_once('_').map_or("1", |(_, unit)| unit);
+        (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() })
+    });
+    let fitted = choice.parameters().into_iter().zip(sizes).map(|(parameter, (value, sigma))| {
+        let sigma = Some(*sigma).filter(|sigma| sigma.is_finite());
+        (parameter.name.to_owned(), Value { value: *value, sigma, unit: parameter.unit.to_owned() })
+    });
+    fitted.chain(held).collect()
+}
+
+/// The findings of a search over the catalogue.
+pub(crate) fn of_search(found: &Found<'_>) -> Vec<Finding> {
+    let places = found.model.choices.iter().zip(&found.names).zip(&found.tests);
+    places.map(|((choice, names), test)| of_choice(choice, names, test, trials(found, choice))).collect()
+}
+
+/// How many variants of an effect were tried.
+fn trials(found: &Found<'_>, choice: &Choice) -> usize {
+    let entry = found.first_scan.iter().find(|entry| entry.scored.choice.id() == choice.id());
+    entry.map_or(1, |entry| entry.shapes.max(1))
+}
+
+/// Whether an effect that a search found is of low significance.
+pub(crate) fn is_faint(found: &Found<'_>, place: usize) -> bool {
+    let (choice, test) = (&found.model.choices[place], &found.tests[place]);
+    z(test, of_trials(test.p_value, trials(found, choice))) < FAINT
+}
+
+/// Probability that a finding has an uncatalogued cause that looks like one of the catalogue: one in twenty, as the blind benchmark finds.
+const UNWRITTEN: f64 = 0.05;
+
+/// The log of that probability over that of a catalogued cause.
+pub(crate) fn unwritten_log_odds() -> f64 {
+    (UNWRITTEN / (1.0 - UNWRITTEN)).ln()
+}
+
+fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
+    let top = names.first().map_or(0.0, |name| name.log_odds);
+    let weights: f64 = names.iter().map(|name| chance(name.log_odds, top)).sum();
+    let p_value = of_trials(test.p_value, trials);
+    let mut causes: Vec<Cause> = names.iter().map(|name| name.choice.cause()).collect();
+    if names.iter().any(|name| name.outdone) {
+        causes.push(Cause::Unknown);
+    }
+    Finding {
+        causes,
+        probability: (1.0 - UNWRITTEN) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
+        z: z(test, p_value),
+        p_value,
+        parameters: parameters(choice, &test.sizes),
+        basis: Basis::Mean,
+        doubts: Vec::new(),
+    }
+}
+
+/// The standard normal quantile of a probability; where that is below what a double holds, from the statistic itself.
+fn z(test: &Test, p_value: f64) -> f64 {
+    if p_value > 1e-290 { z_of_p(p_value) } else { test.statistic.sqrt() }
+}
+
+/// The finding of a sparse term at the end of a model's choices.
+pub(crate) fn of_sparse(choice: &Choice, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
+    let Choice::Sparse(sparse) = choice else { return None };
+    let (coefficient, sigma) = *test.sizes.first()?;
+    let channel = sparse.channel.name().to_owned();
+    let term = UnlistedTerm { channel, covariates: sparse.names(), coefficient, sigma };
+    Some(Finding {
+        causes: vec![Cause::Term(term)],
+        probability: 1.0,
+        z: z(test, p_value),
+        p_value,
+        parameters: BTreeMap::new(),
+        basis: Basis::Products(trials),
+        doubts: Vec::new(),
+    })
+}
+
+/// Something is left, and nothing that was tried explains it.
+pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
+    let failed: Vec<Check> = checked.checks.iter().filter(|test| !test.passes).map(|test| test.check.clone()).collect();
+    // Heavy tails have names of their own: what residuals depend on says how sure it is.
+    let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
+    let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
+        .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
+    let worst = worst.filter(|_| !failed.is_empty())?;
+    Some(of_causes(vec![Cause::Unknown], worst, BTreeMap::new(), Basis::FailedTests(failed)))
+}
+
+/// A finding beside an uncatalogued one, or beside a noise effect, whose z is below this share of that one's may be a part of it.
+const DOUBTFUL: f64 = 3.0;
+
+/// By how much more where as many effects were found as are sought, and there is still something left.
+const DOUBTFUL_IF_FULL: f64 = 3.0;
+
+/// Says of mean effects that one uncatalogued term would do as well, with these odds over them.
+pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
+    for finding in findings.iter_mut().filter(|finding| finding.is_mean()) {
+        finding.or_unlisted(odds, Doubt::TermDoesAsWell);
+    }
+}
+
+/// p-value at which the effects found do not explain all that is there though they do.
+const LACK_OF_FIT: f64 = 0.05;
+
+/// Says of the effects found, where no other doubt is on them, that they may not be what is there where the score of an uncatalogued term is still significant beside them,
+/// by more than what their form may err by. A p-value speaks against what it was computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
+    if p_value >= LACK_OF_FIT {
+        return;
+    }
+    let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
+    let odds = (against * UNWRITTEN / (1.0 - UNWRITTEN)).min(1.0);
+    let is_incomplete = |finding: &&mut Finding| finding.is_sure() && score > FORM_ERROR * finding.z.powi(2);
+    for finding in findings.iter_mut().filter(is_incomplete) {
+        finding.or_unlisted(odds, Doubt::Incomplete);
+    }
+}
+
+/// Odds that none of the candidates of a finding of low significance is right: of such findings of the blind benchmark seven of ten have the right one among theirs, of
+/// others forty-nine of fifty.
+const NONE_OF_THEM: f64 = 3.0 / 7.0;
+
+/// Says of the effects found, where no other doubt is on them, that they may be something else where they are of low significance.
+pub(crate) fn or_faint(findings: &mut [Finding]) {
+    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < FAINT) {
+        finding.or_unlisted(NONE_OF_THEM, Doubt::LowSignificance);
+    }
+}
+
+/// Says of causes that they may be part of an uncatalogued one that is significant as well, the more so where as many effects were found as are sought. A noise effect
+/// keeps its name first.
+pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
+    let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
+        findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
+    };
+    let unlisted = strongest(findings, Finding::is_unlisted);
+    let scatter = strongest(findings, |finding| has_sign(finding.first().id(), Sign::ScatterWithTurn));
+    for finding in findings.iter_mut().filter(|finding| !finding.is_unlisted()) {
+        let is_mean = finding.is_mean();
+        let stands_out = unlisted * if full && is_mean { DOUBTFUL_IF_FULL } else { 1.0 };
+        if is_mean && (finding.z < stands_out || DOUBTFUL * finding.z < scatter) {
+            finding.causes.retain(|cause| !cause.is_unlisted());
+            finding.causes.insert(0, Cause::Unknown);
+            finding.doubts.push(Doubt::ProbablyPartOfUnlisted);
+        } else if finding.z < DOUBTFUL * stands_out {
+            finding.or_unlisted(1.0, Doubt::PartOfUnlisted);
+        }
+    }
+}
+
+/// The counts do not follow the robot, and no gross fault explains it.
+pub(crate) fn of_lost(base: &JointFit<'_>) -> Finding {
+    let sigmas = NoiseComponent::ALL.map(|component| base.fit.noise.sigma(component));
+    of_causes(vec![Cause::Unknown], 0.0, BTreeMap::new(), Basis::Uncorrelated(sigmas))
+}
+
+/// Outlying rows that no fault of the catalogue explains.
+pub(crate) fn of_rows_astray(log: Option<&TestResult>) -> Option<Finding> {
+    let test = log.filter(|test| !test.passes)?;
+    let basis = Basis::OutlyingRows(test.statistic);
+    Some(of_causes(vec![Cause::Unknown], test.p_value, BTreeMap::new(), basis))
+}
+
+/// A log and measurements of two clocks.
+pub(crate) fn of_spans(spans: Option<&TestResult>) -> Option<Finding> {
+    let test = spans.filter(|test| !test.passes)?;
+    Some(of_causes(vec![Cause::Unknown], test.p_value, BTreeMap::new(), Basis::OtherClock(test.statistic)))
+}
+
+/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to be named.
+pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
+    let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
+    let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;
+    let cause = if without.iter().any(|out| out == id) { Cause::Unknown } else { Cause::Effect(id) };
+    // Logged over true counts: wheels that count twice as often seem half as large.
+    let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
+    Some(of_causes(vec![cause], 0.0, BTreeMap::from([(size.to_owned(), value)]), Basis::WheelFactor(factor)))
+}
+
+/// The finding of a gross fault.
+pub(crate) fn of_fault(fault: &Fault) -> Finding {
+    let value = |(name, value): &(&'static str, f64)| {
+        ((*name).to_owned(), Value { value: *value, sigma: None, unit: "1".to_owned() })
+    };
+    Finding {
+        causes: vec![Cause::Effect(fault.id)],
+        probability: 1.0,
+        z: (2.0 * fault.gain.min(1e6)).sqrt(),
+        // A likelihood ratio of e^gain bounds the probability of as much by accident (Markov's inequality).
+        p_value: (-fault.gain).exp(),
+        parameters: fault.sizes.iter().map(value).collect(),
+        basis: Basis::RecordFault(fault.sentence.clone()),
+        doubts: Vec::new(),
+    }
+}
+
+/// Effects of the catalogue that show by a sign, without those taken out.
+pub(crate) fn with_sign(sign: Sign, without: &[String]) -> Vec<&'static str> {
+    CATALOGUE
+        .iter()
+        .copied()
+        .filter(|id| !without.iter().any(|out| out == id))
+        .filter(|id| has_sign(id, sign))
+        .collect()
+}
+
+/// Whether an effect of the catalogue shows by a sign.
+fn has_sign(id: &str, sign: Sign) -> bool {
+    hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign))
+}
+
+/// A finding of what has no mean: causes that are as probable as each other, or an unknown one where there is none.
+pub(crate) fn of_causes(
+    mut causes: Vec<Cause>,
+    p_value: f64,
+    parameters: BTreeMap<String, Value>,
+    basis: Basis,
+) -> Finding {
+    if causes.is_empty() {
+        causes.push(Cause::Unknown);
+    }
+    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNWRITTEN) / causes.len() as f64 };
+    Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new() }
+}
+
+/// A noise effect by candidates each with the log of its likelihood: the likeliest first, without those that cannot be it, as another of them or `any`
+/// cause does better. An unknown cause, where it may be one, is as likely as they are on average.
+pub(crate) fn of_likely_scatter(
+    mut likely: Vec<(&'static str, f64)>,
+    any: f64,
+    or_unlisted: bool,
+    p_value: f64,
+    basis: Basis,
+) -> Finding {
+    likely.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let best = likely.first().map_or(0.0, |(_, log)| *log);
+    let weights: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
+    let named = if or_unlisted { likely.len() as f64 / (likely.len() + 1) as f64 } else { 1.0 };
+    likely.retain(|(_, log)| *log > best.max(any) - LEAST_REACH);
+    let mut causes: Vec<Cause> = likely.into_iter().map(|(id, _)| Cause::Effect(id)).collect();
+    if or_unlisted {
+        causes.push(Cause::Unknown);
+    }
+    let finding = of_causes(causes, p_value, BTreeMap::new(), basis);
+    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNWRITTEN) * named / weights };
+    Finding { probability, ..finding }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLIP: Cause = Cause::Effect("slip_speed");
+    const CASTOR: Cause = Cause::Effect("castor_drag");
+
+    fn found(z: f64, causes: &[Cause]) -> Finding {
+        let value = Value { value: 1e-3, sigma: Some(2e-4), unit: "1".to_owned() };
+        Finding {
+            causes: causes.to_vec(),
+            probability: 0.9,
+            z,
+            p_value: 1e-4,
+            parameters: BTreeMap::from([("share".to_owned(), value)]),
+            basis: Basis::Mean,
+            doubts: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_finding_of_low_significance_may_be_something_else() {
+        let mut findings = [
+            found(3.7, &[SLIP, CASTOR]),
+            found(5.0, &[SLIP, CASTOR]),
+            found(3.7, &[SLIP, Cause::Unknown]),
+            found(3.7, &[Cause::Effect("swapped_wheels")]),
+        ];
+        let before = findings.clone();
+        or_faint(&mut findings);
+        assert_eq!(findings[0].causes, [SLIP, CASTOR, Cause::Unknown]);
+        // None of the causes in three of ten, whatever their shares among themselves.
+        assert!((findings[0].probability - 0.7 * before[0].probability).abs() < 1e-12, "{:?}", findings[0]);
+        assert_eq!(findings[0].doubts, [Doubt::LowSignificance]);
+        // What is significant, what is doubted already, and a fault of the records stay as they are.
+        assert_eq!(findings[1..], before[1..]);
+    }
+
+    #[test]
+    fn a_weak_mean_effect_beside_a_strong_uncatalogued_one_is_probably_part_of_it() {
+        let unknown = of_causes(vec![], 1e-20, BTreeMap::new(), Basis::Autocorrelated(0.3));
+        assert!(unknown.is_unlisted() && unknown.probability == 1.0 && unknown.z > 9.0);
+        let mut findings = [found(5.0, &[SLIP]), found(20.0, &[CASTOR]), found(40.0, &[SLIP]), unknown];
+        doubt(&mut findings, false);
+        assert_eq!(findings[0].causes, [Cause::Unknown, SLIP]);
+        assert_eq!(findings[0].doubts, [Doubt::ProbablyPartOfUnlisted]);
+        // Above its z, but not three times so.
+        assert_eq!((&findings[1].causes[..], findings[1].probability), (&[CASTOR, Cause::Unknown][..], 0.45));
+        assert!(findings[2].doubts.is_empty());
+        // As many effects as are sought, and something left: the margin is three times as wide.
+        let mut full = [found(20.0, &[CASTOR]), findings[3].clone()];
+        doubt(&mut full, true);
+        assert_eq!(full[0].causes, [Cause::Unknown, CASTOR]);
+    }
+
+    #[test]
+    fn a_term_stays_what_it_is_when_something_else_may_do_the_same() {
+        let term = UnlistedTerm { channel: "yaw".to_owned(), covariates: vec![], coefficient: 1.0, sigma: 0.1 };
+        let mut finding = of_causes(vec![Cause::Term(term)], 1e-9, BTreeMap::new(), Basis::Products(300));
+        let before = finding.clone();
+        finding.or_unlisted(1.0, Doubt::FaultyRecords);
+        assert_eq!(finding.causes, before.causes);
+        assert_eq!(finding.probability, 0.5 * before.probability);
+    }
+}

@@ -1,0 +1,169 @@
+//! The diagnosis in English, and as scripts get it: the only place where findings become words.
+
+use std::collections::BTreeMap;
+
+use crate::cause::{Basis, Cause, Doubt};
+use crate::check::{Check, ResidualPersistence};
+use crate::document::{self, Gain, UnlistedTerm, Value, Verdict};
+use crate::finding::Finding;
+
+/// A finding as scripts get it.
+pub(crate) fn finding(finding: &Finding) -> document::Finding {
+    let unlisted_term = match finding.first() {
+        Cause::Term(term) => Some(term.clone()),
+        Cause::Effect(_) | Cause::Unknown => None,
+    };
+    document::Finding {
+        id: finding.first().id().to_owned(),
+        names: finding.causes.iter().map(|cause| cause.id().to_owned()).collect(),
+        probability: finding.probability,
+        z: finding.z,
+        p_value: finding.p_value,
+        parameters: finding.parameters.clone(),
+        sentence: sentence(finding),
+        unlisted_term,
+    }
+}
+
+fn listed(values: &BTreeMap<String, Value>) -> String {
+    let parts: Vec<String> = values
+        .iter()
+        .map(|(name, value)| match value.sigma {
+            Some(sigma) if value.unit == "1" => format!("{name} = {:.3e} ± {sigma:.1e}", value.value),
+            Some(sigma) => format!("{name} = {:.3e} ± {sigma:.1e} {}", value.value, value.unit),
+            None => format!("{name} = {:.3}", value.value),
+        })
+        .collect();
+    parts.join(", ")
+}
+
+/// The candidates, what speaks for them, and what casts doubt on them.
+fn sentence(finding: &Finding) -> String {
+    // Doubts that came after the finding are told after it; its candidates are those that it was found with.
+    let added = |doubt: &Doubt| *doubt != Doubt::ProbablyPartOfUnlisted;
+    let is_doubted = finding.doubts.iter().any(added);
+    let skipped = usize::from(finding.doubts.contains(&Doubt::ProbablyPartOfUnlisted));
+    let mut own: Vec<&str> = finding.causes.iter().skip(skipped).map(Cause::id).collect();
+    if is_doubted && own.len() > 1 && own.last() == Some(&"unlisted") {
+        own.pop();
+    }
+    let what = basis(finding);
+    let mut sentence = match (&finding.basis, &own[..]) {
+        (Basis::Mean, [id]) => format!("{id}: {what}"),
+        (Basis::Mean, [first, ..]) => {
+            format!("one of {}; this data cannot tell which. As {first}: {what}", own.join(", "))
+        }
+        (Basis::Products(_) | Basis::FailedTests(_), _) => what,
+        (_, ["unlisted"] | []) => format!("not in the catalogue: {what}"),
+        (_, [id]) => format!("{id}: {what}"),
+        (_, ids) => format!("one of {}; this data cannot tell which: {what}", ids.join(", ")),
+    };
+    for doubt in &finding.doubts {
+        sentence = match doubt {
+            Doubt::ProbablyPartOfUnlisted => {
+                format!("probably part of an effect that is not in the catalogue, or else {sentence}")
+            }
+            Doubt::PartOfUnlisted => {
+                format!("{sentence}; it may be part of an effect that is not in the catalogue")
+            }
+            Doubt::TermDoesAsWell => format!("{sentence}; a term that is not in the catalogue explains it as well"),
+            Doubt::Incomplete => format!("{sentence}; it does not explain all that is there"),
+            Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
+            Doubt::FaultyRecords => format!("{sentence}; what is wrong with the records may do the same"),
+        };
+    }
+    sentence
+}
+
+/// What speaks for the candidates.
+fn basis(finding: &Finding) -> String {
+    match &finding.basis {
+        Basis::Mean => listed(&finding.parameters),
+        Basis::Products(trials) => {
+            let Cause::Term(UnlistedTerm { channel, covariates, coefficient, sigma }) = finding.first() else {
+                return format!("not in the catalogue: the best of {trials} products tried");
+            };
+            format!(
+                "not in the catalogue: {channel}, grows with {} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried",
+                covariates.join(" · ")
+            )
+        }
+        Basis::FailedTests(failed) => {
+            let failed: Vec<String> = failed.iter().map(Check::name).collect();
+            format!(
+                "the residuals are not what the model says ({}), and nothing in the catalogue explains it: the cause cannot be told",
+                failed.join(", ")
+            )
+        }
+        Basis::Uncorrelated([wheel, turn, position, heading]) => format!(
+            "odometry is uncorrelated with what the instrument measured: to the best fit the wheels err by {:.0} mm/√m and {:.0} mrad/√rad, and measurements by {:.0} mm and {:.0} mrad",
+            1e3 * wheel,
+            1e3 * turn,
+            1e3 * position,
+            1e3 * heading
+        ),
+        Basis::OutlyingRows(rows) => format!("{rows:.0} rows of the log are outliers among the rows around them"),
+        Basis::OtherClock(ratio) => format!(
+            "the log lasts {ratio:.3e} times as long as what was measured of the robot: their times are not in one unit"
+        ),
+        Basis::WheelFactor(factor) => format!(
+            "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
+        ),
+        Basis::RecordFault(sentence) => sentence.clone(),
+        Basis::IsolatedErrors(isolated, of) => {
+            format!("{isolated} of {of} measurements are isolated outliers: the next ones agree with odometry again")
+        }
+        Basis::LargeErrors(ResidualPersistence::Persistent) => "large errors that persist: the robot jumped".to_owned(),
+        Basis::LargeErrors(ResidualPersistence::Reverting) => {
+            "large errors of the instrument that the next measurement reverts".to_owned()
+        }
+        Basis::LargeErrors(ResidualPersistence::Undecided) => {
+            "errors have heavier tails than normal ones, and the next measurements do not say whether robot or instrument erred".to_owned()
+        }
+        Basis::Autocorrelated(coefficient) => format!(
+            "measurement errors are autocorrelated (lag-one coefficient {coefficient:.2}), and no term that was tried explains it"
+        ),
+        Basis::TurnScatter(sigma) => format!("headings scatter with the turn, by {:.1} mrad/√rad", 1e3 * sigma),
+    }
+}
+
+/// The verdict on all findings.
+pub(crate) fn verdict(findings: &[Finding]) -> Verdict {
+    if findings.is_empty() {
+        Verdict::Consistent
+    } else if findings.iter().any(Finding::is_unlisted) {
+        Verdict::Unlisted
+    } else if findings.iter().any(|finding| finding.causes.len() > 1) {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Named
+    }
+}
+
+/// The whole diagnosis in one sentence.
+pub(crate) fn summary(findings: &[Finding], gain: Option<&Gain>) -> String {
+    let names = |finding: &Finding| {
+        let ids: Vec<&str> = finding.causes.iter().map(Cause::id).collect();
+        match finding.first() {
+            // An uncatalogued term is told by what it depends on.
+            Cause::Term(term) => {
+                format!("{} ({} with {})", ids.join(" or "), term.channel, term.covariates.join(" · "))
+            }
+            Cause::Effect(_) | Cause::Unknown => ids.join(" or "),
+        }
+    };
+    let names: Vec<String> = findings.iter().map(names).collect();
+    let gains = match gain {
+        Some(gain) if gain.log_score_per_observation.low > 0.0 => "; the extended model predicts held-out runs better",
+        Some(_) => "; on held-out runs the extended model gains nothing that is significant",
+        None => "",
+    };
+    match verdict(findings) {
+        Verdict::Consistent => "the calibrated model explains what was measured".to_owned(),
+        Verdict::Named => format!("found: {}{gains}", names.join(", ")),
+        Verdict::Ambiguous => {
+            format!("found, with causes that this data cannot discriminate: {}{gains}", names.join("; "))
+        }
+        Verdict::Unlisted => format!("found, and not all of it is in the catalogue: {}{gains}", names.join(", ")),
+    }
+}

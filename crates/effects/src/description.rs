@@ -1,0 +1,182 @@
+//! What is known of an effect beside its two faces: its meaning for people, what excites it, how a single
+//! large error of it looks, how its fault of the records is treated, and how the blind benchmark draws it.
+//!
+//! Diagnosis, plans, pages and the benchmark ask these properties; none of them compares ids. So a new effect
+//! states here all that they must know of it.
+
+use crate::benchmark::Benchmark;
+use crate::estimates::Estimates;
+
+/// Properties of an effect, whatever its sizes.
+#[derive(Clone)]
+pub struct Description {
+    /// What is wrong where the effect is, in one line for people: "the wheels lose distance in proportion to
+    /// their speed".
+    pub meaning: &'static str,
+    /// How people are told of it with the sizes that a fit found.
+    pub told: Told,
+    /// What excites it.
+    pub excitation: Excitation,
+    /// How a single large error of it looks; `None` where its errors are not single ones.
+    pub isolated_error: Option<IsolatedError>,
+    /// How its fault of the records is treated; of record faults only.
+    pub record_fault: RecordFault,
+    /// Its mean term depends on single rows of the log, not only on what the wheels did between two looks.
+    pub goes_by_rows: bool,
+    /// How the blind benchmark draws it.
+    pub benchmark: Benchmark,
+}
+
+impl Description {
+    /// An effect of this meaning that manoeuvres excite, without further properties.
+    pub(crate) const fn of(meaning: &'static str) -> Self {
+        Self {
+            meaning,
+            told: Told::AsFound,
+            excitation: Excitation::Manoeuvres,
+            isolated_error: None,
+            record_fault: RecordFault::WITH_A_TRACE,
+            goes_by_rows: false,
+            benchmark: Benchmark::OF_MEAN,
+        }
+    }
+
+    /// The meaning with sizes; `None` where the finding's own sentence says more.
+    #[must_use]
+    pub fn with_sizes(&self, sizes: &Estimates<'_>) -> Option<String> {
+        match self.told {
+            Told::AsFound => None,
+            Told::ByMeaning => Some(self.meaning.to_owned()),
+            Told::WithSizes(told) => Some(told(sizes)),
+        }
+    }
+}
+
+/// How people are told of an effect that was found.
+#[derive(Clone, Copy)]
+pub enum Told {
+    /// By the finding's own sentence, which says more: what a rewriting undid, or what the checks saw.
+    AsFound,
+    /// By the meaning: the sizes say little to people.
+    ByMeaning,
+    /// By a sentence with the sizes in it.
+    WithSizes(fn(&Estimates<'_>) -> String),
+}
+
+/// What excites an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Excitation {
+    /// What is driven: a plan of manoeuvres can bring it into sight.
+    Manoeuvres,
+    /// Other conditions than what is driven; what to do instead, as an instruction.
+    Conditions(&'static str),
+}
+
+/// How a single large error of an effect looks in the innovations at and after it. Each grid holds the scales
+/// that the error's size is integrated over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum IsolatedError {
+    /// One wheel loses distance, anywhere where it drives: how much, metres.
+    LostOnTheWay {
+        /// Scales of the distance lost, metres.
+        scales_m: &'static [f64],
+    },
+    /// Wheels lose distance as they become faster and gain it as they become slower, in proportion to the
+    /// change of speed.
+    LostWithSpeedChange {
+        /// Scales of the distance per change of speed, seconds.
+        scales_s: &'static [f64],
+    },
+    /// Wheels are behind where they start or stop, and catch up later.
+    WoundUp {
+        /// Scales of the distance that they are behind, metres.
+        scales_m: &'static [f64],
+    },
+    /// The outside instrument is wrong at one look alone, in any direction and by any amount.
+    OfInstrument,
+}
+
+/// How a fault of the records is treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordFault {
+    /// The log alone can show it. What leaves no trace is possible in any records, and is tried only where
+    /// the base fit is hard to believe.
+    pub leaves_a_trace: bool,
+    /// The rewriting restores the counts only roughly, so that outliers and scatter that are left say nothing
+    /// new.
+    pub is_restored_roughly: bool,
+    /// The size by which it multiplies the counts of both wheels: wheels that are calibrated far from nominal
+    /// by one factor are such a fault.
+    pub counts_factor: Option<&'static str>,
+}
+
+impl RecordFault {
+    /// A fault that the log can show and that a rewriting takes back exactly.
+    pub(crate) const WITH_A_TRACE: Self =
+        Self { leaves_a_trace: true, is_restored_roughly: false, counts_factor: None };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hypothesis::Hypothesis;
+    use crate::{CATALOGUE, Estimate, description, hypothesis};
+
+    /// What is wrong with a meaning.
+    fn complaint(meaning: &str) -> Option<&'static str> {
+        match meaning {
+            _ if meaning.trim().is_empty() => Some("it is empty"),
+            _ if meaning.contains('\n') => Some("it is more than one line"),
+            _ if meaning.ends_with('.') || meaning.starts_with(char::is_uppercase) => {
+                Some("it is a part of a sentence")
+            }
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn every_meaning_is_one_line_of_its_own() {
+        let mut meanings: Vec<&str> = CATALOGUE.iter().map(|id| description(id).expect("known").meaning).collect();
+        for meaning in &meanings {
+            assert_eq!(complaint(meaning), None, "{meaning}");
+        }
+        meanings.sort_unstable();
+        meanings.dedup();
+        assert_eq!(meanings.len(), CATALOGUE.len(), "two effects mean the same");
+        for wrong in ["", "two\nlines", "Slips", "slips."] {
+            assert!(complaint(wrong).is_some(), "{wrong}");
+        }
+    }
+
+    /// A sentence with sizes names no size that a fit does not have: it would show a question mark.
+    #[test]
+    fn sentences_show_the_sizes_that_a_fit_finds() {
+        let mut with_sizes = 0;
+        for id in CATALOGUE {
+            let description = description(id).expect("known");
+            let Told::WithSizes(told) = description.told else { continue };
+            let shapes =
+                hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_else(|| panic!("{id} has no sizes"));
+            let parameters = shapes.iter().flat_map(|shape| shape.term.parameters().iter().map(|of| of.name));
+            let names = parameters.chain(shapes.iter().flat_map(|shape| shape.held.iter().map(|(name, _)| *name)));
+            let sizes: Estimates<'_> =
+                names.map(|name| (name, Estimate { value: 0.0125, sigma: Some(1e-3) })).collect();
+            let sentence = told(&sizes);
+            assert!(!sentence.contains('?') && sentence.contains("± "), "{id}: {sentence}");
+            assert!(told(&Estimates::default()) != sentence, "{id}: it shows no size");
+            with_sizes += 1;
+        }
+        assert!(with_sizes >= 15, "{with_sizes}");
+    }
+
+    /// Properties of faults are of faults alone, single errors of what scatters alone.
+    #[test]
+    fn properties_are_of_the_effects_that_can_have_them() {
+        for id in CATALOGUE {
+            let (description, hypothesis) = (description(id).expect("known"), hypothesis(id).expect("known"));
+            let is_fault = matches!(hypothesis, Hypothesis::Records(_));
+            assert!(is_fault || description.record_fault == RecordFault::WITH_A_TRACE, "{id}");
+            assert!(!hypothesis.signs().is_empty() || description.isolated_error.is_none(), "{id}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Estimated sizes of an effect, as sentences for people show them: scaled to a handy unit, with as many
+//! digits as their standard deviation is worth.
+
+use std::collections::BTreeMap;
+
+/// A number with its standard deviation, where that is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value, SI.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: Option<f64>,
+}
+
+impl Estimate {
+    /// The estimate times a scale, which takes it from SI to the unit shown.
+    #[must_use]
+    pub fn shown(self, scale: f64, unit: &str) -> String {
+        plus_minus(scale * self.value, self.sigma.map(|sigma| sigma * scale.abs()), unit)
+    }
+}
+
+/// The sizes of one effect by their names.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Estimates<'n>(BTreeMap<&'n str, Estimate>);
+
+impl<'n> FromIterator<(&'n str, Estimate)> for Estimates<'n> {
+    fn from_iter<I: IntoIterator<Item = (&'n str, Estimate)>>(sizes: I) -> Self {
+        Self(sizes.into_iter().collect())
+    }
+}
+
+impl Estimates<'_> {
+    /// The value of a size.
+    pub(crate) fn value(&self, name: &str) -> Option<f64> {
+        self.0.get(name).map(|estimate| estimate.value)
+    }
+
+    /// A size times a scale, in the unit shown; a question mark where it is not known.
+    pub(crate) fn shown(&self, name: &str, scale: f64, unit: &str) -> String {
+        self.0.get(name).map_or_else(|| "?".to_owned(), |estimate| estimate.shown(scale, unit))
+    }
+
+    /// For each wheel whose sine and cosine (`left_sin` and `left_cos`, with a suffix) are significant,
+    /// `what` and their amplitude; the larger first.
+    pub(crate) fn amplitudes(&self, suffix: &str, scale: f64, unit: &str, what: &str) -> String {
+        let side = |side: &str| -> Option<(f64, String)> {
+            let of = |part: &str| self.0.get(&format!("{side}_{part}{suffix}")[..]);
+            let (sin, cos) = (of("sin")?, of("cos")?);
+            let size = sin.value.hypot(cos.value);
+            let sigma = sin
+                .sigma
+                .zip(cos.sigma)
+                .map(|(a, b)| ((sin.value * a).hypot(cos.value * b)) / size.max(f64::MIN_POSITIVE));
+            let shows = sigma.is_none_or(|sigma| size > 3.0 * sigma);
+            let text = format!("the {side} {what} by {}", plus_minus(scale * size, sigma.map(|s| s * scale), unit));
+            shows.then_some((size, text))
+        };
+        let mut sides: Vec<(f64, String)> = ["left", "right"].into_iter().filter_map(side).collect();
+        sides.sort_by(|a, b| b.0.total_cmp(&a.0));
+        if sides.is_empty() {
+            return format!("a {what}, which one cannot be told");
+        }
+        sides.into_iter().map(|(_, text)| text).collect::<Vec<_>>().join(" and ")
+    }
+}
+
+/// A value with its standard deviation, with as many digits as that is worth.
+fn plus_minus(value: f64, sigma: Option<f64>, unit: &str) -> String {
+    let sigma = sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0);
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    match sigma {
+        Some(sigma) => {
+            let decimals = decimals_for(sigma);
+            format!("{value:.decimals$} ± {sigma:.decimals$}{unit}")
+        }
+        None => {
+            let decimals = decimals_for(0.1 * value.abs());
+            format!("{value:.decimals$}{unit}")
+        }
+    }
+}
+
+/// Decimals that show two digits of a number below 1, and none of one above 10.
+fn decimals_for(sigma: f64) -> usize {
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return 2;
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to 9
+    let decimals = (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize;
+    decimals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_the_standard_deviation() {
+        assert_eq!(plus_minus(0.40123, Some(0.0123), "%"), "0.401 ± 0.012 %");
+        assert_eq!(plus_minus(159.87, Some(23.4), "mm"), "160 ± 23 mm");
+        assert_eq!(plus_minus(7.0, None, ""), "7.00");
+    }
+
+    #[test]
+    fn only_a_significant_amplitude_is_shown() {
+        let of = |value: f64| Estimate { value, sigma: Some(1.2e-3) };
+        let sizes = [("left_sin", 3e-3), ("left_cos", 4e-3), ("right_sin", 1e-3), ("right_cos", 2e-3)];
+        let estimates: Estimates<'_> = sizes.map(|(name, value)| (name, of(value))).into_iter().collect();
+        assert_eq!(estimates.amplitudes("", 1e3, "‰", "radius varies"), "the left radius varies by 5.0 ± 1.2 ‰");
+        assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one cannot be told");
+        assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.2 mm");
+        assert_eq!(estimates.shown("elsewhere", 1e3, "mm"), "?");
+    }
+}
