@@ -1,6 +1,6 @@
 //! The commands in the documents: CI runs them, and they print what the documents show.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -23,34 +23,39 @@ fn blocks(document: &str) -> Vec<(String, Vec<String>)> {
     blocks
 }
 
-/// `step NAME COMMAND` lines of .ci/run.
-fn ci_steps() -> Vec<(String, String)> {
-    let steps = text(".ci/run");
-    let steps = steps.lines().filter_map(|line| line.strip_prefix("step ")?.split_once(' '));
-    steps.filter(|(name, _)| *name != "()").map(|(name, command)| (name.to_owned(), command.to_owned())).collect()
+/// The names of .ci/run's steps, each with its first command.
+fn ci_steps() -> BTreeMap<String, String> {
+    let script = text(".ci/run");
+    let (_, steps) = script.split_once("\n  case $1 in\n").expect("steps by name");
+    let names = steps.lines().zip(steps.lines().skip(1)).filter_map(|(line, next)| {
+        let (name, command) = line.trim().split_once(')').filter(|(name, _)| *name != "*")?;
+        let is_name = name.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-');
+        let command = if command.is_empty() { next } else { command };
+        let command = command.trim().trim_start_matches("run ").trim_end_matches(" ;;");
+        is_name.then(|| (name.to_owned(), command.to_owned()))
+    });
+    names.collect()
 }
 
 #[test]
-fn the_readme_the_justfile_and_ci_run_the_same_commands() {
+fn the_readme_has_commands_of_ci_and_the_justfile_its_steps() {
     let steps = ci_steps();
+    let script = text(".ci/run");
+    let checks = script.lines().find_map(|line| line.strip_prefix("checks=(")?.strip_suffix(')')).expect("checks");
+    let checks: Vec<&String> = checks.split(' ').map(|name| &steps[name]).collect();
     let readme = blocks(&text("README.md"));
-    let commands: Vec<&String> =
-        readme.iter().filter(|(language, _)| language == "sh").flat_map(|(_, lines)| lines).collect();
-    for command in &commands[..2] {
-        assert!(steps.iter().any(|(_, step)| step == *command), "README's \"{command}\" is no step of .ci/run");
+    let mut commands = readme.iter().filter(|(language, _)| language == "sh").flat_map(|(_, lines)| lines);
+    for command in [commands.next(), commands.next()].map(|command| command.expect("README's first two commands")) {
+        assert!(checks.contains(&command), "README's \"{command}\" is no check of .ci/run");
     }
     let justfile = text("justfile");
-    for (name, command) in &steps {
-        assert!(justfile.contains(&format!("\n{name}:\n    {command}\n")), "justfile lacks {name}: {command}");
-    }
-    let recipes: BTreeSet<&str> = justfile
-        .lines()
-        .filter(|line| !line.starts_with([' ', '#']))
-        .filter_map(|line| line.strip_suffix(':'))
-        .collect();
-    let expected: BTreeSet<&str> =
-        steps.iter().map(|(name, _)| name.as_str()).chain(["ci", "documents", "challenge"]).collect();
-    assert_eq!(recipes, expected);
+    let recipes: Vec<&str> = justfile.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+    let expected: BTreeSet<(String, String)> =
+        steps.keys().map(|name| (format!("{name}:"), format!("    .ci/run {name}"))).collect();
+    let found: BTreeSet<(String, String)> =
+        recipes[2..].chunks(2).map(|recipe| (recipe[0].to_owned(), recipe[1].to_owned())).collect();
+    assert_eq!(recipes[..2], ["ci:", "    .ci/run"]);
+    assert_eq!(found, expected);
 }
 
 #[test]
@@ -113,10 +118,6 @@ fn a_pasted_output_with_another_digit_does_not_agree() {
     }
 }
 
-/// The documents whose commands are run.
-const DOCUMENTS: [&str; 5] =
-    ["README.md", "docs/calibration.md", "docs/methods.md", "docs/bench.md", "docs/real-robots.md"];
-
 /// A pasted output as it should be: what is printed, with the same left out at … as before. What comes after … is found by its first line that is printed once, or else is as long as it was.
 fn refreshed(pasted: &[String], real: &str) -> Vec<String> {
     let real: Vec<String> = real.lines().map(|line| line.trim_end().to_owned()).collect();
@@ -155,51 +156,78 @@ fn a_refreshed_output_agrees_and_keeps_what_it_leaves_out() {
 }
 
 /// Every `sh` block that is followed by a `text` block: its `yair` commands print that text. And every picture `docs/bench-NAME.svg` is the one that the sweep
-/// of NAME draws. With YAIR_UPDATE_DOCS=1 texts and pictures are written anew.
-#[test]
-fn the_documents_show_what_the_commands_print() {
+/// of NAME in `docs/bench.md` draws. With YAIR_UPDATE_DOCS=1 texts and pictures are written anew. Compared are so many at the least, real data or none.
+fn shows_what_its_commands_print(document: &str, least: usize) {
     let update = std::env::var("YAIR_UPDATE_DOCS").is_ok_and(|value| value == "1");
     let mut compared = 0;
-    for document in DOCUMENTS {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut printed = None;
-        let mut written = text(document);
-        for (language, lines) in blocks(&text(document)) {
-            let ours = |line: &&String| line.starts_with("yair ") || line.starts_with("cargo run --release -- ");
-            match language.as_str() {
-                "sh" => {
-                    let outputs = lines.iter().filter(ours).map(|line| run(line, folder.path()));
-                    printed = outputs.collect::<Option<String>>();
-                }
-                "text" => {
-                    if let Some(printed) = printed.take().filter(|printed| !printed.is_empty()) {
-                        let block = |lines: &[String]| format!("```text\n{}\n```", lines.join("\n"));
-                        if update {
-                            written = written.replacen(&block(&lines), &block(&refreshed(&lines, &printed)), 1);
-                        } else if let Err(difference) = agrees(&lines, &printed) {
-                            panic!("{document}: {difference}\nall that was printed:\n{printed}");
-                        }
-                        compared += 1;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut printed = None;
+    let mut written = text(document);
+    for (language, lines) in blocks(&text(document)) {
+        let ours = |line: &&String| line.starts_with("yair ") || line.starts_with("cargo run --release -- ");
+        match language.as_str() {
+            "sh" => {
+                let outputs = lines.iter().filter(ours).map(|line| run(line, folder.path()));
+                printed = outputs.collect::<Option<String>>();
+            }
+            "text" => {
+                if let Some(printed) = printed.take().filter(|printed| !printed.is_empty()) {
+                    let block = |lines: &[String]| format!("```text\n{}\n```", lines.join("\n"));
+                    if update {
+                        written = written.replacen(&block(&lines), &block(&refreshed(&lines, &printed)), 1);
+                    } else if let Err(difference) = agrees(&lines, &printed) {
+                        panic!("{document}: {difference}\nall that was printed:\n{printed}");
                     }
+                    compared += 1;
                 }
-                _ => {}
             }
-        }
-        for picture in files("docs").into_iter().filter(|file| file.extension().is_some_and(|of| of == "svg")) {
-            let stem = picture.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let Some(name) = stem.strip_prefix("bench-").filter(|_| document == "docs/bench.md") else { continue };
-            let drawn = fs::read(folder.path().join(name).join("sweep.svg")).expect("the document draws it");
-            if update {
-                fs::write(&picture, &drawn).expect("written");
-            }
-            assert!(drawn == fs::read(&picture).expect("read"), "{stem}.svg is not what {document}'s command draws");
-            compared += 1;
-        }
-        if update {
-            fs::write(root().join(document), written).expect("written");
+            _ => {}
         }
     }
-    assert!(compared >= 8, "the README's sweep and round trip, the bench's tables and pictures, the methods' table");
+    for picture in files("docs").into_iter().filter(|file| file.extension().is_some_and(|of| of == "svg")) {
+        let stem = picture.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let Some(name) = stem.strip_prefix("bench-").filter(|_| document == "docs/bench.md") else { continue };
+        let drawn = fs::read(folder.path().join(name).join("sweep.svg")).expect("the document draws it");
+        if update {
+            fs::write(&picture, &drawn).expect("written");
+        }
+        assert!(drawn == fs::read(&picture).expect("read"), "{stem}.svg is not what {document}'s command draws");
+        compared += 1;
+    }
+    if update {
+        fs::write(root().join(document), written).expect("written");
+    }
+    assert!(compared >= least, "{document}: {compared} outputs were compared");
+}
+
+/// A test for each document, so that they run beside each other.
+mod documents_show_what_commands_print {
+    use super::shows_what_its_commands_print;
+
+    #[test]
+    fn readme() {
+        shows_what_its_commands_print("README.md", 3);
+    }
+
+    #[test]
+    fn calibration() {
+        shows_what_its_commands_print("docs/calibration.md", 0);
+    }
+
+    #[test]
+    fn methods() {
+        shows_what_its_commands_print("docs/methods.md", 2);
+    }
+
+    #[test]
+    fn bench() {
+        shows_what_its_commands_print("docs/bench.md", 5);
+    }
+
+    #[test]
+    fn real_robots() {
+        shows_what_its_commands_print("docs/real-robots.md", 0);
+    }
 }
 
 /// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::support::{document, refusal, run_in, succeed, usage};
 use bench::{BenchError, Campaign, Ended, Shard, SweepOptions, SweepPlan};
@@ -192,48 +192,47 @@ fn write_scenario(folder: &Path, trials: u64) {
     fs::write(folder.join("small.toml"), scenario.to_toml().expect("TOML")).expect("written");
 }
 
-/// The command killed with no time to say anything, as soon as its state stands and again a little later.
+/// Starts a campaign in a folder and kills it, with no time to say anything, a little after it has written its state anew. Whether it lasted so long.
+fn killed_after_a_state(here: &Path, arguments: &[&str], state: &Path) -> bool {
+    let written = || fs::metadata(state).and_then(|of| of.modified()).ok();
+    let before = written();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_yair"))
+        .current_dir(here)
+        .args(arguments)
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("yair starts");
+    while written() == before && child.try_wait().expect("a child").is_none() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_millis(150));
+    child.kill().expect("killed, or ended before");
+    !child.wait().expect("ended").success()
+}
+
+/// The command killed as soon as its state stands, and again when it has gone on and written another.
 #[test]
 fn a_killed_command_goes_on_where_it_was() {
     let temporary = tempfile::tempdir().expect("a folder");
     let here = temporary.path();
-    let arguments = ["sweep", "small.toml", "--rows", "--json", "--quiet", "--out"];
-    let mut trials = 50_000;
-    let undisturbed = loop {
-        write_scenario(here, trials);
-        let started = Instant::now();
-        let undisturbed = run_in(here, &[&arguments[..], &["whole"]].concat());
-        assert_eq!(undisturbed.code, Some(0), "{}", undisturbed.stderr);
-        // However fast the machine: it must not be done before the first state, which is written after two seconds.
-        if started.elapsed() > Duration::from_secs(6) {
-            break undisturbed;
-        }
-        fs::remove_dir_all(here.join("whole")).expect("removed");
-        trials *= 2;
-    };
+    let arguments = ["sweep", "small.toml", "--rows", "--json", "--quiet", "--jobs", "1", "--out"];
     let state = here.join("killed").join(STATE);
-    for resume in [None, Some("--resume")] {
-        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_yair"))
-            .current_dir(here)
-            .args(arguments)
-            .arg("killed")
-            .args(resume)
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .expect("yair starts");
-        let before = fs::metadata(&state).and_then(|of| of.modified()).ok();
-        let started = Instant::now();
-        while fs::metadata(&state).and_then(|of| of.modified()).ok() == before {
-            assert!(started.elapsed() < Duration::from_secs(60), "no state is written");
-            assert!(child.try_wait().expect("a child").is_none(), "it ended before it wrote a state: more trials!");
-            std::thread::sleep(Duration::from_millis(10));
+    let mut trials = 16_000;
+    // A state is written every two seconds: a machine on which the campaign ends before its second one gets a longer campaign.
+    loop {
+        write_scenario(here, trials);
+        let [first, second] = [&["killed"][..], &["killed", "--resume"]]
+            .map(|to| killed_after_a_state(here, &[&arguments[..], to].concat(), &state));
+        if first && second {
+            break;
         }
-        std::thread::sleep(Duration::from_millis(150));
-        child.kill().expect("killed");
-        child.wait().expect("ended");
+        assert!(trials < 10_000_000, "no state is written");
+        fs::remove_dir_all(here.join("killed")).expect("removed");
+        trials *= 2;
     }
     let message = refusal(here, &["sweep", "small.toml", "--out", "killed"]);
     assert!(message.contains("--resume") && message.contains(STATE), "{message}");
+    let undisturbed = succeed(here, &[&arguments[..], &["whole"]].concat());
     let resumed = run_in(here, &[&arguments[..], &["killed", "--resume"]].concat());
     assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
     assert_eq!(resumed.stdout, undisturbed.stdout);

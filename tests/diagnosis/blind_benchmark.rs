@@ -1,11 +1,12 @@
-//! The blind benchmark of diagnosis, a small part of it: a fixed seed, and one that nobody has seen before.
+//! The blind benchmark of diagnosis, a small part of it with a fixed seed, and the same floors under a fresh one.
 //!
 //! The whole campaign is `just challenge`; docs/diagnose.md has its table. Here stand floors under what that measures, so far below it that only a tool that
 //! has broken falls through: one that alarms at nulls one time in two, finds half of what is plain, or names one in four of what it finds.
-#![allow(clippy::print_stdout)] // the fresh seed, and what came of it
+#![allow(clippy::print_stdout)] // the seed, and what came of it
 
 use crate::support::{document, succeed, usage};
-use blind_benchmark::{CaseResult, ChallengeResult, EffectKind, NoiseClass, Round, challenge};
+use blind_benchmark::{CaseResult, EffectKind, NoiseClass, Round, challenge_case};
+use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 /// What the tool must do at the least, as shares: the bar on false alarms under white noise, and floors under detection and naming, which docs/diagnose.md
@@ -31,9 +32,19 @@ fn count<'a>(cases: impl Iterator<Item = &'a CaseResult>, holds: impl Fn(&CaseRe
     cases.fold((0, 0), |(hits, all), case| (hits + u64::from(holds(case)), all + 1))
 }
 
+/// Places of a block of twenty cases that hold nulls and single effects: on these the floors stand.
+const NULLS_AND_SINGLES: u64 = 14;
+
+/// Drives these cases of a seed. Left out is the case of an effect that no robot drawn for it shows.
+fn driven(seed: u64, numbers: impl Iterator<Item = u64>) -> Vec<CaseResult> {
+    let numbers: Vec<u64> = numbers.collect();
+    let results = numbers.into_par_iter().map(|number| challenge_case(seed, number).expect("simulates").ok());
+    results.collect::<Vec<_>>().into_iter().flatten().collect()
+}
+
 /// Three floors, each with a third of `alpha`.
-fn holds(result: &ChallengeResult, alpha: f64) {
-    let white = || result.cases.iter().filter(|case| case.noise == NoiseClass::White);
+fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
+    let white = || cases.iter().filter(|case| case.noise == NoiseClass::White);
     let share = alpha / 3.0;
     let (alarms, nulls) = count(white().filter(|case| case.round == Round::Null), |case| !case.said.is_empty());
     let plain = || {
@@ -49,30 +60,32 @@ fn holds(result: &ChallengeResult, alpha: f64) {
     };
     let (named, said) = count(plain().filter(|case| !case.said.is_empty()), named);
     println!(
-        "seed {}: {alarms} alarms in {nulls} nulls, {detected} of {singles} detected, {named} of {said} named",
-        result.seed
+        "seed {seed}: {alarms} alarms in {nulls} nulls, {detected} of {singles} detected, {named} of {said} named"
     );
     assert!(alarms <= most(nulls, ALARMS, share), "{alarms} alarms in {nulls} nulls");
     assert!(detected >= least(singles, DETECTED, share), "{detected} of {singles} detected");
     assert!(named >= least(said, NAMED, share), "{named} of {said} named");
 }
 
-/// Cases 0 to 99 of a seed: 35 nulls and 35 singles.
+/// Of cases 0 to 99 of a seed all 35 nulls and 35 singles, and the two pairs and four effects that are left out of the first block, of which nothing is asked
+/// here but an answer.
 #[test]
 fn a_fixed_part_of_the_challenge_is_passed() {
-    let result = challenge(20_260, 100, 0, &|| ()).expect("simulates");
-    assert!(result.cases.len() + result.never_shown.values().sum::<usize>() == 100);
-    holds(&result, 1e-3);
+    let seed = 20_260;
+    let cases = driven(seed, (0..100).filter(|number| *number < 20 || number % 20 < NULLS_AND_SINGLES));
+    let in_round = |round: Round| cases.iter().filter(|case| case.round == round).count();
+    // No robot may show an effect that was drawn for it: docs/diagnose.md has such cases, a few in a hundred.
+    assert!(in_round(Round::Null) == 35 && (30..=35).contains(&in_round(Round::Single)), "{}", cases.len());
+    assert!(in_round(Round::Pair) > 0 && in_round(Round::LeftOut) > 0);
+    holds(seed, &cases, 1e-3);
 }
 
-/// The only test that draws from the clock: nothing can have been tuned on these cases. At the floors' own rates it fails once in 10 000 runs, and the tool
-/// is better than its floors.
+/// Nothing can have been tuned on a seed that nobody has seen. At the floors' own rates this fails once in 10 000 runs, and the tool is better than its floors.
 #[test]
+#[ignore = "a campaign, not a test: `just fresh-seeds` takes a seed from the clock and gives it in YAIR_SEED"]
 fn a_part_of_the_challenge_that_nobody_has_seen_is_passed() {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
-    let seed = now.as_nanos() as u64;
-    println!("fresh seed {seed}");
-    holds(&challenge(seed, 60, 0, &|| ()).expect("simulates"), 1e-4);
+    let seed = std::env::var("YAIR_SEED").expect("YAIR_SEED").parse().expect("a whole number");
+    holds(seed, &driven(seed, (0..200).filter(|number| number % 20 < NULLS_AND_SINGLES)), 1e-4);
 }
 
 #[test]

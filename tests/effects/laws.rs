@@ -1,4 +1,4 @@
-//! Laws that every effect of the catalogue keeps, each with a specimen that breaks it. What its hypothesis says of data stands in effect_hypotheses/.
+//! Laws that every effect of the catalogue keeps, each with a specimen that breaks it. What its hypothesis says of data stands in hypotheses/.
 
 use dataset::{Dataset, Protocol, ProtocolSettings, Run};
 use effects::{

@@ -212,14 +212,14 @@ fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     assert!(refused.contains("Latency"), "{refused}");
 }
 
-/// 1000 trials of each case: RMSE²/bound has a standard error of √(2/1000) = 4.5 %, a coverage of 0.7 %, a ratio of RMSEs of two cases 3.2 %. At 4 of
-/// each beside the claims (5 %, 93.5 to 96.5 %, 15 %; 20 000 trials of docs/methods.md) nine numbers are a false alarm of 6e-4. Rejects looks taken one in two,
+/// 300 trials of each case: RMSE²/bound has a standard error of √(2/300) = 8.2 %, a coverage of 1.3 %, a ratio of RMSEs of two cases √(1/300) = 5.8 %. At 4 of
+/// each beside the claims (5 %, 93.5 to 96.5 %, 15 %; 20 000 trials of docs/methods.md) nine numbers are a false alarm of 6e-4; that all 300 intervals cover has a chance of 2e-5 at 96.5 %. Rejects looks taken one in two,
 /// which doubles the mean square, and outliers that are believed, which multiply it by ten.
 #[test]
 fn the_bound_is_reached_and_outliers_hardly_matter() {
     let temp = tempfile::tempdir().expect("a folder");
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/joint-efficiency.toml").display().to_string();
-    let found = succeed(temp.path(), &["sweep", &scenario, "--trials", "1000", "--json", "--quiet"]).stdout;
+    let found = succeed(temp.path(), &["sweep", &scenario, "--trials", "300", "--json", "--quiet"]).stdout;
     let found: Value = serde_json::from_str(&found).expect("JSON");
     let number = |point: usize, row: usize, key: &str| {
         found["points"][point]["estimators"][row][key].as_f64().unwrap_or_else(|| panic!("{key} of {found}"))
@@ -227,11 +227,11 @@ fn the_bound_is_reached_and_outliers_hardly_matter() {
     for row in 0..3 {
         assert_eq!(number(0, row, "failures"), 0.0);
         let ratio = number(0, row, "cramer_rao_ratio");
-        assert!((0.82..1.05 + 0.18).contains(&ratio), "{row}: {ratio}");
+        assert!((1.0 - 0.33..1.05 + 0.33).contains(&ratio), "{row}: {ratio}");
         let coverage = number(0, row, "coverage");
-        assert!((0.935 - 0.028..0.965 + 0.028).contains(&coverage), "{row}: {coverage}");
+        assert!((0.935 - 0.05..1.0).contains(&coverage), "{row}: {coverage}");
         let grown = number(1, row, "rmse") / number(0, row, "rmse");
-        assert!(grown < 1.15 + 0.13, "{row}: {grown}");
+        assert!(grown < 1.15 + 0.23, "{row}: {grown}");
     }
 }
 

@@ -368,23 +368,3 @@ fn a_scenario_without_a_bound_says_why() {
     noisy.noise.wheel_sigma_m_per_sqrt_m = 1e-3;
     assert!(FisherInformation::of(&noisy, &noisy.programs()).is_ok());
 }
-
-#[test]
-fn a_sweeps_point_costs_little() {
-    let scenario = paper();
-    let mut dense = scenario.clone();
-    dense.instruments = vec![capture(20.0)];
-    // A minute at 0.25 m/s.
-    let minute = program(&square(2.9));
-    let started = std::time::Instant::now();
-    let repeats = 10;
-    for _ in 0..repeats {
-        FisherInformation::of(&scenario, &scenario.programs()).expect("bounded");
-    }
-    let point_s = started.elapsed().as_secs_f64() / f64::from(repeats);
-    let started = std::time::Instant::now();
-    FisherInformation::of(&dense, &[minute]).expect("bounded");
-    let dense_s = started.elapsed().as_secs_f64();
-    // Measured 0.05 ms and 10 ms; the limits are what a sweep can afford.
-    assert!(point_s < 0.05 && dense_s < 1.0, "{point_s} s, {dense_s} s");
-}
