@@ -14,7 +14,7 @@ use crate::terminal::{Failure, Terminal, cell, table};
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// How many cases; the bars are meant for 2000 and more.
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=MAX_CASES))]
     cases: u64,
     /// Seed of every random draw.
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -31,10 +31,10 @@ pub(crate) struct Arguments {
 }
 
 /// A week of computing; a typing error beyond.
-const MOST_CASES: u64 = 1_000_000;
+const MAX_CASES: u64 = 1_000_000;
 
 /// Most lines of confusions that a person reads.
-const MOST_SHOWN: usize = 60;
+const MAX_SHOWN: usize = 60;
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     if let Some(number) = arguments.case {
@@ -139,7 +139,7 @@ fn show(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
     wrong.retain(|confusion| (confusion.hidden.as_str(), confusion.said.as_str()) != ("nothing", "nothing"));
     wrong.sort_by(|a, b| b.count.cmp(&a.count).then(a.cmp(b)));
     let mut list = table(&["round", "hidden", "said", "cases", "such as"], 3);
-    for confusion in wrong.iter().take(MOST_SHOWN) {
+    for confusion in wrong.iter().take(MAX_SHOWN) {
         list.add_row([
             confusion.round.clone(),
             confusion.hidden.clone(),
@@ -149,8 +149,8 @@ fn show(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
         ]);
     }
     terminal.say(&list.to_string())?;
-    if wrong.len() > MOST_SHOWN {
-        terminal.say(&format!("and {} more; --json has all", wrong.len() - MOST_SHOWN))?;
+    if wrong.len() > MAX_SHOWN {
+        terminal.say(&format!("and {} more; --json has all", wrong.len() - MAX_SHOWN))?;
     }
     if !result.never_shown.is_empty() {
         let never: Vec<String> = result.never_shown.iter().map(|(id, times)| format!("{id} ({times})")).collect();

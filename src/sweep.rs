@@ -20,13 +20,13 @@ pub(crate) struct Arguments {
     /// Scenario file (TOML) with a [sweep] section; see scenarios/.
     scenario: PathBuf,
     /// Trials at every point, in place of the scenario's; with --precision, at most so many.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..=MOST_TRIALS))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..=MAX_TRIALS))]
     trials: Option<u64>,
     /// Run every point until all its Monte-Carlo errors are below this: 1% or 0.01.
     #[arg(long, value_name = "P", value_parser = precision)]
     precision: Option<f64>,
     /// Threads; 0 = one a core. The result does not depend on it.
-    #[arg(long, value_name = "J", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=MOST_JOBS))]
+    #[arg(long, value_name = "J", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=MAX_JOBS))]
     jobs: u16,
     /// Seed of every random draw, in place of the scenario's.
     #[arg(long)]
@@ -55,10 +55,10 @@ pub(crate) struct Arguments {
 }
 
 /// More threads than any machine of ours has cores; a typing error beyond.
-const MOST_JOBS: i64 = 1024;
+const MAX_JOBS: i64 = 1024;
 
 /// More than a year of any scenario; a typing error beyond.
-const MOST_TRIALS: u64 = 100_000_000;
+const MAX_TRIALS: u64 = 100_000_000;
 
 /// Exit code when accuracy has moved, as of `yair evaluate --max-drift`.
 const MOVED: u8 = 3;
@@ -194,7 +194,7 @@ fn conclude(
 }
 
 /// Most lines that a person reads of what changed.
-const MOST_SHOWN: usize = 20;
+const MAX_SHOWN: usize = 20;
 
 fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!(
@@ -210,7 +210,7 @@ fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Resul
         return Ok(());
     }
     let mut rows = table(&["point", "method", "", "number", "was", "is", "z"], 4);
-    for number in shown.iter().take(MOST_SHOWN) {
+    for number in shown.iter().take(MAX_SHOWN) {
         rows.add_row([
             number.point.clone(),
             number.method.clone(),
@@ -222,8 +222,8 @@ fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Resul
         ]);
     }
     terminal.say(&rows.to_string())?;
-    if shown.len() > MOST_SHOWN {
-        terminal.say(&format!("and {} more", shown.len() - MOST_SHOWN))?;
+    if shown.len() > MAX_SHOWN {
+        terminal.say(&format!("and {} more", shown.len() - MAX_SHOWN))?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use scenario::Level;
 use crate::terminal::{Failure, Terminal, table};
 
 /// Most digits behind the point: beyond, a table of per cents is unreadable.
-const MOST_DECIMALS: f64 = 7.0;
+const MAX_DECIMALS: f64 = 7.0;
 
 pub(crate) fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Failure> {
     let trials = match result.precision {
@@ -149,7 +149,7 @@ pub(crate) fn concise(value: f64, error: f64) -> String {
         // No digit behind the point; the error stands in full.
         return format!("{value:.0}({error:.0})");
     }
-    let mut decimals = (-error.log10().floor()).clamp(0.0, MOST_DECIMALS);
+    let mut decimals = (-error.log10().floor()).clamp(0.0, MAX_DECIMALS);
     let mut digits = (error * 10_f64.powf(decimals)).round();
     if digits >= 10.0 && decimals >= 1.0 {
         (decimals, digits) = (decimals - 1.0, 1.0);

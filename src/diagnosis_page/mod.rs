@@ -20,7 +20,7 @@ pub(crate) struct Page<'d> {
 }
 
 /// Alternatives that are told: those that do not stand out at all are one line.
-const MOST_ALTERNATIVES: usize = 12;
+const MAX_ALTERNATIVES: usize = 12;
 
 impl Page<'_> {
     /// Writes report.md, its pictures and residuals.json.
@@ -147,7 +147,7 @@ impl Page<'_> {
                  (logarithms, to second order).\n"
             )?;
             writeln!(page, "| effect | z | log odds to the best | what became of it |\n| --- | --- | --- | --- |")?;
-            for alternative in standing.iter().take(MOST_ALTERNATIVES) {
+            for alternative in standing.iter().take(MAX_ALTERNATIVES) {
                 writeln!(
                     page,
                     "| `{}` | {:.1} | {:.1} | {} |",

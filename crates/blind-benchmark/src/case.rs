@@ -104,9 +104,9 @@ const HELD_OUT: u32 = 16;
 /// Where those of planned runs are.
 const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
-const MOST_STEPS: usize = 5;
+const MAX_STEPS: usize = 5;
 /// Another form of which the hypothesis takes up less is another effect: the forms of tests/effects/hypotheses leave at most 0.65² of their squares.
-const LEAST_SHARE: f64 = 0.5;
+const MIN_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;
 
@@ -382,7 +382,7 @@ fn scale(
     let mut found = (first, at_first);
     // How fast the ratio grows with the scale: as its first power, until two points say otherwise.
     let mut growth = 1.0_f64;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let off = wanted / found.1;
         if (1.0 / CLOSE.sqrt()..=CLOSE.sqrt()).contains(&off) {
             break;
@@ -411,7 +411,7 @@ fn scale(
             .first()
             .is_some_and(|(_, left)| *left < -DISCRIMINATION_LEVEL)
     };
-    let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
+    let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > MIN_SHARE && !described_better());
     let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_taken_up_by_lengths();
     if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }

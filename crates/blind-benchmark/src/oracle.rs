@@ -55,12 +55,12 @@ pub(crate) struct TrueNoise {
 }
 
 /// The noise of a robot whose counts say nearly all of a turn.
-const LEAST_VAR: f64 = 1e-16;
+const MIN_VAR: f64 = 1e-16;
 
 impl TrueNoise {
     fn noise(self) -> Noise {
         let [xy, theta] = self.look_var;
-        Noise { variance: [self.wheel_var_per_m, LEAST_VAR, xy, theta].map(|variance| variance.max(LEAST_VAR)) }
+        Noise { variance: [self.wheel_var_per_m, MIN_VAR, xy, theta].map(|variance| variance.max(MIN_VAR)) }
     }
 }
 

@@ -57,11 +57,11 @@ pub(crate) fn planned(
 
 /// So much faster a plan is tried again that is too slow for the controllers' steps of speed, and how often.
 const FASTER: f64 = 1.25;
-const MOST_FASTER: usize = 6;
+const MAX_FASTER: usize = 6;
 
 /// Drives plans at their speeds, or as slowly as the controllers can; `None` where they cannot.
 fn drive(case: &Case, mut plans: Vec<SessionPlan>) -> Result<Option<More>, ChallengeError> {
-    for _ in 0..MOST_FASTER {
+    for _ in 0..MAX_FASTER {
         match case.drive_more(&plans) {
             Err(ChallengeError::Simulation(_)) => {
                 plans.iter_mut().for_each(|plan| plan.scenario.robot.cruise_speed_m_s *= FASTER);

@@ -17,7 +17,7 @@ use crate::candidate::Candidate;
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
 /// A controller regulates on counts much finer than most logs' ticks.
-const LEAST_COUNTS: f64 = 40_000.0;
+const MIN_COUNTS: f64 = 40_000.0;
 /// Measurements farther apart than this, in a run of a few, are readings of a standing robot.
 pub(crate) const READ_STANDING_S: f64 = 2.0;
 
@@ -26,8 +26,8 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
     let fit = &model.fit.fit;
-    let counts = nominal.ticks_per_rev.unwrap_or(LEAST_COUNTS);
-    let per_tick = (LEAST_COUNTS / counts).ceil().max(1.0);
+    let counts = nominal.ticks_per_rev.unwrap_or(MIN_COUNTS);
+    let per_tick = (MIN_COUNTS / counts).ceil().max(1.0);
     let mut robot: Robot = toml::from_str(STAND_IN).map_err(|error| error.message().to_owned())?;
     robot.left_wheel_diameter_m = nominal.left_wheel_diameter_m;
     robot.right_wheel_diameter_m = nominal.right_wheel_diameter_m;

@@ -391,7 +391,7 @@ mod tests {
     use crate::augmented_model::AugmentedModel;
 
     const ROW_S: f64 = 0.1;
-    const ROWS_A_LOOK: u32 = 10;
+    const ROWS_PER_MEASUREMENT: u32 = 10;
     const SEPARATION_M: f64 = 0.363;
     const NAMES: [&str; 4] = ["traction_loss", "bumps", "truth_outliers", "stick_slip"];
 
@@ -413,7 +413,7 @@ mod tests {
             let (mut angles, mut pose) = (Wheels { left: vec![0.0], right: vec![0.0] }, Pose::IDENTITY);
             let (mut measurements, mut behind_m) = (Vec::new(), Wheels::both(0.0));
             for row in 0..=680_u32 {
-                if row % ROWS_A_LOOK == 0 {
+                if row % ROWS_PER_MEASUREMENT == 0 {
                     let errs = [stream.normal(), stream.normal(), stream.normal()];
                     let jumps = [stream.normal(), stream.normal(), stream.normal()];
                     let far = if cause == "truth_outliers" && stream.uniform() < 0.03 { 0.02 } else { 0.0 };
@@ -454,7 +454,8 @@ mod tests {
                 angles.left.push(angles.left[row as usize] + tread.left / 0.08);
                 angles.right.push(angles.right[row as usize] + tread.right / 0.08);
             }
-            let measurement_s = |k: usize| ROW_S * f64::from(ROWS_A_LOOK) * f64::from(u32::try_from(k).expect("few"));
+            let measurement_s =
+                |k: usize| ROW_S * f64::from(ROWS_PER_MEASUREMENT) * f64::from(u32::try_from(k).expect("few"));
             let of_poses = |(k, measurement): (usize, &Pose)| {
                 TruthSample::new(measurement_s(k), measurement.x_m, measurement.y_m, Some(measurement.theta_rad))
             };

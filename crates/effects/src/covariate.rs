@@ -151,7 +151,7 @@ pub enum Covariate {
 }
 
 /// Most cycles of a wheel's phase in one turn.
-const MOST_CYCLES: u8 = 24;
+const MAX_CYCLES: u8 = 24;
 
 /// How often a wheel's angle is taken, in words.
 fn turned(side: Side, cycles: u8) -> String {
@@ -231,7 +231,7 @@ impl Covariate {
         let of = |cycles| {
             Side::BOTH.into_iter().flat_map(move |side| [Self::CosPhase(side, cycles), Self::SinPhase(side, cycles)])
         };
-        Self::NAMED.into_iter().chain((2..=MOST_CYCLES).flat_map(of)).find(|covariate| covariate.name() == name)
+        Self::NAMED.into_iter().chain((2..=MAX_CYCLES).flat_map(of)).find(|covariate| covariate.name() == name)
     }
 
     /// The covariate of a run whose values over the runs are these, 0 for one that does not say it; `None` where they do not differ.

@@ -1,7 +1,7 @@
 //! The regular beat behind the irregular stamps of a log.
 
 /// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by, a beat.
-const LEAST_ROWS: usize = 24;
+const MIN_ROWS: usize = 24;
 /// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
 const MEMORY_ROWS: f64 = 500.0;
 /// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with a row lost in it, hardly one as short.
@@ -11,7 +11,7 @@ const NO_BEAT: f64 = 0.3;
 /// A row that is farther from its beat than this share of it has missed it.
 const MISSED: f64 = 0.45;
 /// After so many in a row the log keeps another beat.
-const MOST_MISSED: u32 = 3;
+const MAX_MISSED: u32 = 3;
 
 /// The beat of a run's rows: a line through their times over the numbers of their beats.
 #[derive(Debug, Clone, Default)]
@@ -59,7 +59,7 @@ impl SamplingPeriodEstimator {
             self.first_s.push(from_s);
         }
         self.first_s.push(row_s);
-        if self.first_s.len() <= LEAST_ROWS {
+        if self.first_s.len() <= MIN_ROWS {
             return;
         }
         let rows_s = std::mem::take(&mut self.first_s);
@@ -92,7 +92,7 @@ impl SamplingPeriodEstimator {
         let late_s = row_s - zero_s - sampling_period * between_s;
         if late_s.abs() > MISSED * between_s {
             self.missed += 1;
-            if self.missed >= MOST_MISSED {
+            if self.missed >= MAX_MISSED {
                 *self = Self { late_s: self.late_s, ..Self::default() };
             }
             return;

@@ -33,7 +33,7 @@ mod together;
 /// `kind` of a [`SparseTerm`] in a scenario.
 pub(crate) const TERM: &str = "term";
 /// Most covariates of a product.
-const MOST_COVARIATES: usize = 3;
+const MAX_COVARIATES: usize = 3;
 
 impl Sparse {
     /// How recorded data show it.
@@ -94,9 +94,9 @@ impl SparseTerm {
                 return no_term(format!("of_runs.{key} must be finite values that differ"));
             }
         }
-        if self.covariates.is_empty() || self.covariates.len() > MOST_COVARIATES {
+        if self.covariates.is_empty() || self.covariates.len() > MAX_COVARIATES {
             let count = self.covariates.len();
-            return no_term(format!("{count} covariates; one to {MOST_COVARIATES}, or \"{CONSTANT}\" for a constant"));
+            return no_term(format!("{count} covariates; one to {MAX_COVARIATES}, or \"{CONSTANT}\" for a constant"));
         }
         let covariates = if self.covariates == [CONSTANT] {
             Vec::new()

@@ -14,7 +14,7 @@ use crate::thinning::Thinning;
 /// A nuisance must gain by so many standard errors on what was held out.
 const GAIN_IN_SIGMAS: f64 = 2.0;
 /// What a run has for itself is judged on the other parts of it.
-const PARTS_OF_A_RUN: usize = 3;
+const PARTS_OF_PER_RUN: usize = 3;
 
 /// A run, or a part of one, with the fold that holds it out.
 struct Unit {
@@ -189,7 +189,7 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
     let runs = fit.fit.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
-        (Some(Grouping::Run), gate) => fit.blocks(&mut [], PARTS_OF_A_RUN, gate),
+        (Some(Grouping::Run), gate) => fit.blocks(&mut [], PARTS_OF_PER_RUN, gate),
         (_, OutlierGate::On) => fit.units(&mut []),
         (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS.div_ceil(runs), gate),
     };

@@ -20,7 +20,7 @@ pub(crate) const SHIFTER: f64 = 6_755_399_441_055_744.0;
 const WHOLE_PI: [f64; 2] = [2.0 * HALF_PI[0], 2.0 * 6.077_100_506_506_192e-11];
 
 /// A [`Direction`] is found up to so many half turns, 1.6·10⁶ rad: times the first part of [`WHOLE_PI`] they are exact.
-const MOST_HALF_TURNS: u64 = 1 << 19;
+const MAX_HALF_TURNS: u64 = 1 << 19;
 
 /// 2 sin(x/2) = x + x³·(T₀ + T₁x² + …) up to π/2, by Remez' exchange to 6e-18 of the sine.
 const TWICE_HALF_SINE: [f64; 6] = [
@@ -162,13 +162,13 @@ impl Direction {
     /// For [`Self::is_found`]. Loops collect these by `|`.
     #[inline(always)]
     pub(crate) const fn range(self) -> u64 {
-        self.half_turns.wrapping_sub(SHIFTER.to_bits() - MOST_HALF_TURNS)
+        self.half_turns.wrapping_sub(SHIFTER.to_bits() - MAX_HALF_TURNS)
     }
 
-    /// Were all angles within [`MOST_HALF_TURNS`]?
+    /// Were all angles within [`MAX_HALF_TURNS`]?
     #[inline(always)]
     pub(crate) const fn is_found(ranges: u64) -> bool {
-        ranges < 2 * MOST_HALF_TURNS
+        ranges < 2 * MAX_HALF_TURNS
     }
 
     /// Way of some metres into this direction, along x and y.

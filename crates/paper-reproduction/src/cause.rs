@@ -23,10 +23,10 @@ use super::units::MM_PER_M;
 const NUMBERS: usize = 5;
 
 /// Drive parameters and one size.
-const MOST_PARAMETERS: usize = 4;
+const MAX_PARAMETERS: usize = 4;
 
 /// Two extensions whose misfits differ by less cannot be told apart: a likelihood ratio of 20.
-const TOLD_APART: f64 = 6.0;
+const DISCRIMINATION_LEVEL: f64 = 6.0;
 
 /// A guess at what the model lacks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -225,7 +225,7 @@ impl Forward for Acting {
 fn robot(
     base: &Scenario,
     extension: Extension,
-    parameters: &SVector<f64, MOST_PARAMETERS>,
+    parameters: &SVector<f64, MAX_PARAMETERS>,
     on_squares: bool,
 ) -> Result<SimulatedRobot, SimulationError> {
     let [left, right, base_mm, size] = parameters.data.0[0];
@@ -270,7 +270,7 @@ fn sensitivities(found: &Calibration, base: &Scenario) -> [f64; 2] {
 fn predict(
     base: &Scenario,
     extension: Extension,
-    parameters: &SVector<f64, MOST_PARAMETERS>,
+    parameters: &SVector<f64, MAX_PARAMETERS>,
 ) -> Result<SVector<f64, NUMBERS>, CauseError> {
     let by_direct = direct(&mut robot(base, extension, parameters, false)?)?;
     let [left, right] = sensitivities(&by_direct, base);
@@ -325,7 +325,7 @@ fn fit(
     sigma: &[f64; NUMBERS],
 ) -> Result<Fitted, CauseError> {
     let words = extension.words();
-    let parameters = if extension.has_size() { MOST_PARAMETERS } else { MOST_PARAMETERS - 1 };
+    let parameters = if extension.has_size() { MAX_PARAMETERS } else { MAX_PARAMETERS - 1 };
     // Steps of the numeric derivatives, small against the sizes that matter and large against rounding; in these units the problem is well scaled.
     let step = [1e-5, 1e-5, 1e-2, 1e-5];
     let mut at = SVector::from([TABLE_1.left.mean, TABLE_1.right.mean, TABLE_2_DIRECT.base.value, 0.0]);
@@ -334,7 +334,7 @@ fn fit(
     };
     for _ in 0..STEPS {
         let predicted = predict(base, extension, &at)?;
-        let mut jacobian = SMatrix::<f64, NUMBERS, MOST_PARAMETERS>::zeros();
+        let mut jacobian = SMatrix::<f64, NUMBERS, MAX_PARAMETERS>::zeros();
         for parameter in 0..parameters {
             let mut moved = at;
             moved[parameter] += step[parameter];
@@ -377,8 +377,11 @@ pub fn causes(base: &Scenario, table_2: &Table2, reading_sigma_m: f64) -> Result
         .map(|extension| fit(base, *extension, &published, &sigma))
         .collect::<Result<Vec<_>, _>>()?;
     let best = fitted.iter().map(|fitted| fitted.misfit).fold(f64::INFINITY, f64::min);
-    let not_told_apart: Vec<Extension> =
-        fitted.iter().filter(|fitted| fitted.misfit - best < TOLD_APART).map(|fitted| fitted.extension).collect();
+    let not_told_apart: Vec<Extension> = fitted
+        .iter()
+        .filter(|fitted| fitted.misfit - best < DISCRIMINATION_LEVEL)
+        .map(|fitted| fitted.extension)
+        .collect();
     let mut experiments = Vec::new();
     for candidate in candidates(base, reading_sigma_m) {
         let predicts =

@@ -11,7 +11,7 @@ use super::table_1::{Hypothesis, Row, Table1};
 const ALMOST_ALWAYS: f64 = 0.999;
 
 /// A difference in log likelihood under which hypotheses cannot be told apart: a likelihood ratio of about 20, as discovery by alias groups uses.
-const TOLD_APART: f64 = 3.0;
+const DISCRIMINATION_LEVEL: f64 = 3.0;
 
 impl Reproduction {
     /// The page.
@@ -108,7 +108,7 @@ impl Reproduction {
             )?;
         }
         let worst = self.table_1.iter().map(|table| table.below_best).fold(0.0, f64::max);
-        let verdict = if worst < TOLD_APART {
+        let verdict = if worst < DISCRIMINATION_LEVEL {
             "**The published statistics cannot tell them apart**"
         } else {
             "**The published statistics prefer the best one**"

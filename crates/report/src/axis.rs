@@ -5,7 +5,7 @@ pub(crate) const LARGEST: f64 = 1e100;
 /// Free space between the outermost value and the frame, as a part of what the values span.
 const PADDING: f64 = 0.05;
 /// Values that differ relatively by less are drawn as one: ticks between them would need more digits than a number has.
-const LEAST_RELATIVE_SPAN: f64 = 1e-9;
+const MIN_RELATIVE_SPAN: f64 = 1e-9;
 
 /// How values are spread along an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,7 +81,7 @@ impl Axis {
     pub(crate) fn check(&self) -> Result<(), (f64, f64)> {
         let possible = |value: f64| value.abs() <= LARGEST && (self.scale == Scale::Linear || value > 0.0);
         if let Range::Fixed { low, high } = self.range {
-            let apart = high - low > LEAST_RELATIVE_SPAN * low.abs().max(high.abs());
+            let apart = high - low > MIN_RELATIVE_SPAN * low.abs().max(high.abs());
             if !(possible(low) && possible(high) && apart) {
                 return Err((low, high));
             }
@@ -109,7 +109,7 @@ impl Axis {
         let length = whole_high - whole_low;
         let magnitude = whole_low.abs().max(whole_high.abs());
         let padding = match scale {
-            _ if length > LEAST_RELATIVE_SPAN * magnitude && length > 1.0 / LARGEST => PADDING * length,
+            _ if length > MIN_RELATIVE_SPAN * magnitude && length > 1.0 / LARGEST => PADDING * length,
             Scale::Linear if magnitude > 1.0 / LARGEST => 0.1 * magnitude,
             Scale::Linear => 1.0,
             Scale::Log => 0.3,

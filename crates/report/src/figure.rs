@@ -7,7 +7,7 @@ use crate::panel::Panel;
 /// The width of every figure in SVG pixels; its height follows from its panels.
 pub const WIDTH_PX: f64 = 900.0;
 /// With more columns the labels of a figure of [`WIDTH_PX`] would fill it.
-pub const MOST_COLUMNS: usize = 3;
+pub const MAX_COLUMNS: usize = 3;
 
 /// Panels in a grid under a title, with a caption.
 ///
@@ -44,7 +44,7 @@ impl Figure {
         self
     }
 
-    /// Panels beside each other, 1 to [`MOST_COLUMNS`].
+    /// Panels beside each other, 1 to [`MAX_COLUMNS`].
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns;
         self
@@ -62,8 +62,8 @@ impl Figure {
         if self.panels.is_empty() {
             return Err(ReportError::NoPanels { figure: figure() });
         }
-        if !(1..=MOST_COLUMNS).contains(&self.columns) {
-            return Err(ReportError::Columns { figure: figure(), columns: self.columns, most: MOST_COLUMNS });
+        if !(1..=MAX_COLUMNS).contains(&self.columns) {
+            return Err(ReportError::Columns { figure: figure(), columns: self.columns, most: MAX_COLUMNS });
         }
         for panel in &self.panels {
             panel.check(&self.title)?;

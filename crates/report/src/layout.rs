@@ -25,7 +25,7 @@ const MARGIN_PX: f64 = 16.0;
 const COLUMN_GAP_PX: f64 = 22.0;
 const ROW_GAP_PX: f64 = 20.0;
 const REFERENCE_WRAP_PX: f64 = 100.0;
-const LEAST_WIDTH_PX: f64 = 60.0;
+const MIN_WIDTH_PX: f64 = 60.0;
 const HEIGHT_BY_WIDTH: f64 = 0.75;
 const HEIGHT_PX: std::ops::RangeInclusive<f64> = 170.0..=400.0;
 /// Of a frame with equal aspect, by its width, and absolutely at most.
@@ -114,7 +114,7 @@ impl Layout {
 fn frame_width(margins: &[(f64, f64)], room: f64) -> f64 {
     let taken: f64 = margins.iter().map(|(left, right)| left + right).sum();
     let gaps = (margins.len() - 1) as f64 * COLUMN_GAP_PX;
-    ((room - gaps - taken) / margins.len() as f64).max(LEAST_WIDTH_PX)
+    ((room - gaps - taken) / margins.len() as f64).max(MIN_WIDTH_PX)
 }
 
 /// What the widest labels of each column need left and right of its frames. Wider margins mean narrower frames and other ticks; they only grow, so

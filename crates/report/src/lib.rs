@@ -25,6 +25,6 @@ mod ticks;
 
 pub use axis::{Axis, Range, Scale};
 pub use error::{Place, ReportError};
-pub use figure::{Figure, MOST_COLUMNS, WIDTH_PX};
+pub use figure::{Figure, MAX_COLUMNS, WIDTH_PX};
 pub use panel::Panel;
 pub use series::{Colour, Marks, Series};

@@ -13,8 +13,8 @@ use atomic_file::write_whole;
 
 /// The scale of the PNG that [`Figure::write`] writes: 1800 px wide.
 const PNG_SCALE: f64 = 2.0;
-const LEAST_PNG_SCALE: f64 = 0.1;
-const MOST_PNG_SCALE: f64 = 10.0;
+const MIN_PNG_SCALE: f64 = 0.1;
+const MAX_PNG_SCALE: f64 = 10.0;
 
 impl Figure {
     /// The drawing as an SVG document, [`WIDTH_PX`](crate::WIDTH_PX) wide. Its texts are text: a browser shows them in DejaVu Sans or a font that is no wider.
@@ -39,8 +39,8 @@ impl Figure {
     }
 
     fn rasterise(&self, svg: &str, scale: f64) -> Result<Vec<u8>, ReportError> {
-        if !(LEAST_PNG_SCALE..=MOST_PNG_SCALE).contains(&scale) {
-            return Err(ReportError::PngScale { figure: self.title.clone(), scale, most: MOST_PNG_SCALE });
+        if !(MIN_PNG_SCALE..=MAX_PNG_SCALE).contains(&scale) {
+            return Err(ReportError::PngScale { figure: self.title.clone(), scale, most: MAX_PNG_SCALE });
         }
         let failed = |why: String| ReportError::Raster { figure: self.title.clone(), why };
         let mut options = usvg::Options::default();

@@ -13,7 +13,7 @@ pub(crate) struct Tick {
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// More ticks fit on no axis.
-const MOST_TICKS: i64 = 200;
+const MAX_TICKS: i64 = 200;
 
 /// The densest ticks of which neighbouring labels `fit`: it is asked with two labels and the distance between them as a part of the axis.
 pub(crate) fn ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Vec<Tick> {
@@ -32,7 +32,7 @@ fn all_fit(span: &Span, ticks: &[Tick], fit: &dyn Fn(&str, &str, f64) -> bool) -
 }
 
 fn linear_ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Vec<Tick> {
-    let mut exponent = (span.length() / MOST_TICKS as f64).log10().floor() as i32;
+    let mut exponent = (span.length() / MAX_TICKS as f64).log10().floor() as i32;
     let mut best = Vec::new();
     loop {
         for digit in [1_i64, 2, 5] {
@@ -66,7 +66,7 @@ fn multiples(span: &Span, digit: i64, exponent: i32) -> Option<Vec<Tick>> {
     // An end that is a multiple up to rounding is one.
     let slack = 1e-9 * span.length() / step;
     let (first, last) = ((span.low / step - slack).ceil() as i64, (span.high / step + slack).floor() as i64);
-    if last - first > MOST_TICKS {
+    if last - first > MAX_TICKS {
         return None;
     }
     let numbers: Vec<i64> = (first..=last).map(|k| k * digit).collect();

@@ -8,7 +8,7 @@ use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{NoFit, ScenarioError};
-use crate::limits::{LENGTHS_M, MOST_RUNS};
+use crate::limits::{LENGTHS_M, MAX_RUNS};
 
 /// What a calibration may take.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -96,7 +96,7 @@ impl Budget {
         };
         affords(0.0)?;
         let all: f64 = parts.iter().map(|part| part.pairs).sum();
-        let (mut enough, mut too_much) = (0.0, 0.5 * number(MOST_RUNS) / all.max(1.0));
+        let (mut enough, mut too_much) = (0.0, 0.5 * number(MAX_RUNS) / all.max(1.0));
         if affords(too_much).is_ok() {
             enough = too_much;
         }
@@ -104,7 +104,7 @@ impl Budget {
             let middle = 0.5 * (enough + too_much);
             *(if affords(middle).is_ok() { &mut enough } else { &mut too_much }) = middle;
         }
-        // Whole, positive and at most MOST_RUNS.
+        // Whole, positive and at most MAX_RUNS.
         Ok(parts.iter().map(|part| part.schedule.with_pairs(part.scaled(enough) as u32)).collect())
     }
 
@@ -332,7 +332,7 @@ mod tests {
         let endless = Budget { minutes: Some(1e12), ..ROOM };
         let fitted = fit(endless, &[STRAIGHTS, SPINS.with_pairs(0)]).expect("there is time");
         assert_eq!(fitted.len(), 1);
-        assert_eq!(fitted[0].runs(), MOST_RUNS);
+        assert_eq!(fitted[0].runs(), MAX_RUNS);
     }
 
     #[test]

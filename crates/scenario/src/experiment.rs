@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::Budget;
 use crate::error::{NoFit, ScenarioError};
-use crate::limits::{LENGTHS_M, MOST_RUNS};
+use crate::limits::{LENGTHS_M, MAX_RUNS};
 use crate::robot::Robot;
 use crate::sweep::Sweep;
 
@@ -290,7 +290,7 @@ fn check_schedules(place: &str, key: &str, schedules: &[Schedule]) -> Result<(),
         }
     }
     let runs: u64 = schedules.iter().map(Schedule::runs).sum();
-    range("runs", runs as f64, (1..=MOST_RUNS).contains(&runs), "from 1 to 100000 in all")
+    range("runs", runs as f64, (1..=MAX_RUNS).contains(&runs), "from 1 to 100000 in all")
 }
 
 #[cfg(test)]

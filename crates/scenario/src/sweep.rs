@@ -64,10 +64,10 @@ fn quoted_keys<'de, D: Deserializer<'de>>(set: D) -> Result<BTreeMap<String, f64
 }
 
 /// Most points of a sweep: each is a scenario in memory.
-const MOST_POINTS: u32 = 10_000;
+const MAX_POINTS: u32 = 10_000;
 
 /// Dimensions for which the Sobol sequence has direction numbers.
-const MOST_SOBOL_AXES: usize = 256;
+const MAX_SOBOL_AXES: usize = 256;
 
 impl Sweep {
     /// What can be said without the scenario.
@@ -96,9 +96,9 @@ impl Sweep {
             if sobol.points == 0 {
                 return Err("sweep.sobol.points is 0; ask for at least 1".to_owned());
             }
-            if self.axes.is_empty() || self.axes.len() > MOST_SOBOL_AXES {
+            if self.axes.is_empty() || self.axes.len() > MAX_SOBOL_AXES {
                 let axes = self.axes.len();
-                return Err(format!("sweep.sobol needs 1 to {MOST_SOBOL_AXES} ranges in sweep.axes, which has {axes}"));
+                return Err(format!("sweep.sobol needs 1 to {MAX_SOBOL_AXES} ranges in sweep.axes, which has {axes}"));
             }
         }
         let levels = |levels: &Levels| match levels {
@@ -108,8 +108,8 @@ impl Sweep {
         let count = |n: usize| f64::from(u32::try_from(n).unwrap_or(u32::MAX));
         let grid: f64 = self.axes.values().map(|axis| count(levels(axis))).product();
         let points = grid * self.sobol.map_or(1.0, |sobol| f64::from(sobol.points)) * count(self.cases.len().max(1));
-        if points > f64::from(MOST_POINTS) {
-            return Err(format!("the sweep crosses into {points} points; at most {MOST_POINTS} are driven"));
+        if points > f64::from(MAX_POINTS) {
+            return Err(format!("the sweep crosses into {points} points; at most {MAX_POINTS} are driven"));
         }
         Ok(())
     }

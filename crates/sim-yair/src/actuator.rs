@@ -171,7 +171,7 @@ pub(crate) struct Profile {
     ramp_counts_s2: Option<f64>,
 }
 
-const MOST_PIECES: usize = 5;
+const MAX_PIECES: usize = 5;
 
 /// Nodes of the two-point Gauss–Legendre rule on [0, 1]: ½ ∓ 1/(2√3).
 const GAUSS_NODES: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
@@ -239,13 +239,13 @@ impl Piece {
 /// A motion in pieces of constant speed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pieces {
-    pieces: [Piece; MOST_PIECES],
+    pieces: [Piece; MAX_PIECES],
     count: usize,
 }
 
 impl Default for Pieces {
     fn default() -> Self {
-        Self { pieces: [Piece { rate_rad_s: Wheels::both(0.0), duration_s: 0.0 }; MOST_PIECES], count: 0 }
+        Self { pieces: [Piece { rate_rad_s: Wheels::both(0.0), duration_s: 0.0 }; MAX_PIECES], count: 0 }
     }
 }
 

@@ -51,10 +51,10 @@ fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
 /// sign. It ends when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a
 /// narrow valley: it bounces from side to side, the mean stays, and that is taken for the end.
 fn rprop(session: &Session<'_>) -> Vector3<f64> {
-    const LEAST_M: f64 = 1e-5;
+    const MIN_M: f64 = 1e-5;
     let sessions = std::slice::from_ref(session);
     let mut lengths_m = Vector3::from(lengths(&session.robot.geometry().expect("nominal")));
-    let (mut steps_m, mut slopes) = (Vector3::repeat(LEAST_M), Vector3::zeros());
+    let (mut steps_m, mut slopes) = (Vector3::repeat(MIN_M), Vector3::zeros());
     let mut costs: Vec<f64> = Vec::new();
     while costs.len() < 1000 {
         let cost = POSITIONS.cost(sessions, &geometry(&lengths_m)).expect("poses");
@@ -65,7 +65,7 @@ fn rprop(session: &Session<'_>) -> Vector3<f64> {
             if turned > 0.0 {
                 steps_m[i] = (1.005_f64 * steps_m[i]).min(2.5e-4);
             } else if turned < 0.0 {
-                steps_m[i] = (0.5_f64 * steps_m[i]).max(LEAST_M);
+                steps_m[i] = (0.5_f64 * steps_m[i]).max(MIN_M);
             }
             lengths_m[i] -= steps_m[i] * slopes[i].signum();
         }

@@ -13,7 +13,7 @@ use scenario::{Engine, Instrument, Robot, Scenario};
 use super::error::NoBound;
 
 /// Readings must err by this share of what they are rounded to, for their roundings to be independent to 1 %.
-const LEAST_DITHER: f64 = 1.0 / 3.0;
+const MIN_DITHER: f64 = 1.0 / 3.0;
 
 /// Everything of a scenario that the information depends on.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,7 +114,7 @@ impl Sight {
                 if points.iter().all(|mark| mark.body == points[0].body) {
                     return Err(NoBound::NoHeading);
                 }
-                if reading_sigma_m < LEAST_DITHER * resolution_m {
+                if reading_sigma_m < MIN_DITHER * resolution_m {
                     return Err(NoBound::RoundedReadings { reading_sigma_m, resolution_m });
                 }
                 let precision: Matrix3<f64> =

@@ -20,7 +20,7 @@ pub const TRACKED: [Parameter; 3] = [Parameter::LeftPerTick, Parameter::RightPer
 pub(super) const TRIALS_PER_CHUNK: u64 = 16;
 
 /// Most trials at a point that is to become precise, unless the caller says otherwise.
-const MOST_FOR_PRECISION: u64 = 1_000_000;
+const MAX_FOR_PRECISION: u64 = 1_000_000;
 
 /// Fewest trials from which the number that a precision needs is foretold: below, kurtoses are guesses.
 const FEWEST_FOR_PRECISION: u64 = 512;
@@ -76,7 +76,7 @@ impl SweepPlan {
         let mut scenario = scenario.clone();
         let sweep = scenario.sweep.as_ref().ok_or_else(|| BenchError::NoSweep { scenario: scenario.name.clone() })?;
         let trials = match options.precision {
-            Some(_) => options.trials.unwrap_or(MOST_FOR_PRECISION),
+            Some(_) => options.trials.unwrap_or(MAX_FOR_PRECISION),
             None => options.trials.unwrap_or(sweep.trials),
         };
         if trials < 2 {

@@ -42,7 +42,7 @@ const LARGEST_CONDITION: f64 = 75.0;
 const LARGEST_PLACE_CONDITION: f64 = 1e4;
 
 /// The wrong solution must cost so many times the right one, or the instrument's heading is not seen.
-const LEAST_COST_RATIO: f64 = 4.0;
+const MIN_COST_RATIO: f64 = 4.0;
 
 /// A displacement that the instrument saw, and how the wheels turned meanwhile.
 #[derive(Debug, Clone, PartialEq)]
@@ -233,7 +233,7 @@ impl Censi {
             }
         }
         let [cheap, dear] = solutions(&mut among(samples, &kept).map(|(_, sample)| sample))?;
-        if dear.cost_m2 <= LEAST_COST_RATIO * cheap.cost_m2.max(0.0) {
+        if dear.cost_m2 <= MIN_COST_RATIO * cheap.cost_m2.max(0.0) {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::SensorTheta,

@@ -30,7 +30,7 @@ pub struct Circular;
 const LEG_RAD: f64 = 1.4;
 
 /// |sin Θ/2| of a leg at least this, 60° to 300°: a leg that nearly closes shows no radius.
-const LEAST_SINE: f64 = 0.5;
+const MIN_SINE: f64 = 0.5;
 
 /// The wheels' ratio may differ by this share between the halves of a leg: twice the rounding of a coarse counter (1 mm on 100 mm of inner wheel).
 const CONSTANT_RATIO: f64 = 0.02;
@@ -120,7 +120,7 @@ fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Re
         // Whole turns come from the odometry.
         let turn_rad = unwrap_near(last.theta_rad - first.theta_rad, last.reckoned_rad - first.reckoned_rad);
         let sine = (0.5 * turn_rad).sin();
-        if sine.abs() < LEAST_SINE {
+        if sine.abs() < MIN_SINE {
             continue;
         }
         let turned = |a: &Reading, b: &Reading| b.wheel_rad.zip_with(a.wheel_rad, |b, a| b - a);

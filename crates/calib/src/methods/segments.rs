@@ -36,7 +36,7 @@ pub struct Cost {
 }
 
 /// A direction in which relative changes of the three geometry parameters move the path by so much less than in the best one is not seen.
-const LEAST_SENSITIVITY: f64 = 1e-3;
+const MIN_SENSITIVITY: f64 = 1e-3;
 
 /// Errors of all paths as a function of the three geometry parameters over their nominal values.
 #[derive(Debug, Clone)]
@@ -154,11 +154,11 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
     let eigen = normal.symmetric_eigen();
     let weak = eigen.eigenvalues.imin();
     let sensitivity = (eigen.eigenvalues[weak].max(0.0) / eigen.eigenvalues.max()).sqrt();
-    if sensitivity >= LEAST_SENSITIVITY {
+    if sensitivity >= MIN_SENSITIVITY {
         return Ok(());
     }
     let (parameter, missing) = unobservable(&eigen.eigenvectors.column(weak).into_owned());
-    let why = format!("{missing} (relative sensitivity {sensitivity:.0e}, at least {LEAST_SENSITIVITY:.0e})");
+    let why = format!("{missing} (relative sensitivity {sensitivity:.0e}, at least {MIN_SENSITIVITY:.0e})");
     Err(CalibError::Unobservable { method: Segments::NAME, parameter, why })
 }
 

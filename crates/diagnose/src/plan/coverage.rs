@@ -27,11 +27,11 @@ const LENGTH_WORTH: f64 = 0.3;
 /// A new kind of run must bring this much more a minute than more of the same.
 const NEW_KIND: f64 = 1.3;
 /// Less than this, in effects brought into sight by a pair of runs, is not worth driving.
-const LEAST_GAIN: f64 = 0.01;
+const MIN_GAIN: f64 = 0.01;
 /// A length whose relative standard deviation is larger is little better known than before.
 const UNDETERMINED: f64 = 0.02;
 /// Kinds of run that a person keeps apart.
-const MOST_KINDS: usize = 6;
+const MAX_KINDS: usize = 6;
 
 /// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
 /// it.
@@ -133,19 +133,13 @@ fn mix(
             .filter_map(|(manoeuvre, of)| {
                 let cost = manoeuvre.cost(setting).minutes;
                 let known = parts.iter().any(|part| part.manoeuvre == *manoeuvre);
-                if minutes + cost > setting.minutes || !(known || parts.len() < MOST_KINDS) {
+                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_KINDS) {
                     return None;
                 }
                 let after = with_runs(&equations, &[(of, 1.0)]);
                 let there = worth(&after);
                 let preferred = if known { NEW_KIND } else { 1.0 };
-                (there - here > LEAST_GAIN).then_some((
-                    preferred * (there - here) / cost,
-                    manoeuvre,
-                    after,
-                    there,
-                    cost,
-                ))
+                (there - here > MIN_GAIN).then_some((preferred * (there - here) / cost, manoeuvre, after, there, cost))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, manoeuvre, after, there, cost)) = best else { break };

@@ -88,7 +88,7 @@ impl Forward for State {
 /// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median stands most of them.
 const AROUND: usize = 4;
 /// Rows that are torn one after the other, at most.
-const MOST_ROWS: usize = 2;
+const MAX_ROWS: usize = 2;
 
 /// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
 /// their neighbours, and jumps that are not undone, are none of this fault.
@@ -192,7 +192,7 @@ fn undone(jumps: &[f64]) -> Option<usize> {
     if astray.abs() != 1.0 {
         return None;
     }
-    for (rows, jumps) in jumps.iter().enumerate().skip(1).take(MOST_ROWS) {
+    for (rows, jumps) in jumps.iter().enumerate().skip(1).take(MAX_ROWS) {
         astray += jumps;
         if astray == 0.0 {
             return Some(rows);

@@ -172,12 +172,12 @@ const USUAL_STRIBECK_M_S: f64 = 0.05;
 /// With what power of the acceleration the way that is lost falls where a floor holds a little more or less than is asked of it: four to six, as driven in the blind benchmark.
 const LOST_BY_HOLDS: f64 = 5.0;
 /// A floor on which less than this of the sliding is found holds all.
-const LEAST_SLIDING: f64 = 1e-3;
+const MIN_SLIDING: f64 = 1e-3;
 
 impl TractionLoss {
     /// The usual floor on which so many times as much way is lost as on one that holds up to an acceleration.
     fn sliding(sliding: f64, holds_m_s2: f64) -> Self {
-        Self::usual(holds_m_s2 * sliding.max(LEAST_SLIDING).powf(-1.0 / LOST_BY_HOLDS))
+        Self::usual(holds_m_s2 * sliding.max(MIN_SLIDING).powf(-1.0 / LOST_BY_HOLDS))
     }
 
     /// A usual floor that holds up to an acceleration.
@@ -197,7 +197,7 @@ const LEFT_SLIDING: f64 = 0.85;
 /// Longest step in which sliding is followed within a row, seconds: a fifth of what the ground takes to follow a trembling tread.
 const STEP_S: f64 = 2.5e-3;
 /// Most steps of a piece of a row: rows as long say nothing of a start.
-const MOST_STEPS: f64 = 40.0;
+const MAX_STEPS: f64 = 40.0;
 
 /// The ground's speed under trembling treads, by their mean speeds from row to row: within a row they change steadily.
 #[derive(Clone)]
@@ -260,7 +260,7 @@ impl Term {
             self.ground_m_s[side] = speed_m_s + acceleration_m_s2 * time_s - steady_m_s - more_m_s * left;
             return steady_m_s * time_s + more_m_s * lag_s * (1.0 - left);
         }
-        let steps = (time_s / STEP_S).ceil().clamp(1.0, MOST_STEPS);
+        let steps = (time_s / STEP_S).ceil().clamp(1.0, MAX_STEPS);
         let step_s = time_s / steps;
         let (mut lost_m, mut passed_s) = (0.0, 0.5 * step_s);
         while passed_s < time_s {

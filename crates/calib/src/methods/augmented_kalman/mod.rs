@@ -48,7 +48,7 @@ pub struct AugmentedKalman {
 const STAYS: f64 = 0.01;
 
 /// Passes before it is given up.
-const MOST_PASSES: u32 = 60;
+const MAX_PASSES: u32 = 60;
 
 /// A factor whose sigma is still this share of what it was before any data is not observable.
 const HARDLY_BETTER: f64 = 0.3;
@@ -120,7 +120,7 @@ impl AugmentedKalman {
     fn iterate(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, guess: NoiseFilter) -> (Pass, bool) {
         let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.held_at(*guess.variances()));
         let mut share = 1.0;
-        for _ in 0..MOST_PASSES {
+        for _ in 0..MAX_PASSES {
             // The same variances from where the factors came to, before they are compared with others from there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
             let moved =
