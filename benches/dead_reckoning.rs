@@ -20,10 +20,10 @@ fn odometry(rule: Rule) -> Odometry {
 
 /// A wandering robot of some ten counts a step.
 fn counts(steps: usize) -> Wheels<Vec<i64>> {
-    let column = |bend: i64| {
+    let column = |curvature: i64| {
         (0..)
             .scan(0, |sum, k: i64| {
-                *sum += 10 + (k / 1000 * bend) % 7 - 3;
+                *sum += 10 + (k / 1000 * curvature) % 7 - 3;
                 Some(*sum)
             })
             .take(steps)
@@ -50,7 +50,7 @@ impl<'a> Contender<'a> {
 }
 
 /// Times contenders in turn and prints each beside the first and beside the last.
-#[allow(clippy::print_stdout, clippy::cast_precision_loss)]
+#[allow(clippy::print_stdout)]
 fn race(
     title: &str,
     (steps, rounds): (usize, usize),
@@ -136,7 +136,6 @@ fn fleet(robots: usize, rows: usize, rounds: usize) {
     let odometry = odometry(Rule::ExactArc);
     let one = counts(rows);
     let spread = |column: &[i64]| -> Vec<i64> {
-        #[allow(clippy::cast_possible_wrap)]
         column.iter().flat_map(|count| (0..robots).map(move |robot| count * (1 + robot as i64 % 3))).collect()
     };
     let counts = Wheels { left: spread(&one.left), right: spread(&one.right) };

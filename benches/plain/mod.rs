@@ -8,7 +8,6 @@ fn sinc(x: f64) -> f64 {
 }
 
 #[inline(always)]
-#[allow(clippy::cast_precision_loss)]
 fn step(odometry: &Odometry, pose: &mut Pose, (before, now): (Wheels<i64>, Wheels<i64>)) {
     let left_m = odometry.m_per_count.left * (now.left - before.left) as f64;
     let right_m = odometry.m_per_count.right * (now.right - before.right) as f64;

@@ -5,11 +5,11 @@
 #![allow(clippy::print_stdout)] // the seed, and what came of it
 
 use crate::support::{document, succeed, usage};
-use blind_benchmark::{CaseResult, EffectKind, NoiseClass, Round, challenge_case};
+use blind_benchmark::{CaseKind, CaseResult, EffectKind, NoiseClass, challenge_case};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// What the tool must do at the least, as shares: the bar on false alarms under white noise, and floors under detection and naming, which docs/diagnose.md
+/// What the tool must do at the least, as shares: the bar on false positives under white noise, and floors under detection and naming, which docs/diagnose.md
 /// measures at 0.9 and 0.8.
 const ALARMS: f64 = 0.05;
 const DETECTED: f64 = 0.7;
@@ -46,11 +46,11 @@ fn driven(seed: u64, numbers: impl Iterator<Item = u64>) -> Vec<CaseResult> {
 fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
     let white = || cases.iter().filter(|case| case.noise == NoiseClass::White);
     let share = alpha / 3.0;
-    let (alarms, nulls) = count(white().filter(|case| case.round == Round::Null), |case| !case.said.is_empty());
+    let (alarms, nulls) = count(white().filter(|case| case.round == CaseKind::Null), |case| !case.said.is_empty());
     let plain = || {
         white().filter(|case| {
             let shows = |ratio: Option<f64>| ratio.is_some_and(|ratio| ratio > PLAIN_RATIO);
-            case.round == Round::Single
+            case.round == CaseKind::Single
                 && case.hidden.iter().all(|own| own.kind == EffectKind::Mean && shows(own.ratio))
         })
     };
@@ -73,10 +73,10 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
 fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
     let cases = driven(seed, (0..100).filter(|number| *number < 20 || number % 20 < NULLS_AND_SINGLES));
-    let in_round = |round: Round| cases.iter().filter(|case| case.round == round).count();
+    let in_round = |round: CaseKind| cases.iter().filter(|case| case.round == round).count();
     // No robot may show an effect that was drawn for it: docs/diagnose.md has such cases, a few in a hundred.
-    assert!(in_round(Round::Null) == 35 && (30..=35).contains(&in_round(Round::Single)), "{}", cases.len());
-    assert!(in_round(Round::Pair) > 0 && in_round(Round::LeftOut) > 0);
+    assert!(in_round(CaseKind::Null) == 35 && (30..=35).contains(&in_round(CaseKind::Single)), "{}", cases.len());
+    assert!(in_round(CaseKind::Pair) > 0 && in_round(CaseKind::LeftOut) > 0);
     holds(seed, &cases, 1e-3);
 }
 

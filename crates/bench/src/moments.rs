@@ -103,7 +103,6 @@ mod tests {
     }
 
     #[test]
-    #[allow(clippy::cast_precision_loss)]
     fn running_moments_are_those_of_the_textbook() {
         let values = sample(1, 500);
         let n = values.len() as f64;

@@ -10,11 +10,12 @@ mod case;
 mod draw;
 mod error;
 mod hidden;
-mod looks;
+mod instrument;
 mod measure;
 mod oracle;
 mod planned;
 mod power;
+mod result;
 mod robot;
 mod score;
 #[cfg(test)]
@@ -26,14 +27,13 @@ use rayon::prelude::*;
 
 use case::Case;
 
-pub use case::{OracleView, Round};
+pub use case::{CaseKind, OracleView};
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
-pub use looks::{NoiseClass, TruthKind};
+pub use instrument::{NoiseClass, TruthKind};
 pub use measure::Measure;
-pub use planned::Planned;
+pub use result::{CaseResult, Planned, Reported};
 pub use robot::PathFamily;
-pub use score::{CaseResult, Said};
 
 /// What comes of a campaign.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::case::{OracleView, Round};
+use super::case::{CaseKind, OracleView};
 use super::draw::Draw;
 use super::hidden::EffectKind;
-use super::looks::NoiseClass;
-use super::planned::Planned;
+use super::instrument::NoiseClass;
 use super::power::limits;
-use super::score::{CaseResult, Said};
+use super::result::{CaseResult, Planned, Reported};
 
 /// One measure against its bar.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -34,7 +33,6 @@ pub struct Measure {
 fn share(id: &'static str, what: &'static str, (k, n): (usize, usize), bar: f64, at_most: bool) -> Measure {
     let (low, high) = limits(k, n);
     let limit = if at_most { high } else { low };
-    #[allow(clippy::cast_precision_loss)]
     let value = (n > 0).then(|| k as f64 / n as f64);
     let met = if at_most { limit <= bar } else { limit >= bar };
     Measure { id, what, value, limit: value.map(|_| limit), of: n, bar, at_most, met: value.map(|_| met) }
@@ -60,7 +58,7 @@ enum Naming {
     WrongSet,
 }
 
-fn naming(hidden: &OracleView, first: Option<&Said>) -> Naming {
+fn naming(hidden: &OracleView, first: Option<&Reported>) -> Naming {
     let Some(said) = first else { return Naming::Undetected };
     if said.names[0] == hidden.id {
         Naming::First
@@ -85,27 +83,27 @@ fn is_aliased(hidden: &OracleView) -> bool {
 
 /// All measures.
 pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
-    let of = |round: Round| cases.iter().filter(move |case| case.round == round);
+    let of = |round: CaseKind| cases.iter().filter(move |case| case.round == round);
     let alarm = |case: &CaseResult| case.findings().next().is_some();
     let mut measures = vec![
         share(
             "false_alarms",
             "nulls with an alarm",
-            count(of(Round::Null).filter(|case| case.noise == NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise == NoiseClass::White), alarm),
             0.05,
             true,
         ),
         share(
             "false_alarms_other_noise",
             "nulls with an alarm, other noise",
-            count(of(Round::Null).filter(|case| case.noise != NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise != NoiseClass::White), alarm),
             0.10,
             true,
         ),
         share(
             "nulls_unextended",
             "nulls left unextended",
-            count(of(Round::Null), |case: &CaseResult| !case.extended),
+            count(of(CaseKind::Null), |case: &CaseResult| !case.extended),
             0.95,
             false,
         ),
@@ -118,16 +116,16 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
     measures.push(gain(
         "gain",
         "gain over the oracle's",
-        &of(Round::Single).chain(of(Round::Pair)).collect::<Vec<_>>(),
+        &of(CaseKind::Single).chain(of(CaseKind::Pair)).collect::<Vec<_>>(),
         0.9,
     ));
     let white = |case: &&CaseResult| case.noise == NoiseClass::White;
-    let drawn: Vec<&CaseResult> = of(Round::Single).chain(of(Round::Pair)).filter(white).collect();
+    let drawn: Vec<&CaseResult> = of(CaseKind::Single).chain(of(CaseKind::Pair)).filter(white).collect();
     measures.push(Measure { met: None, ..gain("gain_white", "the same under white noise (shown only)", &drawn, 0.9) });
     measures.push(gain(
         "gain_left_out",
         "left out: gain over the oracle's",
-        &of(Round::LeftOut).collect::<Vec<_>>(),
+        &of(CaseKind::LeftOut).collect::<Vec<_>>(),
         0.7,
     ));
     measures.extend(probabilities(cases));
@@ -137,7 +135,7 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
 fn names(cases: &[CaseResult]) -> Vec<Measure> {
     let singles: Vec<(&OracleView, Naming, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == Round::Single)
+        .filter(|case| case.round == CaseKind::Single)
         .filter_map(|case| {
             let hidden = case.hidden.first()?;
             Some((hidden, naming(hidden, case.findings().next()), case))
@@ -167,7 +165,6 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
     let sizes: Vec<(f64, f64)> = aliased()
         .filter(|(hidden, _, _)| hidden.kind == EffectKind::Mean)
         .filter_map(|(hidden, _, case)| {
-            #[allow(clippy::cast_precision_loss)]
             Some((case.findings().next()?.names.len() as f64, 1.0 + hidden.aliases.len() as f64))
         })
         .collect();
@@ -183,7 +180,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     };
     let of: Vec<_> = sets().filter(|(_, planned)| planned.can_be_told()).collect();
     let can = of.len();
-    let shown = share(
+    let detectability = share(
         "sets_that_can_be_told",
         "sets that the oracle could tell after more runs (shown only)",
         (can, sets().count()),
@@ -198,7 +195,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
             0.9,
             false,
         ),
-        Measure { met: None, ..shown },
+        Measure { met: None, ..detectability },
     ]
 }
 
@@ -207,7 +204,6 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
     let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
     let value = (b > 0.0 && pairs.len() > 1).then(|| a / b);
     let limit = value.map(|value| {
-        #[allow(clippy::cast_precision_loss)]
         let n = pairs.len() as f64;
         let squares: f64 = pairs.iter().map(|pair| (pair.0 - value * pair.1).powi(2)).sum();
         let error = (squares * n / (n - 1.0)).sqrt() / b;
@@ -220,7 +216,7 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
 fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
     let said: Vec<(&OracleView, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == Round::LeftOut && case.findings().next().is_some())
+        .filter(|case| case.round == CaseKind::LeftOut && case.findings().next().is_some())
         .filter_map(|case| Some((case.hidden.first()?, case)))
         .collect();
     let outcome = |(hidden, case): &&(&OracleView, &CaseResult)| without(hidden, case);
@@ -280,7 +276,7 @@ fn pairs(cases: &[CaseResult]) -> Measure {
     let both = |case: &CaseResult| {
         case.hidden.iter().all(|hidden| case.findings().any(|said| said.names.contains(&hidden.id)))
     };
-    let counted = cases.iter().filter(|case| case.round == Round::Pair).filter(both_show);
+    let counted = cases.iter().filter(|case| case.round == CaseKind::Pair).filter(both_show);
     share("pairs", "pairs: both in the findings", count(counted, both), 0.85, false)
 }
 
@@ -291,7 +287,7 @@ fn gain(id: &'static str, what: &'static str, cases: &[&CaseResult], bar: f64) -
 
 /// Findings of singles and pairs: is the first name right as often as stated; do intervals cover?
 fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
-    let rounds = |case: &&CaseResult| matches!(case.round, Round::Single | Round::Pair);
+    let rounds = |case: &&CaseResult| matches!(case.round, CaseKind::Single | CaseKind::Pair);
     let findings: Vec<(f64, bool)> = cases
         .iter()
         .filter(rounds)
@@ -303,13 +299,11 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
     // Ten bins of equal width.
     let mut bins: BTreeMap<u32, (f64, f64, f64)> = BTreeMap::new();
     for (probability, right) in &findings {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let bin = bins.entry((probability * 10.0).clamp(0.0, 9.0) as u32).or_default();
         bin.0 += probability;
         bin.1 += f64::from(u8::from(*right));
         bin.2 += 1.0;
     }
-    #[allow(clippy::cast_precision_loss)]
     let n = findings.len() as f64;
     let error = (n > 0.0).then(|| bins.values().map(|(stated, right, _)| (stated - right).abs()).sum::<f64>() / n);
     let covered: Vec<bool> =
@@ -338,7 +332,7 @@ const BOOTSTRAPS: usize = 400;
 fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let mut points: Vec<(f64, f64)> = cases
         .iter()
-        .filter(|case| case.round == Round::Single && case.noise == NoiseClass::White)
+        .filter(|case| case.round == CaseKind::Single && case.noise == NoiseClass::White)
         .filter_map(|case| {
             let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
             Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))

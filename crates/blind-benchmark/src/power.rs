@@ -10,7 +10,7 @@ const LEVEL: f64 = 0.05;
 const POWER: f64 = 0.9;
 
 /// Noncentrality at which two names are told apart at the level and power above: their log likelihood ratio is N(±λ/2, λ), so √λ = z(0.95) + z(0.9).
-pub(crate) const TOLD_APART: f64 = 8.564;
+pub(crate) const DISCRIMINATION_LEVEL: f64 = 8.564;
 
 /// Power of a χ² test at 5 % with this noncentrality.
 pub(crate) fn power(freedom: f64, noncentrality: f64) -> f64 {
@@ -21,7 +21,6 @@ pub(crate) fn power(freedom: f64, noncentrality: f64) -> f64 {
     let terms = 60 + (3.0 * noncentrality) as u64;
     (0..terms)
         .map(|k| {
-            #[allow(clippy::cast_precision_loss)]
             let more = freedom + 2.0 * k as f64;
             poisson.pmf(k) * ChiSquared::new(more).map_or(0.0, |chi| chi.sf(critical))
         })
@@ -30,7 +29,6 @@ pub(crate) fn power(freedom: f64, noncentrality: f64) -> f64 {
 
 /// The noncentrality at which a χ² test of so many degrees of freedom at 5 % has power 0.9.
 pub(crate) fn detection_limit(freedom: usize) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
     let freedom = freedom.max(1) as f64;
     let (mut low, mut high) = (1.0, 60.0);
     for _ in 0..50 {
@@ -42,7 +40,6 @@ pub(crate) fn detection_limit(freedom: usize) -> f64 {
 
 /// One-sided 95 % limits of a share, lower and upper (Clopper–Pearson).
 pub(crate) fn limits(successes: usize, of: usize) -> (f64, f64) {
-    #[allow(clippy::cast_precision_loss)]
     let (k, n) = (successes as f64, of as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
     let low = if successes == 0 { 0.0 } else { quantile(k, n - k + 1.0, 0.05) };

@@ -222,7 +222,6 @@ fn means(pairs: &[Placed], kinds: &[String]) -> Vec<KindMean> {
             let errors: Vec<(f64, f64)> = of_kinds
                 .filter_map(|(_, _, pair)| pair.mean_final_position_m.zip(pair.mean_final_heading_rad))
                 .collect();
-            #[allow(clippy::cast_precision_loss)] // counts of pairs
             let mean = |of: fn(&(f64, f64)) -> f64| {
                 (!errors.is_empty()).then(|| errors.iter().map(of).sum::<f64>() / errors.len() as f64)
             };

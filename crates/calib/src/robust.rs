@@ -87,7 +87,6 @@ const fn in_total_order(bits: i64) -> i64 {
 }
 
 /// Mean of the values given; `None` when there is none.
-#[allow(clippy::cast_precision_loss)] // counts of runs
 pub(crate) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (count, sum) = values.fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value));
     (count > 0).then(|| sum / count as f64)
@@ -107,7 +106,6 @@ pub struct Summary {
 impl Summary {
     /// Of the values given; `None` when there is none.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // counts of runs
     pub fn of(values: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let mean = mean(values.clone())?;
         let (count, squares) =
@@ -117,7 +115,6 @@ impl Summary {
 
     /// Variance of the mean.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)]
     pub fn mean_variance(&self) -> Option<f64> {
         self.variance.map(|variance| variance / self.count as f64)
     }

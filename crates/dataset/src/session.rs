@@ -269,7 +269,6 @@ mod tests {
         let marks = dataset(Run::default()).points;
         for (k, pose) in poses.iter().enumerate() {
             for (point, mark) in marks.iter().enumerate() {
-                #[allow(clippy::cast_precision_loss)]
                 run.point_readings.push(PointReading { t_s: k as f64, point, room: *pose * mark.body });
             }
         }

@@ -2,14 +2,13 @@
 //! have for it to show, and another functional form.
 //!
 //! Sizes are drawn as a direction and scaled afterwards to what the data can show, up to the largest of a
-//! real robot. The *other form* is a forward face that departs from the catalogue's, so that the world
+//! real robot. The *other form* is a simulation model that departs from the catalogue's, so that the world
 //! differs from every hypothesis. It stands in the effect's file and shares no code with the hypothesis.
 //! References: Pacejka 2012 for slip that saturates; Armstrong-Hélouvry et al. 1994 for round corners of
 //! friction.
 
 use kinematics::Wheels;
 
-use crate::Effect;
 use crate::forward::{Forward, Hooks, Step};
 use crate::stream::Stream;
 
@@ -19,11 +18,8 @@ pub type NamedSize = (&'static str, f64);
 /// Sizes by their names.
 pub type Sizes = Vec<NamedSize>;
 
-/// The forward face of another form, from sizes of the hypothesis, at which it does about as much.
+/// The simulation model of another form, from sizes of the hypothesis, at which it does about as much.
 pub type FormOf = fn(&[NamedSize], &HostRobot) -> Box<dyn Forward>;
-
-/// The effect of sizes in force at a scale.
-pub type AtScale = fn(&[NamedSize], f64, &HostRobot) -> Option<Effect>;
 
 /// The robot that an effect is hidden in.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,15 +90,10 @@ pub struct Benchmark {
     pub sizes: SizeLaw,
     /// Largest scale of a real robot.
     pub max_scale: f64,
-    /// The effect of drawn sizes at a scale, where that is another than `of_sizes` makes of them.
-    pub at_scale: Option<AtScale>,
     /// Another functional form, of which one robot in two is.
     pub other_form: Option<OtherForm>,
     /// Its signature is random in part: one drive with it is not like the next.
     pub has_random_signature: bool,
-    /// The effect without any harm, for records that have what it needs though it is not hidden: so such
-    /// records tell nothing.
-    pub harmless: Option<fn(&HostRobot) -> Option<Effect>>,
 }
 
 /// Means beyond so many times what is large are no robot's.
@@ -120,10 +111,8 @@ impl Benchmark {
         needs: Needs::NONE,
         sizes: SizeLaw::Direction { held: as_tried, positive: false },
         max_scale: MAX_SCALE_OF_MEAN,
-        at_scale: None,
         other_form: None,
         has_random_signature: false,
-        harmless: None,
     };
 
     /// A mean whose shape parameters are drawn by a law of their own.
@@ -176,7 +165,7 @@ pub(crate) fn contact_twist(step: &Step) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::hypothesis::Hypothesis;
-    use crate::{Address, CATALOGUE, StreamName, description, effect_of_sizes, hypothesis};
+    use crate::{Address, CATALOGUE, StreamName, description, effect_at_scale, harmless, hypothesis};
 
     fn host() -> HostRobot {
         HostRobot {
@@ -199,9 +188,9 @@ mod tests {
         match benchmark.sizes {
             SizeLaw::Direction { held, .. } => {
                 let shape =
-                    hypothesis(id).and_then(Hypothesis::into_shapes).and_then(|shapes| shapes.into_iter().next());
+                    hypothesis(id).and_then(Hypothesis::into_variants).and_then(|variants| variants.into_iter().next());
                 let Some(shape) = shape else { return Vec::new() };
-                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.plausible));
+                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.prior_sigma));
                 large.chain(held(shape.held.clone(), &host(), &mut stream)).collect()
             }
             SizeLaw::Scatter(law) => {
@@ -209,13 +198,6 @@ mod tests {
                 scaled.into_iter().chain(held).collect()
             }
             SizeLaw::Fault(law) => law(Wheels { left: run.is_multiple_of(2), right: true }, &mut stream),
-        }
-    }
-
-    fn acts(benchmark: &Benchmark, id: &str, sizes: &[NamedSize], scale: f64) -> Option<Effect> {
-        match benchmark.at_scale {
-            Some(at_scale) => at_scale(sizes, scale, &host()).filter(|effect| effect.physical().check().is_ok()),
-            None => effect_of_sizes(id, sizes),
         }
     }
 
@@ -240,11 +222,11 @@ mod tests {
             }
             for run in 0..20 {
                 let sizes = drawn(id, run);
-                let effect = acts(&benchmark, id, &sizes, 1.0).unwrap_or_else(|| panic!("{id}: {sizes:?}"));
+                let effect = effect_at_scale(id, &sizes, 1.0, &host()).unwrap_or_else(|| panic!("{id}: {sizes:?}"));
                 assert_eq!(effect.id(), *id);
                 // A size that the effect has under another name makes none.
                 let renamed: Sizes = sizes.iter().map(|(_, size)| ("another", *size)).collect();
-                assert!(sizes.is_empty() || acts(&benchmark, id, &renamed, 1.0).is_none(), "{id}");
+                assert!(sizes.is_empty() || effect_at_scale(id, &renamed, 1.0, &host()).is_none(), "{id}");
             }
         }
         let fault = Benchmark::of_fault(|_, _| Vec::new());
@@ -255,8 +237,8 @@ mod tests {
     fn departs(form: &mut dyn Forward) -> bool {
         use crate::catalogue::specimen_step;
         let hooks = form.hooks();
-        if hooks.start_run {
-            form.start_run(stream(0));
+        if hooks.seed_run {
+            form.seed_run(stream(0));
         }
         // A second ahead, and a second back, so that what follows reversals acts.
         (0..2000).any(|k| {
@@ -292,8 +274,8 @@ mod tests {
             forms += 1;
             let mut sizes = drawn(id, 0);
             assert!(departs(&mut *(form.forward)(&sizes, &host())), "{id}");
-            let shapes = hypothesis(id).and_then(Hypothesis::into_shapes).expect("a mean");
-            for parameter in shapes[0].term.parameters() {
+            let variants = hypothesis(id).and_then(Hypothesis::into_variants).expect("a mean");
+            for parameter in variants[0].term.parameters() {
                 sizes.iter_mut().filter(|(name, _)| *name == parameter.name).for_each(|(_, size)| *size = 0.0);
             }
             assert!(!departs(&mut *(form.forward)(&sizes, &host())), "{id} of no size");
@@ -305,12 +287,12 @@ mod tests {
     #[test]
     fn what_needs_something_of_the_records_can_be_there_without_harm() {
         for id in CATALOGUE {
-            let benchmark = description(id).expect("known").benchmark;
-            assert_eq!(benchmark.needs != Needs::NONE, benchmark.harmless.is_some(), "{id}");
-            let Some(harmless) = benchmark.harmless else { continue };
-            assert!(harmless(&host()).is_some_and(|effect| effect.id() == *id && effect.physical().check().is_ok()));
+            let needs = description(id).expect("known").benchmark.needs;
+            let found = harmless(id, &host());
+            assert_eq!(needs != Needs::NONE, found.is_some(), "{id}");
+            assert!(found.is_none_or(|effect| effect.id() == *id && effect.physical().check().is_ok()), "{id}");
             let bare = HostRobot { payload_kg: Vec::new(), jitter_s: 0.0, ..host() };
-            assert_eq!(harmless(&bare), None, "{id}");
+            assert_eq!(harmless(id, &bare), None, "{id}");
         }
     }
 }

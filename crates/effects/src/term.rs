@@ -2,7 +2,7 @@
 //!
 //! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the way of wheels, each by covariates of its own; seen_along, seen_across and
 //! seen_heading are off by coefficient · Π covariates, and seen_late is so long ago.
-//! [`Sparse`] is the hypothesis face, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the forward face, as
+//! [`Sparse`] is the estimation model, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the simulation model, as
 //! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes with.
 //!
 //! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised because a threshold on raw coefficients depends on
@@ -10,53 +10,37 @@
 
 use std::collections::BTreeMap;
 
-use dataset::RunInfo;
-use kinematics::{Increment, Pose, Wheels};
-use model_term::{Interval, Look, ModelTerm, TermParameter};
+use kinematics::Wheels;
+use model_term::ModelTerm;
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, Moment};
+use crate::covariate::{Channel, Covariate, KinematicSample};
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
-use crate::hypothesis::{Hypothesis, Shape};
-use crate::memory::{Memory, Remembered};
-use together::Together;
+use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
+use crate::hypothesis::{Hypothesis, Variant};
+use crate::motion_history::{MotionHistory, MotionHistoryTracker};
+use recorded::{OfRows, ROW_SHARE, Recorded};
+pub use sparse::Sparse;
+use sparse::{CONSTANT, on_channel, parameter, seen};
+use together::ProductBatch;
 
+mod recorded;
+mod sparse;
 mod together;
 
 /// `kind` of a [`SparseTerm`] in a scenario.
 pub(crate) const TERM: &str = "term";
-/// How a product of no covariates is written.
-const CONSTANT: &str = "1";
 /// Most covariates of a product.
 const MOST_COVARIATES: usize = 3;
 
-/// A channel and the product of covariates that it goes with.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sparse {
-    /// What it adds to.
-    pub channel: Channel,
-    /// The factors; none for a constant.
-    pub covariates: Vec<Covariate>,
-}
-
 impl Sparse {
-    /// The names of its covariates, as findings and scenarios have them.
-    #[must_use]
-    pub fn names(&self) -> Vec<String> {
-        if self.covariates.is_empty() {
-            return vec![CONSTANT.to_owned()];
-        }
-        self.covariates.iter().map(Covariate::name).collect()
-    }
-
     /// How recorded data show it.
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
         if self.is_of_rows()
-            && let Some(shape) = IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop())
+            && let Some(shape) = IntervalError::hypothesis().into_variants().and_then(|mut variants| variants.pop())
         {
             return Box::new(OfRows { of: shape.term, own: [parameter(self)] });
         }
@@ -66,32 +50,7 @@ impl Sparse {
     /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of [`Self::shares_moments`].
     #[must_use]
     pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
-        all.iter().all(Self::shares_moments).then(|| Box::new(Together::new(all)) as Box<dyn ModelTerm>)
-    }
-
-    /// Whether it goes with what is found once for all products of an interval: those do that add to the motion or to the wheels' way, but for what goes with rows.
-    #[must_use]
-    pub fn shares_moments(&self) -> bool {
-        !self.channel.is_seen() && !self.is_of_rows()
-    }
-
-    /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.
-    #[must_use]
-    pub fn of_rows() -> Self {
-        Self { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] }
-    }
-
-    fn is_of_rows(&self) -> bool {
-        self.covariates.iter().any(Covariate::is_of_rows)
-    }
-
-    fn product(&self, at: &Moment<'_>) -> f64 {
-        self.covariates.iter().map(|covariate| covariate.value(at)).product()
-    }
-
-    /// The product for each wheel by what it does itself; 0 for one that the channel leaves alone.
-    fn of_wheels(&self, channel: Channel, at: &Moment<'_>) -> Wheels<f64> {
-        Wheels::from_sides(|side| if channel.is_of(side) { self.product(&at.of_wheel(side)) } else { 0.0 })
+        all.iter().all(Self::shares_moments).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
     }
 }
 
@@ -183,7 +142,7 @@ impl SparseTerm {
     #[must_use]
     pub(crate) fn shown(&self) -> Option<Hypothesis> {
         let term = self.sparse().ok()?.term();
-        Some(Hypothesis::Terms(vec![Shape { held: Vec::new(), term, at: None }]))
+        Some(Hypothesis::Terms(vec![Variant { held: Vec::new(), term, at: None }]))
     }
 }
 
@@ -211,7 +170,7 @@ impl PhysicalEffect for SparseTerm {
             of_run: BTreeMap::new(),
             session_s: 0.0,
             session_m: 0.0,
-            memory: Memory::NONE,
+            memory: MotionHistoryTracker::NONE,
             speeds: (0.0, 0.0),
         }))
     }
@@ -226,7 +185,7 @@ impl PhysicalEffect for SparseTerm {
     }
 }
 
-/// The forward face in a run.
+/// The simulation model in a run.
 struct State {
     size: SparseTerm,
     sparse: Sparse,
@@ -235,19 +194,19 @@ struct State {
     session_s: f64,
     /// Way of the drive's centre in the session, metres.
     session_m: f64,
-    memory: Memory,
+    memory: MotionHistoryTracker,
     /// v and ω of the last step, for what is seen after it.
     speeds: (f64, f64),
 }
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
+        Hooks { on_run_start: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         (self.session_s, self.session_m) = (run.session_s, run.session_m);
-        (self.memory, self.speeds) = (Memory::NONE, (0.0, 0.0));
+        (self.memory, self.speeds) = (MotionHistoryTracker::NONE, (0.0, 0.0));
         for (key, values) in &self.size.of_runs {
             let value = values[run.number as usize % values.len()];
             let said = *run.info.covariates.entry(key.clone()).or_insert(value);
@@ -269,9 +228,9 @@ impl Forward for State {
         let half_s = 0.5 * step.dt_s;
         let (distance_m, turn_rad) = (v_m_s * step.dt_s, omega_rad_s * step.dt_s);
         let travel_m = wheel_m_s.map(|wheel_m_s| wheel_m_s * step.dt_s);
-        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
+        let MotionHistory { since_reversal_m, wheel_since_reversal_m, last_turn } =
             self.memory.after(travel_m, distance_m, turn_rad);
-        let at = Moment {
+        let at = KinematicSample {
             v_m_s,
             omega_rad_s,
             acceleration_m_s2: mean(wheel_m_s2),
@@ -310,10 +269,10 @@ impl Forward for State {
         }
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
-        let at = seen(self.speeds, sighting.world_from_body, sighting.t_s);
+    fn instrument(&mut self, reading: &mut PoseReading) {
+        let at = seen(self.speeds, reading.world_from_body, reading.t_s);
         let size = self.size.coefficient * self.sparse.product(&at);
-        sighting.world_from_body = sighting.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
+        reading.world_from_body = reading.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -328,193 +287,6 @@ impl Forward for State {
     /// What goes with v or ω alone goes with the way or the turn, however fast.
     fn depends_on_speed(&self) -> bool {
         self.size.coefficient != 0.0 && self.sparse.covariates.iter().filter(|of| of.is_a_speed()).count() > 1
-    }
-}
-
-/// A moment at which an instrument looks: twist, heading and time alone are known of it.
-fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> Moment<'static> {
-    static NONE: BTreeMap<String, f64> = BTreeMap::new();
-    Moment {
-        v_m_s,
-        omega_rad_s,
-        acceleration_m_s2: 0.0,
-        yaw_acceleration_rad_s2: 0.0,
-        heading_rad: world_from_body.theta_rad,
-        wheel_m_s: Wheels::both(0.0),
-        wheel_m_s2: Wheels::both(0.0),
-        own_m_s: 0.0,
-        own_m_s2: 0.0,
-        own_since_reversal_m: [f64::INFINITY; 2],
-        wheel_rad: Wheels::both(0.0),
-        turned_rad: Wheels::both(0.0),
-        run_s,
-        session_s: 0.0,
-        session_m: 0.0,
-        since_reversal_m: f64::INFINITY,
-        wheel_since_reversal_m: Wheels::both([f64::INFINITY; 2]),
-        last_turn: 0.0,
-        x_m: 0.0,
-        y_m: 0.0,
-        of_run: &NONE,
-    }
-}
-
-/// A size on a channel that is none of the wheels', by v and ω.
-fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
-    match channel {
-        Channel::Along | Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
-        Channel::Across | Channel::SeenAcross => Pose::new(0.0, size, 0.0),
-        Channel::Yaw | Channel::SeenHeading => Pose::new(0.0, 0.0, size),
-        Channel::SeenLate => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
-        // What both wheels or one of them gain needs their separation: `Sparse::of_wheels`.
-        Channel::Wheels | Channel::LeftWheel | Channel::RightWheel => Pose::IDENTITY,
-    }
-}
-
-/// The hypothesis face in a run.
-#[derive(Clone)]
-struct Recorded {
-    of: Sparse,
-    own: [TermParameter; 1],
-    past: Past,
-}
-
-/// What moments need to know of the intervals before.
-#[derive(Debug, Clone, Copy)]
-struct Past {
-    memory: Memory,
-    row: Option<Row>,
-}
-
-/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains add up to the speeds.
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    end_s: f64,
-    wheel_m_s: Wheels<f64>,
-    wheel_m_s2: Wheels<f64>,
-}
-
-/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second; more of what fades after a reversal.
-fn parameter(of: &Sparse) -> TermParameter {
-    let unit = match of.channel {
-        Channel::Yaw => "rad/s",
-        Channel::SeenAlong | Channel::SeenAcross => "m",
-        Channel::SeenHeading => "rad",
-        Channel::SeenLate => "s",
-        _ => "m/s",
-    };
-    let faded: f64 = of.covariates.iter().map(Covariate::fades).product();
-    TermParameter { name: "coefficient", unit, plausible: 0.02 * faded }
-}
-
-impl Past {
-    const NONE: Self = Self { memory: Memory::NONE, row: None };
-
-    /// The middle of an interval that takes time.
-    fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
-        let Increment { distance_m, turn_rad } = interval.increment();
-        let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
-        let wheel_m_s = interval.speed_m_s();
-        let [from_s, to_s] = interval.row_s;
-        let row = match self.row {
-            // A look between two rows cuts an interval: its speed changed where its row began, and not at the look.
-            Some(row) if row.end_s == to_s => row,
-            before => {
-                let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
-                let wheel_m_s2 =
-                    before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
-                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
-            }
-        };
-        self.row = Some(row);
-        let wheel_m_s2 = row.wheel_m_s2;
-        let Wheels { left, right } = wheel_m_s2;
-        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
-            self.memory.after(interval.travel_m, distance_m, turn_rad);
-        Moment {
-            v_m_s,
-            omega_rad_s,
-            acceleration_m_s2: 0.5 * (left + right),
-            yaw_acceleration_rad_s2: (right - left) / interval.wheel_separation_m,
-            heading_rad: interval.world_from_body.theta_rad + 0.5 * turn_rad,
-            wheel_m_s,
-            wheel_m_s2,
-            own_m_s: 0.0,
-            own_m_s2: 0.0,
-            own_since_reversal_m: [f64::INFINITY; 2],
-            wheel_rad: interval.wheel_rad.zip_with(interval.turned_rad, |angle, turned| angle + 0.5 * turned),
-            turned_rad: interval.turned_rad,
-            run_s: interval.t_s,
-            session_s: interval.session_s(),
-            session_m: interval.session_m,
-            since_reversal_m,
-            wheel_since_reversal_m,
-            last_turn,
-            x_m: interval.world_from_body.x_m,
-            y_m: interval.world_from_body.y_m,
-            of_run: &interval.run.covariates,
-        }
-    }
-}
-
-impl Recorded {
-    fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), own: [parameter(of)], past: Past::NONE }
-    }
-}
-
-impl ModelTerm for Recorded {
-    fn parameters(&self) -> &[TermParameter] {
-        &self.own
-    }
-
-    fn restart(&mut self, _run: &RunInfo) {
-        self.past = Past::NONE;
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
-            let at = self.past.moment(interval);
-            gradient[0] = if self.of.channel.is_of_wheels() {
-                interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
-            } else {
-                on_channel(self.of.channel, self.of.product(&at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
-            };
-        }
-    }
-
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        if self.of.channel.is_seen() {
-            let speeds = (look.twist.v_m_s, look.twist.omega_rad_s);
-            let product = self.of.product(&seen(speeds, look.world_from_body, look.t_s));
-            gradient[0] = on_channel(self.of.channel, product, speeds);
-        }
-    }
-}
-
-/// Unit of how much longer a row is than by the beat, as a share of itself.
-const ROW_SHARE: f64 = 0.02;
-
-/// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is false. Which speed it goes with is not that by the same stamps.
-#[derive(Clone)]
-struct OfRows {
-    of: Box<dyn ModelTerm>,
-    own: [TermParameter; 1],
-}
-
-impl ModelTerm for OfRows {
-    fn parameters(&self) -> &[TermParameter] {
-        &self.own
-    }
-
-    fn restart(&mut self, run: &RunInfo) {
-        self.of.restart(run);
-    }
-
-    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        self.of.motion(interval, gradient);
-        let Pose { x_m, y_m, theta_rad } = gradient[0];
-        gradient[0] = Pose::new(x_m / ROW_SHARE, y_m / ROW_SHARE, theta_rad / ROW_SHARE);
     }
 }
 

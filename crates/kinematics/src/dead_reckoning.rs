@@ -1,4 +1,4 @@
-//! Dead reckoning from cumulative wheel counts, online and over a whole log, to the same bits.
+//! Dead reckoning from cumulative wheel counts, online; `trajectory.rs` gives the same bits over a whole log.
 //!
 //! Position follows eq. (3), `x += ΔS cos(θ+Δθ/2)`, with the arc as the chord ([`Rule::Midpoint`], the paper) or the exact
 //! chord `ΔS·sinc(Δθ/2)` ([`Rule::ExactArc`]). Heading is *not* summed: it is a function of the counts since the start,
@@ -7,8 +7,7 @@
 //! with the number of steps either. `whole_log.rs` does the same with columns.
 
 use crate::trig::{SHIFTER, along, step_sinc};
-use crate::whole_log::{self, Every, Last, Rows};
-use crate::{InstructionSet, OdometryCovariance, Pose, WheelNoise, Wheels};
+use crate::{Pose, Wheels};
 
 /// How one step's wheel travel becomes a displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -56,7 +55,7 @@ impl Count for i32 {
 impl Count for i64 {
     const CONVERTS_BY_BITS: bool = true;
 
-    #[allow(clippy::cast_precision_loss)] // 2^53 counts are 10^10 km of wheel travel
+    // 2^53 counts are 10^10 km of wheel travel.
     #[inline(always)]
     fn since(self, earlier: Self) -> f64 {
         self.wrapping_sub(earlier) as f64
@@ -114,134 +113,6 @@ impl Odometry {
             steps: 0,
             world_from_body,
         }
-    }
-
-    /// The pose at every row of a log, the first being the start pose.
-    ///
-    /// Cost: docs/performance.md; 24 bytes a row.
-    ///
-    /// # Panics
-    /// When the two columns differ in length: they are columns of one table.
-    #[must_use]
-    pub fn trajectory<C: Count>(&self, start: Pose, counts: Wheels<&[C]>) -> Vec<Pose> {
-        let mut poses = vec![start; counts.left.len()];
-        self.trajectory_into(start, counts, &mut poses);
-        poses
-    }
-
-    /// [`Self::trajectory`] into poses that are there.
-    ///
-    /// # Panics
-    /// When the two columns and `poses` differ in length.
-    pub fn trajectory_into<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, poses: &mut [Pose]) {
-        self.trajectory_into_by(InstructionSet::widest(), start, counts, poses);
-    }
-
-    /// [`Self::trajectory_into`] by a given instruction set: the same bits, at another speed.
-    ///
-    /// # Panics
-    /// As [`Self::trajectory_into`].
-    pub fn trajectory_into_by<C: Count>(
-        &self,
-        set: InstructionSet,
-        start: Pose,
-        counts: Wheels<&[C]>,
-        poses: &mut [Pose],
-    ) {
-        assert_eq!(counts.left.len(), poses.len(), "one pose a row");
-        let Some((state, steps)) = self.first_row(start, counts) else { return };
-        if let Some((first, later)) = poses.split_first_mut() {
-            *first = start;
-            whole_log::walk(set, state, steps, Every(later));
-        }
-    }
-
-    /// The pose at the last row of a log; the start pose for an empty one.
-    ///
-    /// # Panics
-    /// When the two columns differ in length.
-    #[must_use]
-    pub fn final_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>) -> Pose {
-        let Some((state, steps)) = self.first_row(start, counts) else { return start };
-        whole_log::walk(InstructionSet::widest(), state, steps, Last).world_from_body()
-    }
-
-    /// The poses at some rows of a log, nothing else being stored: `rows` count from 0 and do not fall.
-    ///
-    /// # Panics
-    /// When the two columns differ in length, or a row is not among theirs or below the one before it.
-    #[must_use]
-    pub fn poses_at<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, rows: &[usize]) -> Vec<Pose> {
-        assert!(rows.is_sorted(), "rows in their order");
-        assert!(rows.last().is_none_or(|last| *last < counts.left.len()), "rows of the log");
-        let mut poses = vec![start; rows.iter().take_while(|row| **row == 0).count()];
-        if let Some((state, steps)) = self.first_row(start, counts) {
-            let rows = &rows[poses.len()..];
-            whole_log::walk(InstructionSet::widest(), state, steps, Rows::new(rows, &mut poses));
-        }
-        poses
-    }
-
-    /// Calls `visit` with pose and covariance at every row of a log in order, storing nothing: each step an exact arc ([`OdometryCovariance::propagate`])
-    /// of wheels whose travel carries `noise`.
-    ///
-    /// # Panics
-    /// When the two columns differ in length.
-    pub fn for_each_pose_with_covariance<C: Count>(
-        &self,
-        (start, covariance): (Pose, OdometryCovariance),
-        counts: Wheels<&[C]>,
-        noise: &WheelNoise,
-        mut visit: impl FnMut(Pose, &OdometryCovariance),
-    ) {
-        let (mut covariance, mut before) = (covariance, None);
-        let mut rows = counts.left.iter().zip(counts.right);
-        self.for_each_pose(start, counts, |pose| {
-            let now = rows.next().map(|(&left, &right)| Wheels { left, right });
-            if let (Some((from, before)), Some(now)) = (before, now) {
-                let steps: Wheels<f64> = now.zip_with(before, C::since);
-                let travel_m = steps.zip_with(self.m_per_count, |counts, m_per_count| counts * m_per_count);
-                covariance.propagate(from, travel_m, self.wheel_separation_m, noise);
-            }
-            before = now.map(|now| (pose, now));
-            visit(pose, &covariance);
-        });
-    }
-
-    /// Calls `visit` with the pose at every row of a log in order, storing nothing.
-    ///
-    /// # Panics
-    /// When the two columns differ in length.
-    pub fn for_each_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, mut visit: impl FnMut(Pose)) {
-        let Some((mut state, steps)) = self.first_row(start, counts) else { return };
-        visit(start);
-        if steps.left.len() < whole_log::FEWEST_FOR_A_BLOCK {
-            for (&left, &right) in steps.left.iter().zip(steps.right) {
-                visit(state.update(Wheels { left, right }));
-            }
-            return;
-        }
-        // By blocks of a length at which the copy of the poses stays in the nearest cache.
-        let mut poses = [start; whole_log::BLOCK];
-        for (left, right) in steps.left.chunks(whole_log::BLOCK).zip(steps.right.chunks(whole_log::BLOCK)) {
-            let poses = &mut poses[..left.len()];
-            state = whole_log::walk(InstructionSet::widest(), state, Wheels { left, right }, Every(poses));
-            poses.iter().copied().for_each(&mut visit);
-        }
-    }
-
-    /// Dead reckoning at the first row of a log, and the rows that follow; `None` for an empty one.
-    fn first_row<'a, C: Count>(
-        &self,
-        start: Pose,
-        counts: Wheels<&'a [C]>,
-    ) -> Option<(DeadReckoning<C>, Wheels<&'a [C]>)> {
-        assert_eq!(counts.left.len(), counts.right.len(), "left and right counts are columns of one table");
-        let ((left, later_left), (right, later_right)) = (counts.left.split_first()?, counts.right.split_first()?);
-        Some((
-            self.start(start, Wheels { left: *left, right: *right }),
-            Wheels { left: later_left, right: later_right },
-        ))
     }
 }
 
@@ -354,24 +225,6 @@ mod tests {
 
     proptest! {
         #[test]
-        fn online_and_whole_log_agree_to_the_bit(steps in prop::collection::vec((-40_i64..90, -40_i64..90), 1..200), exact: bool) {
-            let odometry = yair(if exact { Rule::ExactArc } else { Rule::Midpoint });
-            let (mut left, mut right) = (vec![7_i64], vec![-3_i64]);
-            for (l, r) in &steps {
-                left.push(left[left.len() - 1] + l);
-                right.push(right[right.len() - 1] + r);
-            }
-            let start = Pose::new(1.0, -2.0, 0.3);
-            let whole = odometry.trajectory(start, Wheels { left: &left[..], right: &right[..] });
-            let mut online = odometry.start(start, Wheels { left: left[0], right: right[0] });
-            prop_assert_eq!(whole[0], start);
-            for k in 1..left.len() {
-                prop_assert_eq!(online.update(Wheels { left: left[k], right: right[k] }), whole[k]);
-            }
-            prop_assert_eq!(odometry.final_pose(start, Wheels { left: &left[..], right: &right[..] }), whole[left.len() - 1]);
-        }
-
-        #[test]
         fn exact_arcs_equal_the_product_of_group_elements(steps in prop::collection::vec((-900_i64..900, -900_i64..900), 1..40)) {
             let odometry = yair(Rule::ExactArc);
             let geometry = DriveGeometry::new(Wheels::both(0.16), 0.363).expect("valid");
@@ -379,7 +232,6 @@ mod tests {
             let (mut counts, mut product) = (Wheels::both(0_i64), Pose::IDENTITY);
             for (l, r) in steps {
                 counts = Wheels { left: counts.left + l, right: counts.right + r };
-                #[allow(clippy::cast_precision_loss)]
                 let travel_m = Wheels { left: 1.0334e-3 * l as f64, right: 1.0322e-3 * r as f64 };
                 product = product * geometry.increment(travel_m).arc();
                 let pose = state.update(counts);
@@ -413,7 +265,6 @@ mod tests {
             state.update(Wheels { left: 3 * k, right: 4 * k });
             summed_rad += (4.0 * 1.0322e-3 - 3.0 * 1.0334e-3) / 0.363;
         }
-        #[allow(clippy::cast_precision_loss)]
         let exact_rad = n as f64 * (4.0 * 1.0322e-3 - 3.0 * 1.0334e-3) / 0.363;
         let error = (state.world_from_body().theta_rad - exact_rad).abs();
         assert!(error <= 8.0 * f64::EPSILON * exact_rad, "{error}");
@@ -421,13 +272,5 @@ mod tests {
             (summed_rad - exact_rad).abs() > 100.0 * error.max(f64::EPSILON * exact_rad),
             "the summed form does drift"
         );
-    }
-
-    #[test]
-    fn an_empty_log_ends_where_it_starts() {
-        let odometry = yair(Rule::Midpoint);
-        let start = Pose::new(1.0, 2.0, 3.0);
-        assert_eq!(odometry.final_pose::<i64>(start, Wheels { left: &[], right: &[] }), start);
-        assert!(odometry.trajectory::<i64>(start, Wheels { left: &[], right: &[] }).is_empty());
     }
 }

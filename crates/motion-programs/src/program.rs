@@ -175,7 +175,6 @@ fn square(run: u32, side_m: f64, clockwise: bool) -> MotionProgram {
 
 /// Equal arcs of at most half a turn with a reading between each two.
 fn circle(run: u32, radius_m: f64, turns: f64, clockwise: bool) -> MotionProgram {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a number of turns that someone drives
     let arcs = (2.0 * turns).ceil().max(1.0) as u32;
     let (sign, protocol) = if clockwise { (-1.0, Protocol::CircleCw) } else { (1.0, Protocol::CircleCcw) };
     let arc = Motion::Arc { radius_m, turn_rad: sign * TAU * turns / f64::from(arcs) };
@@ -187,7 +186,6 @@ fn circle(run: u32, radius_m: f64, turns: f64, clockwise: bool) -> MotionProgram
 /// A corridor loop: two rounds of a rectangle would close; this walks nine legs, four turns left and four right, as the paper's figure 7
 /// does not say which.
 fn validation_path(run: u32, length_m: f64, measure_every_m: f64) -> MotionProgram {
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let steps = (length_m / measure_every_m).round().max(1.0) as usize;
     let mut motions = Vec::with_capacity(2 * steps + VALIDATION_LEGS);
     for step in 0..steps {

@@ -8,9 +8,9 @@ use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::SimulationError;
 
-use super::MM_PER_M;
 use super::published::{TABLE_1, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_2::Table2;
+use super::units::MM_PER_M;
 
 /// One finding of the audit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -75,7 +75,7 @@ fn printed_sigmas() -> Finding {
     let (left, right) = (TABLE_1.left.std, TABLE_1.right.std);
     let sigma = TABLE_2_DIRECT.sensitivity.map(|printed| printed.sigma.unwrap_or(f64::NAN));
     let doubled = Wheels { left: to_thousandths(2.0 * left), right: to_thousandths(2.0 * right) };
-    #[allow(clippy::float_cmp)] // both rounded to the same digit
+    // Both are rounded to the same digit: compared exactly.
     let swapped = doubled.left == sigma.right && doubled.right == sigma.left;
     let verdict =
         if swapped { "table 2 prints 2σ with left and right swapped" } else { "no rule that was tried connects them" };
@@ -119,8 +119,7 @@ fn umbmark_ratio(table_2: &Table2) -> Finding {
     let umbmark = TABLE_2_UMBMARK.sensitivity;
     let measured = umbmark.right.value / umbmark.left.value;
     let direct = TABLE_1.right.mean / TABLE_1.left.mean;
-    #[allow(clippy::cast_precision_loss)]
-    let relative_var = |shape: super::shape::Shape| shape.variance / shape.count as f64 / (shape.mean * shape.mean);
+    let relative_var = |shape: super::shape::Variant| shape.variance / shape.count as f64 / (shape.mean * shape.mean);
     let error = (relative_var(TABLE_1.left) + relative_var(TABLE_1.right)).sqrt();
     // UMBmark's own scatter, from the simulation of table 2: the ratio moves by twice a sensitivity's error, the mean being kept.
     let own = table_2.cell("umbmark", "C_L").map_or(0.0, |cell| 2.0 * cell.sigma);
@@ -197,7 +196,6 @@ fn runs_before_rejection() -> Finding {
     let (left, right) = (TABLE_1.left.count, TABLE_1.right.count);
     let log_likelihood = |runs: usize| {
         let lost = [runs - left, runs - right];
-        #[allow(clippy::cast_precision_loss)]
         let share = lost.iter().sum::<usize>() as f64 / (2 * runs) as f64;
         lost.iter().map(|lost| log_binomial(runs, *lost, share)).sum::<f64>()
     };
@@ -205,7 +203,6 @@ fn runs_before_rejection() -> Finding {
     let within: Vec<usize> =
         (right..=right + 60).filter(|runs| log_likelihood(best) - log_likelihood(*runs) < 2.0).collect();
     let (low, high) = (within.first().copied().unwrap_or(best), within.last().copied().unwrap_or(best));
-    #[allow(clippy::cast_precision_loss)]
     let share = 100.0 * (2 * best - left - right) as f64 / (2 * best) as f64;
     Finding {
         id: "runs_before_rejection",
@@ -219,7 +216,6 @@ fn runs_before_rejection() -> Finding {
     }
 }
 
-#[allow(clippy::cast_precision_loss)]
 fn log_binomial(n: usize, k: usize, share: f64) -> f64 {
     let log_choose: f64 = (1..=k).map(|j| ((n - k + j) as f64 / j as f64).ln()).sum();
     let term = |count: usize, share: f64| if count == 0 { 0.0 } else { count as f64 * share.ln() };

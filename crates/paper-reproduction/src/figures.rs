@@ -14,9 +14,9 @@ use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::SimulationError;
 
-use super::MM_PER_M;
 use super::published::{Column, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_1::quantile;
+use super::units::MM_PER_M;
 use bench::Trial;
 
 /// Figure 4: where the contacts and the centre go in a spin at constant wheel speeds.
@@ -170,7 +170,6 @@ pub fn figure_7(
         .collect();
     let walks: Vec<Walk> = walks?.into_iter().flatten().collect();
     let readings = walks.first().map_or(0, |walk| walk.errors_m[0].len());
-    #[allow(clippy::cast_precision_loss)]
     let distance_m: Vec<f64> = (0..readings).map(|reading| 0.5 * reading as f64).collect();
     let (read_m, reckoned_m) = walks.iter().find_map(|walk| walk.paths.clone()).unwrap_or_default();
     let methods = PARAMETERS
@@ -190,7 +189,6 @@ pub fn figure_7(
                     .filter(|(_, distance_m)| **distance_m >= JUDGED_FROM_M)
                     .all(|(error, distance)| *error < 0.1 * distance)
             };
-            #[allow(clippy::cast_precision_loss)]
             let (n, below) = (walks.len() as f64, walks.iter().filter(holds).count() as f64);
             PathErrors {
                 method,

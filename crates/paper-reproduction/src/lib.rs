@@ -13,6 +13,7 @@ pub mod published;
 pub mod shape;
 pub mod table_1;
 pub mod table_2;
+mod units;
 
 use scenario::{Scenario, ScenarioError};
 use serde::Serialize;
@@ -27,11 +28,6 @@ use table_2::Table2;
 
 /// The scenario that is shipped as `scenarios/paper.toml`.
 const SCENARIO: &str = include_str!("../../../scenarios/paper.toml");
-
-/// Controller counts in one of the paper's pulses, as the shipped scenario has them.
-const COUNTS_PER_PULSE: f64 = 80.0;
-
-const MM_PER_M: f64 = 1e3;
 
 /// The paper's robot and protocols.
 ///

@@ -58,20 +58,16 @@ impl Reproduction {
             ))
             .columns(2);
         for side in Side::BOTH {
-            #[allow(clippy::cast_precision_loss)]
             let edges: Vec<f64> = (0..=BINS).map(|bin| FIRST_EDGE + BIN * bin as f64).collect();
             let mut heights = vec![0.0; BINS];
             for value in samples[side] {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
                 let bin = (((value - FIRST_EDGE) / BIN).max(0.0) as usize).min(BINS - 1);
                 heights[bin] += 1.0;
             }
             let shape = TABLE_1[side];
-            #[allow(clippy::cast_precision_loss)]
             let total = shape.count as f64 * BIN;
             let curve: Vec<(f64, f64)> = (0..=100)
                 .map(|k| {
-                    #[allow(clippy::cast_precision_loss)]
                     let x = FIRST_EDGE + BIN * f64::from(k) / 100.0 * BINS as f64;
                     let z = (x - shape.mean) / shape.std;
                     (x, total * (-0.5 * z * z).exp() / (shape.std * std::f64::consts::TAU.sqrt()))

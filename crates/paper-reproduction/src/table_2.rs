@@ -11,9 +11,9 @@ use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::SimulationError;
 
-use super::MM_PER_M;
 use super::published::{Column, Printed, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_1::quantile;
+use super::units::MM_PER_M;
 use bench::Trial;
 
 /// One cell of table 2 beside its simulation. Sensitivities in mm/pulse, lengths in mm.

@@ -4,9 +4,10 @@ use svg::node::element::{Description, Group, Line, Rectangle, SVG, Text, Title};
 
 use crate::figure::{Figure, WIDTH_PX};
 use crate::font::{FAMILIES, Font, Weight};
+use crate::frame::{Rect, TICK_PX};
 use crate::layout::{
-    CAPTION_PX, LABEL_PX, LINE, Layout, PANEL_TITLE_PX, PanelLayout, REFERENCE_PX, Rect, TICK_GAP_PX, TICK_LENGTH_PX,
-    TICK_PX, TITLE_PX,
+    CAPTION_PX, LABEL_PX, LINE, Layout, PANEL_TITLE_PX, PanelLayout, REFERENCE_PX, TICK_GAP_PX, TICK_LENGTH_PX,
+    TITLE_PX,
 };
 use crate::legend::{self, Legend};
 use crate::marks::{Styles, drawn, number, swatch};

@@ -1,18 +1,18 @@
 //! Where everything of a figure stands. Frames of one figure are equally wide, and a legend below a panel makes the figure higher, not the frame
 //! smaller; what a frame shows therefore does not depend on where its legend found room.
 
-use crate::axis::{Range, Span};
+use crate::axis::Range;
 use crate::figure::{Figure, WIDTH_PX};
 use crate::font::{Font, Weight};
+use crate::frame::{Frame, Rect, TICK_PX};
 use crate::legend::Legend;
 use crate::panel::Panel;
 use crate::series::Marks;
-use crate::ticks::{Tick, ticks};
+use crate::ticks::Tick;
 
 pub(crate) const TITLE_PX: f64 = 18.0;
 pub(crate) const PANEL_TITLE_PX: f64 = 14.0;
 pub(crate) const LABEL_PX: f64 = 13.0;
-pub(crate) const TICK_PX: f64 = 12.0;
 pub(crate) const REFERENCE_PX: f64 = 11.5;
 pub(crate) const CAPTION_PX: f64 = 11.5;
 /// The distance between lines of text, by the text's size.
@@ -30,52 +30,6 @@ const HEIGHT_BY_WIDTH: f64 = 0.75;
 const HEIGHT_PX: std::ops::RangeInclusive<f64> = 170.0..=400.0;
 /// Of a frame with equal aspect, by its width, and absolutely at most.
 const EQUAL_ASPECT_HEIGHTS: (f64, f64, f64) = (0.4, 1.1, 620.0);
-
-/// A rectangle on paper, in SVG pixels, y downwards.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Rect {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
-    pub(crate) w: f64,
-    pub(crate) h: f64,
-}
-
-impl Rect {
-    pub(crate) fn contains(&self, (x, y): (f64, f64)) -> bool {
-        (self.x..=self.x + self.w).contains(&x) && (self.y..=self.y + self.h).contains(&y)
-    }
-}
-
-/// The rectangle that shows data, and which.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
-    pub(crate) rect: Rect,
-    pub(crate) x: Span,
-    pub(crate) y: Span,
-}
-
-impl Frame {
-    pub(crate) fn x_px(&self, value: f64) -> f64 {
-        self.rect.x + self.rect.w * self.x.fraction(value)
-    }
-
-    pub(crate) fn y_px(&self, value: f64) -> f64 {
-        self.rect.y + self.rect.h * (1.0 - self.y.fraction(value))
-    }
-
-    pub(crate) fn px(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        (self.x_px(x), self.y_px(y))
-    }
-
-    fn x_ticks(&self, font: &Font) -> Vec<Tick> {
-        let half = |label: &str| font.width_px(label, TICK_PX, Weight::Regular) / 2.0;
-        ticks(&self.x, &|a, b, apart| apart * self.rect.w >= (half(a) + half(b) + 14.0).max(46.0))
-    }
-
-    fn y_ticks(&self) -> Vec<Tick> {
-        ticks(&self.y, &|_, _, apart| apart * self.rect.h >= 2.6 * TICK_PX)
-    }
-}
 
 /// The name of a reference line, in place.
 #[derive(Clone, Debug)]

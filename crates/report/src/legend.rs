@@ -1,13 +1,12 @@
 //! The legend: what it lists, and where it stands without covering data.
 
 use crate::font::{Font, Weight};
-use crate::layout::{Frame, Rect};
-use crate::marks::{beyond, covered_points};
+use crate::frame::{Frame, Rect};
+use crate::marks::{SWATCH_PX, beyond, covered_points};
 use crate::panel::Panel;
 
 pub(crate) const TEXT_PX: f64 = 12.0;
 pub(crate) const ROW_PX: f64 = 19.0;
-pub(crate) const SWATCH_PX: f64 = 32.0;
 const SWATCH_GAP_PX: f64 = 7.0;
 const PADDING_PX: f64 = 8.0;
 const ENTRY_GAP_PX: f64 = 22.0;

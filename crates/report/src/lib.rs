@@ -14,10 +14,12 @@ mod draw;
 mod error;
 mod figure;
 mod font;
+mod frame;
 mod layout;
 mod legend;
 mod marks;
 mod panel;
+mod rendering;
 mod series;
 mod ticks;
 

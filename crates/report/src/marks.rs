@@ -3,13 +3,14 @@
 use svg::node::element::{Circle, Group, Line, Path, Rectangle, Title};
 
 use crate::figure::Figure;
-use crate::layout::Frame;
-use crate::legend::SWATCH_PX;
+use crate::frame::Frame;
 use crate::panel::Panel;
 use crate::series::{Colour, Marks, Series};
 
 const REFERENCE_COLOUR: &str = "#555555";
 const REFERENCE_DASHES: &str = "6 4";
+/// The width of a swatch in the legend.
+pub(crate) const SWATCH_PX: f64 = 32.0;
 const LINE_PX: f64 = 1.9;
 const CAP_PX: f64 = 3.5;
 /// Dashes tell lines apart where colours cannot, on grey paper.

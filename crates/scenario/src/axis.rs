@@ -125,7 +125,7 @@ fn short_decimal(value: f64) -> f64 {
 
 /// Share of axis number `axis` at Sobol point number `point`, in [0, 1).
 pub(crate) fn sobol_share(seed: u64, point: u32, axis: u32) -> f64 {
-    #[allow(clippy::cast_possible_truncation)] // both halves of the seed in one word; the crate hashes it
+    // Both halves of the seed in one word; the crate hashes it.
     let seed = (seed ^ (seed >> 32)) as u32;
     f64::from(sobol_burley::sample(point, axis, seed))
 }
@@ -201,7 +201,6 @@ pub(crate) fn set(table: &mut Table, axis: &str, level: f64) -> Result<(), Strin
     for key in keys(axis) {
         match number_at(table, key)?.0 {
             Value::Float(number) => *number = level,
-            #[allow(clippy::cast_possible_truncation)]
             Value::Integer(number) if level.fract() == 0.0 && level.abs() < 1e15 => *number = level as i64,
             _ => return Err(format!("{level} is not a whole number, as this key asks")),
         }

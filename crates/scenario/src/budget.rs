@@ -4,10 +4,11 @@
 //! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
 //! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
 
-use motion_programs::{Cost, MotionProgram, Pace, Schedule};
+use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
 
-use crate::experiment::{LENGTHS_M, MOST_RUNS, Scenario, ScenarioError};
+use crate::error::{NoFit, ScenarioError};
+use crate::limits::{LENGTHS_M, MOST_RUNS};
 
 /// What a calibration may take.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,39 +29,6 @@ pub struct Budget {
     /// What a person needs for each run, to place the robot and to read its marks, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub handling_s: Option<f64>,
-}
-
-/// Why protocols cannot be driven within a budget.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NoFit {
-    /// The room has no place to move.
-    #[error("a side of {room_m} m leaves no way for a robot that needs {clearance_m} m of it")]
-    Room {
-        /// The side of the room, metres.
-        room_m: f64,
-        /// What the robot needs of it, metres.
-        clearance_m: f64,
-    },
-    /// One run in each direction takes longer than there is.
-    #[error("one run in each direction takes {needed_min:.1} min of {minutes} min")]
-    Time {
-        /// What the fewest runs take, minutes.
-        needed_min: f64,
-        /// The budget, minutes.
-        minutes: f64,
-    },
-    /// One run in each direction goes farther than is allowed.
-    #[error("one run in each direction makes {needed_m:.1} m of {metres} m")]
-    Travel {
-        /// What the fewest runs travel, metres.
-        needed_m: f64,
-        /// The budget, metres.
-        metres: f64,
-    },
-    /// A validation path was asked for.
-    #[error("a validation path cannot be shrunk: its legs are whole numbers of the distance between two readings")]
-    ValidationPath,
 }
 
 /// Shorter than this is no run: the least that a protocol may state, metres.
@@ -113,12 +81,12 @@ impl Budget {
     }
 
     /// Protocols that stay in the room and within the budget.
-    fn fit(&self, protocols: &[Schedule], pace: &Pace) -> Result<Vec<Schedule>, NoFit> {
+    pub(crate) fn fit(&self, protocols: &[Schedule], drive_limits: &DriveLimits) -> Result<Vec<Schedule>, NoFit> {
         let mut parts = Vec::with_capacity(protocols.len());
         for stated in protocols.iter().filter(|stated| stated.runs() > 0) {
             let schedule = self.bounded(*stated)?;
             let pairs = 0.5 * number(schedule.runs());
-            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), pace) });
+            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), drive_limits) });
         }
         let affords = |factor: f64| {
             self.affords(parts.iter().fold(Cost::default(), |sum, part| Cost {
@@ -136,7 +104,7 @@ impl Budget {
             let middle = 0.5 * (enough + too_much);
             *(if affords(middle).is_ok() { &mut enough } else { &mut too_much }) = middle;
         }
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, positive and at most MOST_RUNS
+        // Whole, positive and at most MOST_RUNS.
         Ok(parts.iter().map(|part| part.schedule.with_pairs(part.scaled(enough) as u32)).collect())
     }
 
@@ -173,61 +141,19 @@ impl Budget {
     }
 }
 
-#[allow(clippy::cast_precision_loss)] // numbers of runs
 fn number(runs: u64) -> f64 {
     runs as f64
 }
 
-fn cost(programs: &[MotionProgram], pace: &Pace) -> Cost {
-    programs.iter().map(|program| pace.cost(program)).sum()
-}
-
-impl Scenario {
-    /// Everything that is driven, in order: the scenario's own protocols, fitted when there is a budget.
-    ///
-    /// A scenario that was read fits, or reading it failed. One that was put together since, such as a point of a sweep, may not, and drives nothing
-    /// then; [`Self::programs_for`] says why.
-    #[must_use]
-    pub fn programs(&self) -> Vec<MotionProgram> {
-        self.fitted(&self.protocols).unwrap_or_default()
-    }
-
-    /// What a calibration method drives, fitted when there is a budget: its protocols of `[sweep.protocols]`, or the scenario's own.
-    ///
-    /// # Errors
-    /// [`NoFit`] says why the method cannot be used within the budget.
-    pub fn programs_for(&self, method: &str) -> Result<Vec<MotionProgram>, NoFit> {
-        let own = self.sweep.as_ref().and_then(|sweep| sweep.protocols.get(method));
-        self.fitted(own.unwrap_or(&self.protocols))
-    }
-
-    /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the driving alone.
-    #[must_use]
-    pub fn cost_of(&self, programs: &[MotionProgram]) -> Cost {
-        cost(programs, &self.pace())
-    }
-
-    pub(crate) fn fitted(&self, protocols: &[Schedule]) -> Result<Vec<MotionProgram>, NoFit> {
-        let fitted = match &self.budget {
-            Some(budget) => budget.fit(protocols, &self.pace())?,
-            None => protocols.to_vec(),
-        };
-        Ok(fitted.iter().flat_map(Schedule::programs).collect())
-    }
-
-    fn pace(&self) -> Pace {
-        Pace {
-            wheel_separation_m: self.robot.wheel_separation_m,
-            cruise_speed_m_s: self.robot.cruise_speed_m_s,
-            acceleration_m_s2: self.robot.acceleration_m_s2,
-            handling_s: self.budget.and_then(|budget| budget.handling_s).unwrap_or(0.0),
-        }
-    }
+/// What programs cost at a pace.
+pub(crate) fn cost(programs: &[MotionProgram], drive_limits: &DriveLimits) -> Cost {
+    programs.iter().map(|program| drive_limits.cost(program)).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::Scenario;
 
     const PAPER: &str = include_str!("../../../scenarios/paper.toml");
 
@@ -252,7 +178,7 @@ mod tests {
     }
 
     fn fit(budget: Budget, protocols: &[Schedule]) -> Result<Vec<Schedule>, NoFit> {
-        budget.fit(protocols, &paper(budget).pace())
+        budget.fit(protocols, &paper(budget).drive_limits())
     }
 
     fn cost_of(budget: Budget, protocols: &[Schedule]) -> Cost {
@@ -291,7 +217,6 @@ mod tests {
     /// Stated pairs and fitted ones: is there one factor, is everything afforded, and would the next larger factor cost too much?
     fn check_factor(budget: Budget, stated: &[Schedule]) {
         let fitted = fit(budget, stated).expect("there is room and time");
-        #[allow(clippy::cast_precision_loss)]
         let pairs = |schedules: &[Schedule]| schedules.iter().map(|s| s.runs() as f64 / 2.0).collect::<Vec<_>>();
         let (stated_pairs, fitted_pairs) = (pairs(stated), pairs(&fitted));
         let steps =
@@ -311,10 +236,7 @@ mod tests {
             .iter()
             .zip(&fitted_pairs)
             .zip(steps(1.0))
-            .map(|((part, pairs), step)| {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                part.with_pairs(*pairs as u32 + u32::from(step <= next * (1.0 + 1e-12)))
-            })
+            .map(|((part, pairs), step)| part.with_pairs(*pairs as u32 + u32::from(step <= next * (1.0 + 1e-12))))
             .collect();
         assert!(!affordable(cost_of(budget, &more)), "{budget:?}: {more:?} would fit too");
     }

@@ -1,95 +1,15 @@
-//! A scenario: reading, checking and writing it.
+//! An experiment: the robot, what is random, what sees it, what it drives, and the ranges of all these values.
 
-use std::io::Read;
-use std::path::{Path, PathBuf};
-
-use effects::{Effect, EffectError};
+use effects::Effect;
 use kinematics::{DriveGeometry, GeometryError};
 use motion_programs::Schedule;
 use serde::{Deserialize, Serialize};
 
-use crate::budget::{Budget, NoFit};
+use crate::budget::Budget;
+use crate::error::{NoFit, ScenarioError};
+use crate::limits::{LENGTHS_M, MOST_RUNS};
 use crate::robot::Robot;
 use crate::sweep::Sweep;
-
-/// Why a scenario is not one.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScenarioError {
-    /// The file cannot be read.
-    #[error("{}: cannot read the scenario: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The text is not a scenario; the message carries line and column and lists the known words.
-    #[error("{place}: {message}")]
-    Toml {
-        /// File, and line where it is known.
-        place: String,
-        /// What is wrong, in one line.
-        message: String,
-    },
-    /// An effect's size is not physical.
-    #[error("{place}: {source}")]
-    Effect {
-        /// The file.
-        place: String,
-        /// Which and why.
-        source: EffectError,
-    },
-    /// The robot's nominal geometry is not physical.
-    #[error("{place}: robot: {source}")]
-    Geometry {
-        /// The file.
-        place: String,
-        /// Which and why.
-        source: GeometryError,
-    },
-    /// A value is outside its range.
-    #[error("{place}: {key} is {value}; it must be {must_be}")]
-    OutOfRange {
-        /// The file.
-        place: String,
-        /// Dotted key.
-        key: String,
-        /// The offending value.
-        value: f64,
-        /// The range.
-        must_be: &'static str,
-    },
-    /// Protocols that cannot be driven within the budget.
-    #[error("{place}: {key} does not fit into the budget: {source}")]
-    NoFit {
-        /// The file.
-        place: String,
-        /// Dotted key of the protocols.
-        key: String,
-        /// Why.
-        source: NoFit,
-    },
-    /// A sweep's axis or case names a key that the scenario does not have, or one that is not a number.
-    #[error("{place}: {key}: {problem}")]
-    Axis {
-        /// The file.
-        place: String,
-        /// Which axis or case, with its dotted key.
-        key: String,
-        /// What is wrong with it.
-        problem: String,
-    },
-}
-
-/// Scenarios are written by hand; anything larger is another file.
-const LARGEST_FILE_BYTES: u64 = 1 << 20;
-
-/// Most runs of one scenario, over all protocols: each is kept in memory.
-pub(crate) const MOST_RUNS: u64 = 100_000;
-
-/// Bounds of robots that drive on floors and of their rooms, wide enough for any of them: they keep a slip of the pen from running for days.
-pub(crate) const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -206,54 +126,6 @@ pub enum Instrument {
 }
 
 impl Scenario {
-    /// Reads and checks a scenario file.
-    ///
-    /// # Errors
-    /// [`ScenarioError`]: unreadable, not a scenario, or values out of range; one line that names the file.
-    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        let io = |source| ScenarioError::Io { path: path.to_owned(), source };
-        let place = path.display().to_string();
-        // Read no more than the limit, whatever size a device or a pipe states.
-        let mut text = String::new();
-        let file = std::fs::File::open(path).map_err(io)?;
-        file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
-        if text.len() as u64 > LARGEST_FILE_BYTES {
-            let message = format!("too large for a scenario (at most {LARGEST_FILE_BYTES} bytes)");
-            return Err(ScenarioError::Toml { place, message });
-        }
-        Self::parse(&text, &place)
-    }
-
-    /// Parses and checks a scenario; `place` (the file) is named in errors.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub fn parse(text: &str, place: &str) -> Result<Self, ScenarioError> {
-        let scenario: Self = toml::from_str(text).map_err(|error| {
-            let place = match error.span() {
-                Some(span) => format!("{place}:{}", text[..span.start].matches('\n').count() + 1),
-                None => place.to_owned(),
-            };
-            ScenarioError::Toml { place, message: error.message().trim().replace('\n', "; ") }
-        })?;
-        scenario.check(place)?;
-        let no_fit = |source| ScenarioError::NoFit { place: place.to_owned(), key: "protocol".to_owned(), source };
-        scenario.fitted(&scenario.protocols).map_err(no_fit)?;
-        if let Some(sweep) = &scenario.sweep {
-            sweep.points(&scenario, place)?;
-        }
-        Ok(scenario)
-    }
-
-    /// The scenario as TOML; [`Self::parse`] gives the same scenario back.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Toml`] when a value has no TOML form (a seed beyond 2⁶³).
-    pub fn to_toml(&self) -> Result<String, ScenarioError> {
-        toml::to_string(self)
-            .map_err(|error| ScenarioError::Toml { place: self.name.clone(), message: error.to_string() })
-    }
-
     /// The robot's specified drive.
     ///
     /// # Errors
@@ -324,7 +196,6 @@ impl Scenario {
         if let Some(log) = self.log {
             interval("log.interval_s", log.interval_s)?;
         }
-        #[allow(clippy::cast_precision_loss)]
         let instruments = self.instruments.len() as f64;
         range(
             "instrument",
@@ -337,7 +208,6 @@ impl Scenario {
                 Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
                     not_negative("instrument.resolution_m", resolution_m)?;
                     not_negative("instrument.reading_sigma_m", reading_sigma_m)?;
-                    #[allow(clippy::cast_precision_loss)]
                     let marks = robot.points.len() as f64;
                     let must_be = "at least two points with a floor grid: one point gives no heading";
                     range("robot.point", marks, robot.points.len() >= 2, must_be)?;
@@ -420,7 +290,6 @@ fn check_schedules(place: &str, key: &str, schedules: &[Schedule]) -> Result<(),
         }
     }
     let runs: u64 = schedules.iter().map(Schedule::runs).sum();
-    #[allow(clippy::cast_precision_loss)]
     range("runs", runs as f64, (1..=MOST_RUNS).contains(&runs), "from 1 to 100000 in all")
 }
 

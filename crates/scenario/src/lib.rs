@@ -4,12 +4,19 @@
 
 mod axis;
 mod budget;
+mod error;
 mod experiment;
+mod file;
+mod limits;
+mod points;
+mod programs;
 mod robot;
 mod sweep;
 
 pub use axis::{Level, Levels, Range, Scale};
-pub use budget::{Budget, NoFit};
-pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario, ScenarioError};
+pub use budget::Budget;
+pub use error::{NoFit, ScenarioError};
+pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario};
+pub use points::{Axis, CASE_AXIS, Point};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
-pub use sweep::{Axis, CASE_AXIS, Case, Point, Sobol, Sweep};
+pub use sweep::{Case, Sobol, Sweep};

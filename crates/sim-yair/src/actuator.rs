@@ -95,7 +95,6 @@ impl Actuator {
 
 /// The counts that counters show: the largest whole numbers not above. 2⁶³ counts are beyond any run.
 #[inline]
-#[allow(clippy::cast_possible_truncation)]
 fn whole_counts(counts: Wheels<f64>) -> Wheels<i64> {
     /// 1.5·2⁵²: what is added to it is rounded to a whole number, which stands in the low bits.
     const SHIFTER: f64 = 6_755_399_441_055_744.0;
@@ -306,7 +305,7 @@ impl ServoPair {
             moving: false,
             settling_s: 0.0,
             hold_s: 0.0,
-            #[allow(clippy::cast_possible_truncation)] // within one wheel turn
+            // Within one wheel turn.
             start_counts: start_counts.map(|counts| counts.floor() as i64),
         })
     }
@@ -318,7 +317,7 @@ impl ServoPair {
             let speed_counts_s = command.speed_counts_s[side];
             if counts != 0.0 {
                 self.servos[side].command(Travel {
-                    #[allow(clippy::cast_possible_truncation)] // targets are whole counts
+                    // Targets are whole counts.
                     counts: counts.round() as i64,
                     speed_counts_s,
                     // Both wheels ramp for the same time, so that an arc keeps its radius while it starts and stops.

@@ -13,6 +13,7 @@ mod hctl1100;
 mod instrument;
 mod motor;
 mod plan;
+mod planned_motion;
 mod quadrature;
 mod robot;
 mod servo;

@@ -239,7 +239,6 @@ fn slope(dataset: &Dataset) -> f64 {
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("the simulator logs ticks") };
         let rows = run.odometry.t_s.windows(2).zip(ticks.left.windows(2));
         for ((t_s, counts), sample) in rows.zip(&run.wheel_reference[1..]) {
-            #[allow(clippy::cast_precision_loss)] // some counts
             let ticks_s = (counts[1] - counts[0]) as f64 / (t_s[1] - t_s[0]);
             product += ticks_s * sample.speed_m_s.left;
             square += ticks_s * ticks_s;
@@ -276,17 +275,16 @@ fn an_interval_of_a_log_is_not_one_arc() {
     let simulation = sim_yair::simulate(&scenario, 9, 0).expect("simulates");
     let truth = true_geometry(&simulation);
     let session = simulation.dataset.session();
-    let mut excursions = Censi::DEFAULT.excursions(std::slice::from_ref(&session));
+    let mut samples = Censi::DEFAULT.samples(std::slice::from_ref(&session));
     let fitted = |fit: &CensiFit| {
         DriveGeometry::new(fit.radius_m.map(|radius_m| 2.0 * radius_m), fit.separation_m).expect("positive")
     };
-    let [by_rows, _] = solutions(&mut excursions.iter()).expect("exciting");
-    for excursion in &mut excursions {
-        let sum =
-            excursion.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad));
-        excursion.wheel_rad = vec![sum];
+    let [by_rows, _] = solutions(&mut samples.iter()).expect("exciting");
+    for sample in &mut samples {
+        let sum = sample.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad));
+        sample.wheel_rad = vec![sum];
     }
-    let [whole, _] = solutions(&mut excursions.iter()).expect("exciting");
+    let [whole, _] = solutions(&mut samples.iter()).expect("exciting");
     assert!(relative(&fitted(&by_rows.fit), &truth) < 1e-9);
     let off = relative(&fitted(&whole.fit), &truth);
     assert!((off - 0.089).abs() < 0.001, "{off}");

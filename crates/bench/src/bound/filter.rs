@@ -9,9 +9,10 @@
 use kinematics::{Increment, OdometryCovariance, Pose, Side, Wheels, sinc, sinc_derivative};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 
+use super::error::NoBound;
+use super::innovation::Innovation;
 use super::model::Model;
 use super::timeline::{Event, Timeline, Travel};
-use super::{Innovation, NoBound};
 
 /// Where the pose's error stands in the state: three entries.
 const POSE: usize = 0;
@@ -69,7 +70,7 @@ impl<'a> Filter<'a> {
             match *event {
                 Event::Motion(travel) => filter.begin(travel),
                 Event::Drive { share } => filter.drive(share),
-                Event::Look { sight, t_s } => filter.look(sight, t_s)?,
+                Event::Measurement { measurement, t_s } => filter.look(measurement, t_s)?,
             }
         }
         Ok(filter.innovations)
@@ -131,8 +132,8 @@ impl<'a> Filter<'a> {
         self.world_from_body = self.world_from_body * Increment::from_travel(driven_m, separation_m).arc();
     }
 
-    fn look(&mut self, sight: usize, t_s: f64) -> Result<(), NoBound> {
-        let seen = self.model.sights[sight].covariance(self.world_from_body);
+    fn look(&mut self, measurement: usize, t_s: f64) -> Result<(), NoBound> {
+        let seen = self.model.sights[measurement].covariance(self.world_from_body);
         if std::mem::take(&mut self.lost) {
             self.covariance.fixed_view_mut::<3, 3>(POSE, POSE).copy_from(&seen);
             self.largest_var = seen.diagonal();
@@ -170,7 +171,6 @@ impl<'a> Filter<'a> {
 
 /// Cov(u_i, u_j), ticks², of two roundings between which the wheel turns `counts`: 1/12 − f(1−f)/2 with f the fraction of a tick.
 fn rounding_covariance(counts: i64, counts_per_tick: u32) -> f64 {
-    #[allow(clippy::cast_precision_loss)] // less than a tick
     let fraction = counts.rem_euclid(i64::from(counts_per_tick)) as f64 / f64::from(counts_per_tick);
     1.0 / 12.0 - 0.5 * fraction * (1.0 - fraction)
 }

@@ -9,74 +9,22 @@
 //! ratio above one. Both engines have the same formulas; a stepped robot also settles after a motion and is seen a few times more.
 //! Reference: Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, eq. 3.31; Schweppe 1965 for the innovations' form.
 
+mod error;
 mod filter;
+mod innovation;
 mod model;
 mod timeline;
 
 use calib::Parameter;
-use kinematics::GeometryError;
-use motion_programs::MotionProgram;
+use motion_programs::{Motion, MotionProgram};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use scenario::Scenario;
 
+pub use error::NoBound;
+use filter::Filter;
+pub use innovation::Innovation;
 use model::Model;
-
-/// Why a scenario has no bound.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NoBound {
-    /// An effect's scatter is none that a whole motion has.
-    #[error("effect {id} has no closed bound: {why}")]
-    Effect {
-        /// The effect.
-        id: &'static str,
-        /// Why.
-        why: &'static str,
-    },
-    /// The true geometry is not physical.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
-    /// Nothing looks at the robot.
-    #[error("no instrument sees the robot")]
-    NoInstrument,
-    /// A tachometer measures the wheels, and the bound takes looks at the pose alone.
-    #[error("a tachometer's wheel speeds are no look at the pose: leave the instrument out for a bound")]
-    WheelSpeeds,
-    /// The floor grid reads fewer than two distinct points.
-    #[error("the robot's marked points give no heading: two of them must differ")]
-    NoHeading,
-    /// The grid rounds coarser than its readings err.
-    #[error(
-        "readings that err by {reading_sigma_m} m are rounded to {resolution_m} m: such roundings are not independent; a bound takes an error of a third of the rounding"
-    )]
-    RoundedReadings {
-        /// Standard deviation of a reading before it is rounded, metres.
-        reading_sigma_m: f64,
-        /// What it is rounded to, metres.
-        resolution_m: f64,
-    },
-    /// A reading tells something without error.
-    #[error(
-        "the look at {t_s} s has a direction without any error: the bound is zero; give the instrument or the wheels some noise"
-    )]
-    NoError {
-        /// When, seconds from the run's start.
-        t_s: f64,
-    },
-}
-
-/// What one look adds to what all before it told, in the frame of the run's true start pose; poses are ordered x, y, θ (m, m, rad).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
-    /// When, seconds from the run's start.
-    pub t_s: f64,
-    /// Slope of the predicted pose in the left diameter, the right diameter and the wheel separation (columns), all in metres.
-    pub slope: Matrix3<f64>,
-    /// Covariance of the seen pose minus the predicted one.
-    pub covariance: Matrix3<f64>,
-    /// The inverse of [`Self::covariance`].
-    pub precision: Matrix3<f64>,
-}
+use timeline::Timeline;
 
 impl Innovation {
     /// The innovations of one run, in order. Its first look finds where it starts and is none.
@@ -84,14 +32,13 @@ impl Innovation {
     /// # Errors
     /// [`NoBound`] with the reason.
     pub fn of_run(scenario: &Scenario, program: &MotionProgram) -> Result<Vec<Self>, NoBound> {
-        Model::of(scenario)?.innovations(&program.motions)
+        innovations(&Model::of(scenario)?, &program.motions)
     }
+}
 
-    /// Hᵀ S⁻¹ H, 1/m².
-    #[must_use]
-    pub fn information(&self) -> Matrix3<f64> {
-        self.slope.transpose() * self.precision * self.slope
-    }
+/// What the looks of a run add, one by one.
+fn innovations(model: &Model, motions: &[Motion]) -> Result<Vec<Innovation>, NoBound> {
+    Filter::run(model, &Timeline::of(model, motions))
 }
 
 /// An eigenvalue below this share of the largest is rounding: a few hundred terms, each good to 1e-16 of the largest.
@@ -131,7 +78,7 @@ impl FisherInformation {
         }
         let mut matrix = Matrix3::zeros();
         for (program, runs) in kinds {
-            let innovations = model.innovations(&program.motions)?;
+            let innovations = innovations(&model, &program.motions)?;
             matrix += runs * innovations.iter().map(Innovation::information).sum::<Matrix3<f64>>();
         }
         let diameter_m = model.geometry.wheel_diameter_m();
@@ -172,16 +119,16 @@ impl FisherInformation {
         let scale = Matrix3::from_diagonal(&self.geometry_m);
         let eigen = SymmetricEigen::new(scale * self.matrix * scale);
         let rounding = ROUNDING_SHARE * eigen.eigenvalues.max();
-        let (mut variance, mut unseen) = (0.0, 0.0);
+        let (mut variance, mut unobservable) = (0.0, 0.0);
         for (direction, &eigenvalue) in eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues) {
             let share = direction[row] * direction[row];
             if eigenvalue > rounding {
                 variance += share / eigenvalue;
             } else {
-                unseen += share;
+                unobservable += share;
             }
         }
-        (unseen < UNSEEN_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
+        (unobservable < UNSEEN_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
     }
 }
 

@@ -7,13 +7,10 @@
 
 use dataset::MarkedPoint;
 use kinematics::{DriveGeometry, Increment, Point, Pose, WheelNoise, Wheels};
-use motion_programs::Motion;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use scenario::{Engine, Instrument, Robot, Scenario};
 
-use super::filter::Filter;
-use super::timeline::Timeline;
-use super::{Innovation, NoBound};
+use super::error::NoBound;
 
 /// Readings must err by this share of what they are rounded to, for their roundings to be independent to 1 %.
 const LEAST_DITHER: f64 = 1.0 / 3.0;
@@ -67,11 +64,6 @@ impl Model {
             robot: scenario.robot.clone(),
             nominal_geometry: scenario.nominal_geometry()?,
         })
-    }
-
-    /// What the looks of a run add, one by one.
-    pub(super) fn innovations(&self, motions: &[Motion]) -> Result<Vec<Innovation>, NoBound> {
-        Filter::run(self, &Timeline::of(self, motions))
     }
 
     /// Recorded ticks of a wheel turn.
@@ -168,8 +160,8 @@ mod tests {
     #[test]
     fn two_marks_across_the_axle_give_the_textbook_pose() {
         let grid = Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 2e-3 };
-        let sight = Sight::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
-        let seen = sight.covariance(Pose::new(3.0, -1.0, 0.7));
+        let measurement = Sight::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
+        let seen = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
         // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of them.
         let expected = Matrix3::from_diagonal(&Vector3::new(2e-6, 2e-6, 2.0 * 4e-6 / 0.16));
         assert!((seen - expected).abs().max() < 1e-18, "{seen}");
@@ -180,8 +172,8 @@ mod tests {
     fn rounding_to_the_grid_adds_a_twelfth_of_its_square() {
         let marks = [mark(0.0, 0.2), mark(0.0, -0.2)];
         let grid = |reading_sigma_m| Sight::of(&Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }, &marks);
-        let sight = grid(4e-4).expect("dithered");
-        assert!((sight.covariance(Pose::IDENTITY)[(0, 0)] / (0.5 * (1.6e-7 + 1e-6 / 12.0)) - 1.0).abs() < 1e-14);
+        let measurement = grid(4e-4).expect("dithered");
+        assert!((measurement.covariance(Pose::IDENTITY)[(0, 0)] / (0.5 * (1.6e-7 + 1e-6 / 12.0)) - 1.0).abs() < 1e-14);
         assert!(matches!(grid(3e-4), Err(NoBound::RoundedReadings { .. })));
     }
 

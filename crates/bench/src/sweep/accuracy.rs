@@ -89,7 +89,6 @@ pub fn compare(result: &SweepResult, baseline: &SweepResult, place: &str) -> Res
             all.extend(comparisons(&point, (is, now.trials), (was, then.trials)));
         }
     }
-    #[allow(clippy::cast_precision_loss)] // a few hundred
     let tail = FALSE_ALARM_BUDGET / (2.0 * all.len().max(1) as f64);
     let z_limit = Normal::standard().inverse_cdf(1.0 - tail);
     all.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
@@ -99,13 +98,12 @@ pub fn compare(result: &SweepResult, baseline: &SweepResult, place: &str) -> Res
         compared: all.len(),
         largest_z: all.first().map_or(0.0, |largest| largest.z.abs()),
         moved: all.iter().filter(|number| number.z.abs() > z_limit).cloned().collect(),
-        #[allow(clippy::float_cmp)] // the same bits, or changed
+        // Changed where a bit is.
         changed: all.into_iter().filter(|number| number.is != number.was).collect(),
     })
 }
 
 /// Everything that can be compared of one estimator; the numbers beside the estimators are their trials.
-#[allow(clippy::cast_precision_loss)] // counts of trials
 fn comparisons(
     point: &str,
     (is, is_of): (&EstimatorResult, u64),
@@ -184,7 +182,6 @@ mod tests {
             let mut angles = crate::Moments::default();
             for _ in 0..4000 {
                 let k = (0..2000).filter(|_| stream.uniform() < share).count();
-                #[allow(clippy::cast_precision_loss)]
                 angles.push(angle(k as f64 / 2000.0, 2000.0));
             }
             let scaled = angles.variance().expect("many").0 * 2000.5;

@@ -168,7 +168,6 @@ fn levels_of(key: &str, points: &[PointResult]) -> Vec<Level> {
 
 impl DesignAxis {
     /// Where a point is drawn: at its number, or at the place of its case.
-    #[allow(clippy::cast_precision_loss)] // cases are few
     fn x(&self, point: &PointResult) -> Option<f64> {
         match point.levels.get(&self.key)? {
             Level::Number(number) => Some(*number),

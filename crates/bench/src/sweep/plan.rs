@@ -134,7 +134,6 @@ impl SweepPlan {
     /// The chunk at which a point that has come to its look is looked at again; `None` when it is done. With a precision it is where the error, falling with the root
     /// of the number of trials, will have reached it, but no more than four times as far. Looks depend on the trials alone and never on when
     /// somebody looked: the number of trials is part of the result.
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn next_look(&self, point: usize, sum: &PointSum) -> Option<u64> {
         let done = sum.chunks.next();
         let excess = self.largest_error(point, sum) / self.precision?;
@@ -244,7 +243,6 @@ pub(super) struct Stand {
 }
 
 impl Stand {
-    #[allow(clippy::cast_possible_truncation)] // points are few
     pub(super) fn new(plan: &SweepPlan, point: usize) -> Result<Self, BenchError> {
         let scenario = &plan.points[point].scenario;
         let mut groups: Vec<Group> = Vec::new();

@@ -40,7 +40,6 @@ impl Histogram {
 
     /// The value below which the share `q` lies, with its standard error; `None` with fewer than two errors.
     pub(crate) fn quantile(&self, q: f64) -> Option<WithError> {
-        #[allow(clippy::cast_precision_loss)] // counts of trials
         let n = self.count as f64;
         (self.count > 1).then(|| {
             let by = (q * (1.0 - q) / n).sqrt();
@@ -52,7 +51,6 @@ impl Histogram {
     fn at(&self, rank: f64) -> f64 {
         let (mut below, mut last) = (0.0, 0.0);
         for (bin, count) in &self.bins {
-            #[allow(clippy::cast_precision_loss)]
             let count = *count as f64;
             let (low, high) = edges(*bin);
             if below + count >= rank {
@@ -66,7 +64,7 @@ impl Histogram {
 }
 
 /// The bin of a relative error; bin k ≥ 0 lies at or above zero, bin −1−k mirrors it.
-#[allow(clippy::cast_possible_truncation)] // at most 16384 bins for each of 1100 doublings
+// At most 16384 bins for each of 1100 doublings.
 fn bin(relative_error: f64) -> i32 {
     let size = (relative_error.abs() / FINEST).min(f64::MAX);
     let k = if size < LINEAR {

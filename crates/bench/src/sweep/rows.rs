@@ -185,7 +185,7 @@ impl Group<'_> {
                 Level::Name(name) => strings(group, &texts(&|_| text(name)))?,
             }
         }
-        #[allow(clippy::cast_possible_wrap)] // trials are at most 1e8
+        // Trials are at most 1e8.
         let trials: Vec<i64> = (self.first..self.first + self.trials)
             .flat_map(|trial| std::iter::repeat_n(trial as i64, estimates))
             .collect();

@@ -147,7 +147,6 @@ impl State {
         // A point that stops by itself cannot be cut.
         let chunks = if plan.precision.is_some() { 1 } else { plan.chunks() };
         let units = points as u64 * chunks;
-        #[allow(clippy::cast_possible_truncation)] // a place is at most the number of points
         let place = |unit: u64| Place { point: (unit / chunks) as usize, chunk: unit % chunks };
         let (first, end) = (place(shard.first(units)), place(shard.end(units)));
         Ok(Self {

@@ -166,7 +166,6 @@ pub(super) fn largest_drift_error(drift: &Moments) -> f64 {
 }
 
 /// A share of `of` trials with its standard error and the bounds of Clopper & Pearson (1934).
-#[allow(clippy::cast_precision_loss)] // counts of trials
 fn coverage(covered: u64, of: u64) -> Option<Coverage> {
     let (k, n) = (covered as f64, of as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok();

@@ -18,7 +18,7 @@ use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
-use estimation::WheelTrack;
+use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Tachometer {
 
 /// Travel of each wheel for one radian, metres, by one run; or why it says nothing.
 fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'static str> {
-    let track = WheelTrack::of(run, robot).ok_or("the run has no odometry")?;
+    let track = WheelAngleInterpolator::of(run, robot).ok_or("the run has no odometry")?;
     let rows_s = &run.odometry().t_s;
     let (mut travel_m, mut turned_rad) = (Wheels::both(0.0), Wheels::both(0.0_f64));
     for samples in run.run().wheel_reference.windows(2) {
@@ -101,7 +101,6 @@ impl Method for Tachometer {
             );
             return Err(CalibError::NotApplicable { method: Self::NAME, why });
         }
-        #[allow(clippy::cast_precision_loss)] // a number of runs
         let count = values.len() as f64;
         let mean = Wheels::from_sides(|side| values.iter().map(|value| value[side]).sum::<f64>() / count);
         let scores: Vec<_> = values

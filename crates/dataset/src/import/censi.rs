@@ -15,8 +15,8 @@ use std::rc::Rc;
 use kinematics::Wheels;
 use serde::Deserialize;
 
-use super::Source;
 use crate::error::DatasetError;
+use crate::imported::Source;
 use crate::record::{
     Dataset, Displacement, NominalRobot, Odometry, Protocol, Provenance, Run, RunInfo, TruthNoise, WheelLog,
 };
@@ -124,7 +124,7 @@ fn whole_counts(key: &str, phi_rad_s: f64, interval_s: f64) -> Result<i64, Strin
     let counts = phi_rad_s * interval_s * TICKS_PER_REV / TAU;
     let whole = counts.round();
     if (counts - whole).abs() <= COUNT_TOLERANCE {
-        #[allow(clippy::cast_possible_truncation)] // saturates, at 10^8 years of driving
+        // Saturates, at 10^8 years of driving.
         Ok(whole as i64)
     } else {
         Err(format!(

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 
 use kinematics::{DriveGeometry, Increment, Wheels};
 
-use super::Source;
 use crate::error::{DatasetError, shown};
+use crate::imported::Source;
 use crate::record::{
     Dataset, NominalRobot, Odometry, Protocol, ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample,
     WheelLog,
@@ -232,7 +232,6 @@ impl Motion {
         let mut motion = Self::default();
         for (left, right) in ticks.left.windows(2).zip(ticks.right.windows(2)) {
             let counts = Wheels { left: left[1].wrapping_sub(left[0]), right: right[1].wrapping_sub(right[0]) };
-            #[allow(clippy::cast_precision_loss)] // counts of one cycle
             let Increment { distance_m, turn_rad } =
                 geometry.increment(counts.zip_with(m_per_count, |counts, m_per_count| counts as f64 * m_per_count));
             motion.distance_m += distance_m;

@@ -245,7 +245,7 @@ impl Source<'_> {
             let (file, line) = (self.file.to_owned(), self.line(&key.span()));
             return Err(DatasetError::WrongUnit { file, line, key: shown(name.as_bytes()), expected });
         }
-        #[allow(clippy::cast_precision_loss)] // A covariate of more than 2^53 that must be exact is not a measurement.
+        // A covariate of more than 2^53 that must be exact is not a measurement.
         let number = match value.as_ref() {
             Value::Float(number) => *number,
             Value::Integer(number) => *number as f64,

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{Dataset, Run};
-use crate::table::{RUN_COLUMN, RunIndex, Table};
+use crate::table::RunIndex;
 use crate::warning::Warning;
 use manifest::Manifest;
 use odometry::OdometryTable;
@@ -119,17 +119,4 @@ pub(crate) const fn has_truth(run: &Run) -> bool {
         && run.displacements.is_empty()
         && run.point_readings.is_empty()
         && run.wheel_reference.is_empty())
-}
-
-/// Warns of the columns that are none of `known` (`run` is).
-fn warn_of_unknown(table: &Table, known: &[&str], warnings: &mut Vec<Warning>) {
-    for name in table.names() {
-        if name != RUN_COLUMN && !known.contains(&name.as_str()) {
-            warnings.push(Warning::UnknownColumn {
-                file: table.file().to_owned(),
-                column: shown(name.as_bytes()),
-                known: format!("{RUN_COLUMN}, {}", known.join(", ")),
-            });
-        }
-    }
 }

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use kinematics::{Side, Wheels};
 
-use super::warn_of_unknown;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{ExtraChannel, Odometry, Run, WheelLog};
@@ -92,7 +91,7 @@ impl OdometryTable {
         let mut known = vec!["t_s"];
         known.extend(Form::ALL.iter().flat_map(|form| form.columns()));
         known.extend(ExtraChannel::ALL.map(ExtraChannel::column));
-        warn_of_unknown(&table, &known, warnings);
+        table.warn_of_unknown(&known, warnings);
         for column in Form::ALL.into_iter().filter(|other| *other != form).flat_map(Form::columns) {
             if table.column(column).is_some() {
                 warnings.push(Warning::RedundantColumn { file: file.to_owned(), column, used: form.names() });

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use kinematics::{Point, Wheels};
 
-use super::warn_of_unknown;
 use crate::error::{DatasetError, shown};
 use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
 use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
@@ -83,7 +82,7 @@ pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Tr
             let table = Table::open(&file, kind.header)?;
             table.require(RUN_COLUMN)?;
             let columns = (kind.find)(&table)?;
-            warn_of_unknown(&table, kind.known, warnings);
+            table.warn_of_unknown(kind.known, warnings);
             tables.push(TruthTable { name: kind.file, table, columns });
         }
     }

@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::error::{DatasetError, shown};
+use crate::warning::Warning;
 use fields::Fields;
 use lines::{Line, Lines};
 
@@ -114,6 +115,19 @@ impl Table {
 
     pub(crate) fn file(&self) -> &Path {
         &self.columns.file
+    }
+
+    /// Warns of the columns that are none of `known` (`run` is).
+    pub(crate) fn warn_of_unknown(&self, known: &[&str], warnings: &mut Vec<Warning>) {
+        for name in self.names() {
+            if name != RUN_COLUMN && !known.contains(&name.as_str()) {
+                warnings.push(Warning::UnknownColumn {
+                    file: self.file().to_owned(),
+                    column: shown(name.as_bytes()),
+                    known: format!("{RUN_COLUMN}, {}", known.join(", ")),
+                });
+            }
+        }
     }
 
     /// Where a column stands.

@@ -54,7 +54,6 @@ struct RunOut<'a> {
     covariates: &'a BTreeMap<String, f64>,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
 const fn is_true(value: &bool) -> bool {
     *value
 }

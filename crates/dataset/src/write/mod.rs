@@ -13,7 +13,7 @@ use std::io::{self, BufWriter, Write};
 use std::mem::{Discriminant, discriminant};
 use std::path::{Path, PathBuf};
 
-use tables::{OptionalColumns, TABLES};
+use tables::{OptionalColumns, Out, TABLES};
 use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
@@ -216,8 +216,6 @@ fn may_write(target: &Path, existing: Existing) -> Result<bool, DatasetError> {
         (Existing::ReplaceDataset, None) => Ok(true),
     }
 }
-
-type Out = BufWriter<fs::File>;
 
 #[cfg(test)]
 mod tests {

@@ -1,12 +1,15 @@
 //! The tables as text: numbers in the fewest digits that read back to the same bits.
 
 use std::collections::BTreeSet;
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 
-use super::Out;
 use crate::read::{DISPLACEMENT, ODOMETRY, POINTS, TRUTH, WHEEL_REFERENCE, wheel_columns};
 use crate::record::{ExtraChannel, MarkedPoint, Run, WheelLog};
 use crate::table::quoted_where_needed;
+
+/// A table that is being written.
+pub(super) type Out = BufWriter<File>;
 
 /// A number as `{}` prints it, in a third of the time: of two texts equally near, which numbers above 10¹² may have, it is the even one. Nothing for `None`.
 fn number(out: &mut impl Write, number: impl Into<Option<f64>>) -> io::Result<()> {

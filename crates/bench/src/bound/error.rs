@@ -1,0 +1,47 @@
+//! Why a scenario has no bound.
+
+use kinematics::GeometryError;
+
+/// Why a scenario has no bound.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoBound {
+    /// An effect's scatter is none that a whole motion has.
+    #[error("effect {id} has no closed bound: {why}")]
+    Effect {
+        /// The effect.
+        id: &'static str,
+        /// Why.
+        why: &'static str,
+    },
+    /// The true geometry is not physical.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// Nothing looks at the robot.
+    #[error("no instrument sees the robot")]
+    NoInstrument,
+    /// A tachometer measures the wheels, and the bound takes looks at the pose alone.
+    #[error("a tachometer's wheel speeds are no look at the pose: leave the instrument out for a bound")]
+    WheelSpeeds,
+    /// The floor grid reads fewer than two distinct points.
+    #[error("the robot's marked points give no heading: two of them must differ")]
+    NoHeading,
+    /// The grid rounds coarser than its readings err.
+    #[error(
+        "readings that err by {reading_sigma_m} m are rounded to {resolution_m} m: such roundings are not independent; a bound takes an error of a third of the rounding"
+    )]
+    RoundedReadings {
+        /// Standard deviation of a reading before it is rounded, metres.
+        reading_sigma_m: f64,
+        /// What it is rounded to, metres.
+        resolution_m: f64,
+    },
+    /// A reading tells something without error.
+    #[error(
+        "the look at {t_s} s has a direction without any error: the bound is zero; give the instrument or the wheels some noise"
+    )]
+    NoError {
+        /// When, seconds from the run's start.
+        t_s: f64,
+    },
+}

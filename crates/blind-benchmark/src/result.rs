@@ -1,0 +1,126 @@
+//! What came of a case: what was found, and what the planned run made of it.
+
+use diagnose::Document;
+
+use super::case::{Case, CaseKind, OracleView};
+use super::hidden::EffectKind;
+use super::instrument::{NoiseClass, TruthKind};
+use super::robot::PathFamily;
+
+/// One finding, as far as it is scored.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Reported {
+    /// Its names, most probable first.
+    pub names: Vec<String>,
+    /// Stated probability of the first name.
+    pub probability: f64,
+    /// Its z.
+    pub z: f64,
+    /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 % interval holds the truth.
+    pub covered: Vec<bool>,
+    /// Its sentence.
+    pub sentence: String,
+}
+
+/// What the case was and what came of it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CaseResult {
+    /// The case's number: with the seed, all that it takes to drive it again.
+    pub case: u64,
+    /// What was asked.
+    pub round: CaseKind,
+    /// What was driven.
+    pub paths: PathFamily,
+    /// What the instrument showed.
+    pub truth: TruthKind,
+    /// What the measurements err by.
+    pub noise: NoiseClass,
+    /// Sessions, runs and measurements.
+    pub counts: [usize; 3],
+    /// What was hidden, as the oracle sees it.
+    pub hidden: Vec<OracleView>,
+    /// What was found.
+    pub said: Vec<Reported>,
+    /// Checks that failed at the end.
+    pub failed_checks: Vec<String>,
+    /// Why there is no diagnosis.
+    pub refused: Option<String>,
+    /// Whether the mean was extended.
+    pub extended: bool,
+    /// Gain in log score on the held-out log: of the tool, and of who knows the true term.
+    pub gain: Option<[f64; 2]>,
+    /// Where its effect was found among several names: what the planned run made of them.
+    pub planned: Option<Planned>,
+}
+
+impl CaseResult {
+    /// The findings that are not right anyway because of what the measurements err by.
+    pub(crate) fn findings(&self) -> impl Iterator<Item = &Reported> {
+        let right = self.noise.right_answers();
+        let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
+        self.said
+            .iter()
+            .filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
+    }
+
+    /// What was said of it, in short.
+    pub(crate) fn verdict(&self) -> String {
+        if self.refused.is_some() {
+            return "refused".to_owned();
+        }
+        let names: Vec<String> = self.findings().map(|said| said.names.join("|")).collect();
+        if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
+    }
+}
+
+/// What came of the planned run of a case whose one mean effect was found among several names.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Planned {
+    /// The set before.
+    pub names: Vec<String>,
+    /// Whether there was a plan that tells names apart.
+    pub planned: bool,
+    /// Whether the oracle tells the right name from all others of the set after the planned runs.
+    pub told_by_plan: bool,
+    /// The same after the battery.
+    pub told_by_battery: bool,
+    /// What was found after the planned runs.
+    pub said: Vec<Reported>,
+}
+
+impl Planned {
+    /// Whether somebody could have driven what tells.
+    #[must_use]
+    pub fn can_be_told(&self) -> bool {
+        self.told_by_plan || self.told_by_battery
+    }
+}
+
+/// A diagnosis' findings, as far as they are scored.
+pub(crate) fn said(document: &Document, case: &Case) -> Vec<Reported> {
+    document
+        .findings
+        .iter()
+        .map(|finding| {
+            let hidden = case.hidden.iter().find(|hidden| hidden.id == finding.id);
+            let exact = hidden.filter(|hidden| hidden.kind == EffectKind::Mean && !hidden.other_form);
+            let covered = exact.map_or_else(Vec::new, |hidden| {
+                hidden
+                    .sizes()
+                    .iter()
+                    .filter_map(|(name, truth)| {
+                        let value = finding.parameters.get(*name)?;
+                        Some((value.value - truth).abs() < 1.96 * value.sigma?)
+                    })
+                    .collect()
+            });
+            Reported {
+                names: finding.names.clone(),
+                probability: finding.probability,
+                z: finding.z,
+                covered,
+                sentence: finding.sentence.clone(),
+            }
+        })
+        .collect()
+}

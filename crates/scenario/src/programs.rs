@@ -1,0 +1,51 @@
+//! What a scenario drives, fitted to its budget, and what that costs.
+
+use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
+
+use crate::budget::cost;
+use crate::error::NoFit;
+use crate::experiment::Scenario;
+
+impl Scenario {
+    /// Everything that is driven, in order: the scenario's own protocols, fitted when there is a budget.
+    ///
+    /// A scenario that was read fits, or reading it failed. One that was put together since, such as a point of a sweep, may not, and drives nothing
+    /// then; [`Self::programs_for`] says why.
+    #[must_use]
+    pub fn programs(&self) -> Vec<MotionProgram> {
+        self.fitted(&self.protocols).unwrap_or_default()
+    }
+
+    /// What a calibration method drives, fitted when there is a budget: its protocols of `[sweep.protocols]`, or the scenario's own.
+    ///
+    /// # Errors
+    /// [`NoFit`] says why the method cannot be used within the budget.
+    pub fn programs_for(&self, method: &str) -> Result<Vec<MotionProgram>, NoFit> {
+        let own = self.sweep.as_ref().and_then(|sweep| sweep.protocols.get(method));
+        self.fitted(own.unwrap_or(&self.protocols))
+    }
+
+    /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the driving alone.
+    #[must_use]
+    pub fn cost_of(&self, programs: &[MotionProgram]) -> Cost {
+        cost(programs, &self.drive_limits())
+    }
+
+    pub(crate) fn fitted(&self, protocols: &[Schedule]) -> Result<Vec<MotionProgram>, NoFit> {
+        let fitted = match &self.budget {
+            Some(budget) => budget.fit(protocols, &self.drive_limits())?,
+            None => protocols.to_vec(),
+        };
+        Ok(fitted.iter().flat_map(Schedule::programs).collect())
+    }
+
+    /// How fast the robot drives, and what a person needs for each run.
+    pub(crate) fn drive_limits(&self) -> DriveLimits {
+        DriveLimits {
+            wheel_separation_m: self.robot.wheel_separation_m,
+            cruise_speed_m_s: self.robot.cruise_speed_m_s,
+            acceleration_m_s2: self.robot.acceleration_m_s2,
+            handling_s: self.budget.and_then(|budget| budget.handling_s).unwrap_or(0.0),
+        }
+    }
+}
