@@ -20,10 +20,10 @@ fn odometry(rule: Rule) -> Odometry {
 
 /// A wandering robot of some ten counts a step.
 fn counts(steps: usize) -> Wheels<Vec<i64>> {
-    let column = |bend: i64| {
+    let column = |curvature: i64| {
         (0..)
             .scan(0, |sum, k: i64| {
-                *sum += 10 + (k / 1000 * bend) % 7 - 3;
+                *sum += 10 + (k / 1000 * curvature) % 7 - 3;
                 Some(*sum)
             })
             .take(steps)

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// Find the 95 % interval of each parameter of `joint` from the likelihood's own rise, which need not be symmetric.
     #[arg(long, conflicts_with = "online")]
     profile: bool,
-    /// Follow the parameters through the logs as the robot would on line, a look after the other, and say when they have settled.
+    /// Follow the parameters through the logs as the robot would on line, a measurement after the other, and say when they have settled.
     #[arg(long, conflicts_with_all = ["method", "out"])]
     online: bool,
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
@@ -144,9 +144,9 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
         (Column::LeftWheel, &["left_wheel_diameter_m", "left_m_per_tick"][..]),
         (Column::RightWheel, &["right_wheel_diameter_m", "right_m_per_tick"]),
         (Column::Separation, &["wheel_separation_m"]),
-        (Column::MountX, &["sensor_x_m"]),
-        (Column::MountY, &["sensor_y_m"]),
-        (Column::MountTheta, &["sensor_theta_rad"]),
+        (Column::SensorX, &["sensor_x_m"]),
+        (Column::SensorY, &["sensor_y_m"]),
+        (Column::SensorTheta, &["sensor_theta_rad"]),
     ] {
         let present = keys.iter().any(|key| joint.parameters.contains_key(*key));
         if !present || !found.columns.contains(&column) {
@@ -201,8 +201,9 @@ fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal:
         }
         let rejected = method.runs_rejected.len();
         terminal.say(&format!("{name}: {} of {runs} runs used, {rejected} values rejected", method.runs_used))?;
-        if let Some(OneStep { looks, first_looks, .. }) = method.one_step {
-            terminal.say(&format!("  {first_looks} looks fitted, then one step over all {looks}"))?;
+        if let Some(OneStep { measurements, first_measurements, .. }) = method.one_step {
+            terminal
+                .say(&format!("  {first_measurements} measurements fitted, then one step over all {measurements}"))?;
         }
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;

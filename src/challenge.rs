@@ -72,9 +72,9 @@ fn one(arguments: &Arguments, number: u64, terminal: &Terminal) -> Result<ExitCo
 }
 
 fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
-    let [sessions, runs, looks] = result.counts;
+    let [sessions, runs, measurements] = result.counts;
     terminal.say(&format!(
-        "case {}: {:?}, {:?} paths, {:?} truth, {:?} noise; {sessions} sessions, {runs} runs, {looks} looks",
+        "case {}: {:?}, {:?} paths, {:?} truth, {:?} noise; {sessions} sessions, {runs} runs, {measurements} measurements",
         result.case, result.round, result.paths, result.truth, result.noise
     ))?;
     for hidden in &result.hidden {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use bench::{AccuracyCheck, Campaign, Ended, Shard, SweepOptions, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let bar = terminal.progress(0, "trials");
     let started = Instant::now();
-    let ended = plan.campaign(&Campaign {
+    let outcome = plan.campaign(&Campaign {
         jobs: arguments.jobs.into(),
         folder: arguments.out.as_deref(),
         resume: arguments.resume,
@@ -124,15 +124,15 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     bar.finish_and_clear();
     let elapsed_s = started.elapsed().as_secs_f64();
     let out = arguments.out.as_deref();
-    match ended {
-        Ended::Stopped(progress) => {
+    match outcome {
+        Outcome::Stopped(progress) => {
             terminal.remark(&format!(
                 "stopped after {} of {} trials; the same command with --resume goes on",
                 progress.done, progress.planned
             ));
             Ok(ExitCode::from(INTERRUPTED))
         }
-        Ended::Shard => {
+        Outcome::Shard => {
             let (shard, out) = (arguments.shard.unwrap_or(Shard::WHOLE), out.unwrap_or(Path::new(".")));
             terminal.remark(&format!(
                 "shard {shard} stands in {} after {elapsed_s:.1} s; yair merge puts the shards together",
@@ -140,7 +140,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             ));
             Ok(ExitCode::SUCCESS)
         }
-        Ended::Whole(result) => {
+        Outcome::Whole(result) => {
             if let Some(out) = out {
                 bench::write_results(&plan, &result, arguments.rows, out)?;
             }

@@ -6,11 +6,11 @@
 
 mod support;
 
-use blind_benchmark::{CaseResult, ChallengeResult, EffectKind, NoiseClass, Round, challenge};
+use blind_benchmark::{CaseKind, CaseResult, ChallengeResult, EffectKind, NoiseClass, challenge};
 use statrs::distribution::{Binomial, DiscreteCDF};
 use support::{document, succeed, usage};
 
-/// What the tool must do at the least, as shares: the bar on false alarms under white noise, and floors under detection and naming, which docs/diagnose.md
+/// What the tool must do at the least, as shares: the bar on false positives under white noise, and floors under detection and naming, which docs/diagnose.md
 /// measures at 0.9 and 0.8.
 const ALARMS: f64 = 0.05;
 const DETECTED: f64 = 0.7;
@@ -37,11 +37,11 @@ fn count<'a>(cases: impl Iterator<Item = &'a CaseResult>, holds: impl Fn(&CaseRe
 fn holds(result: &ChallengeResult, alpha: f64) {
     let white = || result.cases.iter().filter(|case| case.noise == NoiseClass::White);
     let share = alpha / 3.0;
-    let (alarms, nulls) = count(white().filter(|case| case.round == Round::Null), |case| !case.said.is_empty());
+    let (alarms, nulls) = count(white().filter(|case| case.round == CaseKind::Null), |case| !case.said.is_empty());
     let plain = || {
         white().filter(|case| {
             let shows = |ratio: Option<f64>| ratio.is_some_and(|ratio| ratio > PLAIN_RATIO);
-            case.round == Round::Single
+            case.round == CaseKind::Single
                 && case.hidden.iter().all(|own| own.kind == EffectKind::Mean && shows(own.ratio))
         })
     };

@@ -2,7 +2,7 @@
 
 use dataset::{Dataset, Protocol, ProtocolSettings, Run};
 use effects::{
-    CATALOGUE, Command, Effect, Forward, Hooks, Hypothesis, Readout, RunStart, SampleClock, Sighting, Step, Stream,
+    CATALOGUE, Command, Effect, Forward, Hooks, Hypothesis, PoseReading, Readout, RunStart, SampleClock, Step, Stream,
 };
 use kinematics::{Pose, Rule};
 use motion_programs::{Motion, MotionProgram, Platform};
@@ -248,9 +248,9 @@ fn the_catalogue_is_whole_and_every_effect_says_how_data_show_it() {
             Hypothesis::Geometry => geometry.contains(id),
             Hypothesis::Records(_) => gross.contains(id),
             Hypothesis::Silent => noise.contains(id),
-            Hypothesis::Terms(shapes) => !shapes.is_empty() && ![geometry, gross, noise].concat().contains(id),
-            Hypothesis::TermsAndScatter(shapes, signs) => {
-                !shapes.is_empty() && !signs.is_empty() && ![geometry, gross, noise].concat().contains(id)
+            Hypothesis::Terms(variants) => !variants.is_empty() && ![geometry, gross, noise].concat().contains(id),
+            Hypothesis::TermsAndScatter(variants, signs) => {
+                !variants.is_empty() && !signs.is_empty() && ![geometry, gross, noise].concat().contains(id)
             }
             Hypothesis::Scatter(signs) => !signs.is_empty() && ![geometry, gross, noise].concat().contains(id),
         };
@@ -293,8 +293,8 @@ macro_rules! pass_on {
 
 impl Forward for Everywhere {
     pass_on! {
-        begin_run(run: &mut RunStart<'_>);
-        start_run(stream: Stream);
+        on_run_start(run: &mut RunStart<'_>);
+        seed_run(stream: Stream);
         start_motion();
         command(command: &mut Command);
         motor(step: &mut Step);
@@ -303,7 +303,7 @@ impl Forward for Everywhere {
         encoder(step: &mut Step);
         readout(readout: &mut Readout);
         clock(sample: &mut SampleClock);
-        instrument(sighting: &mut Sighting);
+        instrument(reading: &mut PoseReading);
     }
 
     fn counts_per_tick(&self) -> Option<u32> {
@@ -366,9 +366,9 @@ fn every_file_says_all_of_its_effect_and_the_document_says_the_same() {
             let said = header[from..until].split(" Assumption").next().unwrap_or_default().trim();
             assert!(section.contains(&format!("- {said}\n")), "docs/effects.md, {id}, does not say of {part}: {said}");
         }
-        let Some(Hypothesis::Terms(shapes)) = effects::hypothesis(id) else { continue };
+        let Some(Hypothesis::Terms(variants)) = effects::hypothesis(id) else { continue };
         let large = section.lines().find(|line| line.starts_with("- Large: ")).unwrap_or_default();
-        for parameter in shapes.iter().flat_map(|shape| shape.term.parameters()) {
+        for parameter in variants.iter().flat_map(|shape| shape.term.parameters()) {
             assert!(large.contains(&format!("`{}` (", parameter.name)), "{id}: {}", parameter.name);
         }
     }

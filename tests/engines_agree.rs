@@ -1,11 +1,11 @@
 //! Two engines, one meaning: motors under their controllers in 1 ms steps, and whole motions in closed form, scatter alike.
 //!
 //! Compared is what dead reckoning misses: the true end seen from the true start, against the end by the counts. Moments of both engines are compared
-//! by z tests at 4.5 standard errors, a false alarm of 7e-6 each. Every comparison is also made against a closed form without the noise inside an arc
+//! by z tests at 4.5 standard errors, a false positive of 7e-6 each. Every comparison is also made against a closed form without the noise inside an arc
 //! (the L²/12 term), which must be told apart: it was.
 
 use dataset::{Protocol, ProtocolSettings, Run, RunView};
-use kinematics::{ArcScatter, Increment, Pose, Rule, Wheels};
+use kinematics::{BridgeCovariance, Increment, Pose, Rule, Wheels};
 use motion_programs::{Motion, MotionProgram, Platform};
 use rayon::prelude::*;
 use scenario::{Engine, Scenario};
@@ -138,7 +138,7 @@ fn an_umbmark_square_scatters_alike_in_both_engines() {
 fn the_noise_inside_a_straight_is_a_twelfth_of_its_square() {
     let (length_m, base_m) = (4.0, 0.363);
     let var_m2 = Wheels::both(K_M_PER_SQRT_M * K_M_PER_SQRT_M * length_m);
-    let scatter = ArcScatter::within(Wheels::both(length_m), var_m2, base_m);
+    let scatter = BridgeCovariance::within(Wheels::both(length_m), var_m2, base_m);
     let theta_var = 2.0 * var_m2.left / (base_m * base_m);
     assert!((scatter.across_var_m2 / (theta_var * length_m * length_m / 12.0) - 1.0).abs() < 1e-12);
 }

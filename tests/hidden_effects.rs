@@ -114,8 +114,8 @@ fn nulls_are_consistent() {
     assert!(alarms <= bound, "{alarms} alarms in {nulls}; at 5 % more than {bound} have a chance below 1e-3");
 }
 
-/// With the ends of runs alone a large effect makes a fifth of the looks lie far off by any model without it, and what is left shows nothing: without a search among all
-/// looks this one is `unlisted`.
+/// With the ends of runs alone a large effect makes a fifth of the measurements lie far off by any model without it, and what is left shows nothing: without a search among all
+/// measurements this one is `unlisted`.
 #[test]
 fn a_large_effect_that_shows_in_few_looks_is_not_taken_for_outliers() {
     let (yaw_rad, seed) = (0.02, 71);

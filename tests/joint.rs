@@ -143,9 +143,9 @@ fn ends_of_large_squares_show_what_they_leave_open() {
 fn displacements_in_the_frame_of_a_sensor_that_looks_aside_give_robot_and_sensor_back() {
     let (mut dataset, truth) = drive(&quiet(motion_capture(mix(), MOUNTED)), 4);
     for run in &mut dataset.runs {
-        let looks: Vec<_> = run.truth.iter().step_by(15).collect();
+        let measurements: Vec<_> = run.truth.iter().step_by(15).collect();
         let pose = |sample: &TruthSample| Pose::new(sample.x_m, sample.y_m, sample.theta_rad().expect("a heading"));
-        run.displacements = looks
+        run.displacements = measurements
             .windows(2)
             .map(|pair| {
                 let moved = pose(pair[0]).to(pose(pair[1]));
@@ -156,11 +156,11 @@ fn displacements_in_the_frame_of_a_sensor_that_looks_aside_give_robot_and_sensor
         run.truth.clear();
     }
     let found = calibrated(&dataset);
-    let mounting = found.mounting.expect("a sensor that looks aside is found").body_from_sensor;
+    let extrinsics = found.extrinsics.expect("a sensor that looks aside is found").body_from_sensor;
     assert!(off(&found, &truth) < 2.0 * ROUNDED, "{}", off(&found, &truth));
     // A lever of 0.13 m and displacements of 0.2 m.
-    assert!(MOUNTED.position().distance_m(mounting.position()) < 1e-4, "{mounting:?}");
-    assert!(wrap_to_pi(mounting.theta_rad - MOUNTED.theta_rad).abs() < 1e-4, "{mounting:?}");
+    assert!(MOUNTED.position().distance_m(extrinsics.position()) < 1e-4, "{extrinsics:?}");
+    assert!(wrap_to_pi(extrinsics.theta_rad - MOUNTED.theta_rad).abs() < 1e-4, "{extrinsics:?}");
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
     let straights = vec![Schedule::Straights { length_m: 1.5, runs: 6 }];
     let spins = vec![Schedule::Spins { turn_rad: TAU, runs: 6 }];
     let squares = vec![Schedule::Squares { side_m: 1.0, runs_each_way: 3 }];
-    for (protocols, ends, unseen) in [
+    for (protocols, ends, unobservable) in [
         (straights, false, Parameter::WheelSeparation),
         (spins, false, Parameter::CommonScale),
         (squares, true, Parameter::CommonScale),
@@ -179,22 +179,22 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
         }
         let found = calibrated(&dataset);
         let named: Vec<Parameter> = found.not_observable.iter().map(|of| of.parameter).collect();
-        assert_eq!(named, [unseen]);
+        assert_eq!(named, [unobservable]);
         assert!(found.not_observable[0].why.contains("add"), "{:?}", found.not_observable);
         let nominal = dataset.robot.geometry().expect("a drive");
-        let kept = match unseen {
+        let kept = match unobservable {
             Parameter::WheelSeparation => found.geometry.wheel_separation_m() / nominal.wheel_separation_m(),
             // The product of the lengths over nominal is what a common scale moves.
             _ => lengths(&found.geometry).iter().zip(lengths(&nominal)).map(|(a, b)| a / b).product::<f64>(),
         };
         // The directions that are seen move a little of everything; 2 % of scale, which these robots have, would not pass.
-        assert!((kept - 1.0).abs() < 0.02, "{unseen:?} {kept}");
+        assert!((kept - 1.0).abs() < 0.02, "{unobservable:?} {kept}");
     }
     let (mix, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 5);
     assert!(calibrated(&mix).not_observable.is_empty());
 }
 
-/// Where thousands of looks make the cost a parabola, the interval at 95 % is 1.96 σ to each side: it is allowed 2 %, as σ is that of the information at the
+/// Where thousands of measurements make the cost a parabola, the interval at 95 % is 1.96 σ to each side: it is allowed 2 %, as σ is that of the information at the
 /// minimum and the cost's own curvature changes a little on the way. An interval of one σ, or of 1.64, would not pass.
 #[test]
 fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
@@ -215,7 +215,7 @@ fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
 }
 
 /// 1000 trials of each case: RMSE²/bound has a standard error of √(2/1000) = 4.5 %, a coverage of 0.7 %, a ratio of RMSEs of two cases 3.2 %. At 4 of
-/// each beside the claims (5 %, 93.5 to 96.5 %, 15 %; 20 000 trials of docs/methods.md) nine numbers are a false alarm of 6e-4. Rejects looks taken one in two,
+/// each beside the claims (5 %, 93.5 to 96.5 %, 15 %; 20 000 trials of docs/methods.md) nine numbers are a false positive of 6e-4. Rejects measurements taken one in two,
 /// which doubles the mean square, and outliers that are believed, which multiply it by ten.
 #[test]
 fn the_bound_is_reached_and_outliers_hardly_matter() {
@@ -305,8 +305,8 @@ fn sessions_and_runs_may_have_an_instrument_of_their_own() {
     let (first, truth) = drive(&motion_capture(mix(), mounted[0]), 11);
     let (second, _) = drive(&motion_capture(mix(), mounted[1]), 12);
     let found = Joint::DEFAULT.calibrate(&[first.session(), second.session()]).expect("looks");
-    assert_eq!(found.own_instruments.len(), 2, "{found:?}");
-    for (own, mounted) in found.own_instruments.iter().zip(mounted) {
+    assert_eq!(found.group_instruments.len(), 2, "{found:?}");
+    for (own, mounted) in found.group_instruments.iter().zip(mounted) {
         let near = |found: Option<f64>, truth: f64| found.is_some_and(|found| (found - truth).abs() < 1e-4);
         assert!(near(own.sensor_x_m, mounted.x_m) && near(own.sensor_y_m, mounted.y_m), "{own:?}");
         assert!(near(own.sensor_theta_rad, mounted.theta_rad) && own.latency_s.is_none(), "{own:?}");
@@ -319,8 +319,8 @@ fn sessions_and_runs_may_have_an_instrument_of_their_own() {
         run.truth.iter_mut().for_each(|sample| sample.t_s += latency_s(number));
     }
     let found = calibrated(&late);
-    assert_eq!(found.own_instruments.len(), late.runs.len(), "{found:?}");
-    for (number, (own, run)) in found.own_instruments.iter().zip(&late.runs).enumerate() {
+    assert_eq!(found.group_instruments.len(), late.runs.len(), "{found:?}");
+    for (number, (own, run)) in found.group_instruments.iter().zip(&late.runs).enumerate() {
         assert_eq!(own.of, run.info.id);
         // A run at one speed does not show how late it is seen; corners do.
         let square = run.info.id.starts_with("square");
@@ -333,7 +333,10 @@ fn sessions_and_runs_may_have_an_instrument_of_their_own() {
     for seed in 14..24 {
         let (same, _) = drive(&motion_capture(mix(), Pose::IDENTITY), seed);
         let found = calibrated(&same);
-        assert!(found.own_instruments.is_empty() && found.mounting.is_none() && found.latency_s.is_none(), "{found:?}");
+        assert!(
+            found.group_instruments.is_empty() && found.extrinsics.is_none() && found.latency_s.is_none(),
+            "{found:?}"
+        );
     }
 }
 

@@ -21,7 +21,7 @@ fn list<'v>(value: &'v Value, key: &str) -> &'v [Value] {
     value[key].as_array().unwrap_or_else(|| panic!("{key} is no list in {value}"))
 }
 
-/// 18 biases within 4.5 of their standard errors: a false alarm of 1e-4. Rejects `ivanjko` with the wheels of the whole log, where the instrument's last look
+/// 18 biases within 4.5 of their standard errors: a false positive of 1e-4. Rejects `ivanjko` with the wheels of the whole log, where the instrument's last measurement
 /// comes before the robot stands: 3.6 % of the wheelbase, 500 standard errors.
 #[test]
 fn every_method_takes_part_and_those_that_see_everything_are_unbiased_in_usual_conditions() {

@@ -1,7 +1,7 @@
 //! The five methods in closed form or of linear steps: each gives a known robot back to its order of approximation, says what it cannot see, and refuses
 //! what it cannot use; on the logs of Sousa et al. (2022), `ivanjko` gives the published parameters.
 //!
-//! Statistical bounds are 4.5 standard errors, a false alarm of 7e-6 for each of 60 comparisons.
+//! Statistical bounds are 4.5 standard errors, a false positive of 7e-6 for each of 60 comparisons.
 
 mod support;
 
@@ -163,7 +163,7 @@ fn late(dataset: &mut Dataset) {
     }
 }
 
-static GENERAL: Linear = Linear { form: Form::General, readings: Readings::Ends };
+static GENERAL: Linear = Linear { form: Form::General, readings: Readings::ConvergenceCriterion };
 
 /// A method, what it is driven on here, to what share it is exact, and what must not pass for it.
 type Case = (&'static dyn Method, Vec<Schedule>, f64, &'static [fn(&mut Dataset)]);

@@ -23,10 +23,10 @@ const ROWS: usize = 12_000;
 const M_PER_RAD: Wheels<f64> = Wheels { left: 0.0424, right: 0.04265 };
 const SEPARATION_M: f64 = 0.2065;
 const WHEEL_SIGMA: f64 = 4e-4;
-const LOOK_SIGMA_M: f64 = 5e-4;
-const LOOK_SIGMA_RAD: f64 = 1e-3;
+const MEASUREMENT_SIGMA_M: f64 = 5e-4;
+const MEASUREMENT_SIGMA_RAD: f64 = 1e-3;
 
-/// A row and a look every 50 ms, other speeds every ten seconds, more to the left than to the right; the model of `joint` to the letter, the instrument `ahead_m` of the drive's centre.
+/// A row and a measurement every 50 ms, other speeds every ten seconds, more to the left than to the right; the model of `joint` to the letter, the instrument `ahead_m` of the drive's centre.
 fn run(seed: u64, ahead_m: f64) -> Run {
     let mut chance = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = move |sigma: f64| sigma * chance.sample::<f64, _>(StandardNormal);
@@ -46,8 +46,8 @@ fn run(seed: u64, ahead_m: f64) -> Run {
             angles.right.push(angle.right);
         }
         let seen = pose * Pose::new(ahead_m, 0.0, 0.0);
-        let (x_m, y_m) = (seen.x_m + normal(LOOK_SIGMA_M), seen.y_m + normal(LOOK_SIGMA_M));
-        truth.push(TruthSample::new(t_s, x_m, y_m, Some(seen.theta_rad + normal(LOOK_SIGMA_RAD))));
+        let (x_m, y_m) = (seen.x_m + normal(MEASUREMENT_SIGMA_M), seen.y_m + normal(MEASUREMENT_SIGMA_M));
+        truth.push(TruthSample::new(t_s, x_m, y_m, Some(seen.theta_rad + normal(MEASUREMENT_SIGMA_RAD))));
         angle = angle.zip_with(speed, |angle, turned| angle + turned);
         let travel_m = M_PER_RAD
             .zip_with(speed, |m_per_rad, rad| m_per_rad * rad)
@@ -91,7 +91,7 @@ fn apart(a: &Calibration, b: &Calibration) -> (f64, f64) {
     })
 }
 
-/// The one step misses the whole fit by two things. Its noise is that of the pieces: a variance is off by √(2/65 536) = 0.55 % of itself as far as looks show it,
+/// The one step misses the whole fit by two things. Its noise is that of the pieces: a variance is off by √(2/65 536) = 0.55 % of itself as far as measurements show it,
 /// and the wheels' by a few times that; an estimate whose weights are off by a share ε moves by less than ε of its sigma, and its sigma by ε/2. And the step
 /// itself bends, by less than its square, which [`Calibration::converged`] keeps below 5 % of a sigma. Together: 0.1 sigma, and sigmas within 2 %
 /// (0.013 and 0.4 % seen).
@@ -107,10 +107,10 @@ fn one_step_is_the_whole_fit_within_a_tenth_of_a_sigma() {
         write(&dataset, &dir, Existing::Refuse).expect("written");
         let one_step = in_one_step(&dir);
         let whole = Joint::DEFAULT.calibrate(&[dataset.session()]).expect("calibrated");
-        assert_eq!(one_step.mounting.is_some(), ahead_m > 0.0);
+        assert_eq!(one_step.extrinsics.is_some(), ahead_m > 0.0);
         let said = one_step.one_step.expect("it says so");
-        assert_eq!((said.looks, said.passes), (RUNS * ROWS, 1));
-        assert!(said.first_looks < RUNS * ROWS / 3, "{said:?}");
+        assert_eq!((said.measurements, said.passes), (RUNS * ROWS, 1));
+        assert!(said.first_measurements < RUNS * ROWS / 3, "{said:?}");
         assert!(whole.one_step.is_none() && one_step.converged);
         assert_eq!((one_step.runs_used, one_step.runs_rejected.len()), (RUNS, 0));
         let (sigmas, ratio) = apart(&one_step, &whole);

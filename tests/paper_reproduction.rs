@@ -99,14 +99,14 @@ fn paper_causes_only_a_wheelbase_that_differs_in_corners_fits_and_is_plausible()
     let fitted = |extension| causes.fitted.iter().find(|fitted| fitted.extension == extension).expect("fitted");
     // One degree of freedom is left: a misfit of 7.9 has a probability of 0.5 %. The model as it stands misses by hundreds.
     let corner = fitted(Extension::CornerWheelbase);
-    assert!(corner.misfit < 7.9 && corner.plausible && (2.2..2.8).contains(&corner.size), "{corner:?}");
+    assert!(corner.misfit < 7.9 && corner.prior_sigma && (2.2..2.8).contains(&corner.size), "{corner:?}");
     assert!(fitted(Extension::None).misfit > 100.0);
     // Slip in every turn, spins and corners alike, is a wheelbase by another name and reconciles nothing.
     assert!((fitted(Extension::TurnSlip).misfit / fitted(Extension::None).misfit - 1.0).abs() < 1e-3);
     assert!(fitted(Extension::NominalOf500).misfit > 100.0);
     let told: Vec<Extension> = causes.not_told_apart.clone();
     assert_eq!(told, [Extension::CornerWheelbase, Extension::StartStopLength, Extension::ScaleOnSquares]);
-    assert!(!fitted(Extension::StartStopLength).plausible && !fitted(Extension::ScaleOnSquares).plausible);
+    assert!(!fitted(Extension::StartStopLength).prior_sigma && !fitted(Extension::ScaleOnSquares).prior_sigma);
     // A straight of 4 m tells all three apart; ten turns do not.
     assert!(causes.experiments[0].does.contains("straight of 4 m") && causes.experiments[0].tells_apart > 10.0);
     assert!(causes.experiments.last().expect("three").tells_apart < 3.0);

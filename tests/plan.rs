@@ -178,7 +178,7 @@ fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
         let nearest = run.truth.iter().min_by(|a, b| (a.t_s - at_s).abs().total_cmp(&(b.t_s - at_s).abs()));
         run.truth = vec![run.truth[0], *nearest.expect("looks")];
     }
-    let ends = base.foreseeing(&[cut.session()]).reckoned(&base.fit.model, &mut []);
+    let ends = base.on_planned_runs(&[cut.session()]).dead_reckoned(&base.fit.model, &mut []);
     assert_eq!(ends.len(), cut.runs.len());
     let off = ends.iter().map(|end| {
         let seen = end.off.inverse();

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-use bench::{BenchError, Campaign, Ended, Shard, SweepOptions, SweepPlan};
+use bench::{BenchError, Campaign, Outcome, Shard, SweepOptions, SweepPlan};
 use motion_programs::Schedule;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::record::Field;
@@ -48,7 +48,7 @@ fn run(
     jobs: usize,
     resume: bool,
     waves: u32,
-) -> Result<Ended, BenchError> {
+) -> Result<Outcome, BenchError> {
     let (stop, left) = (AtomicBool::new(waves == 0), AtomicU32::new(waves));
     plan.campaign(&Campaign {
         jobs,
@@ -68,7 +68,7 @@ fn run(
 /// Runs to the end and writes the results.
 fn whole(plan: &SweepPlan, folder: &Path, jobs: usize) -> BTreeMap<String, Vec<u8>> {
     fs::create_dir_all(folder).expect("a folder");
-    let Ended::Whole(result) = run(plan, folder, Shard::WHOLE, jobs, false, u32::MAX).expect("runs") else {
+    let Outcome::Whole(result) = run(plan, folder, Shard::WHOLE, jobs, false, u32::MAX).expect("runs") else {
         panic!("one shard that nobody stops")
     };
     bench::write_results(plan, &result, true, folder).expect("written");
@@ -113,9 +113,9 @@ fn threads_stops_and_shards_end_in_the_same_bytes() {
         let mut stops = 0;
         let result = loop {
             match run(&plan, &folder, Shard::WHOLE, 1, stops > 0, 1 + stops % 3).expect("goes on") {
-                Ended::Whole(result) => break result,
-                Ended::Stopped(_) => stops += 1,
-                Ended::Shard => panic!("one shard"),
+                Outcome::Whole(result) => break result,
+                Outcome::Stopped(_) => stops += 1,
+                Outcome::Shard => panic!("one shard"),
             }
             // What a killed process leaves behind its state: a longer spool.
             let spool = folder.join("sweep.trials.spool");
@@ -134,7 +134,7 @@ fn threads_stops_and_shards_end_in_the_same_bytes() {
                 let folder = at(&format!("shard-{number}-of-{of}"));
                 fs::create_dir_all(&folder).expect("a folder");
                 let shard = Shard::new(number, of).expect("within");
-                assert_eq!(run(&plan, &folder, shard, 2, false, u32::MAX).expect("runs"), Ended::Shard);
+                assert_eq!(run(&plan, &folder, shard, 2, false, u32::MAX).expect("runs"), Outcome::Shard);
                 folders.insert(0, folder);
             }
             let out = at(&format!("merged-{of}"));

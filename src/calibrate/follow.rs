@@ -8,21 +8,21 @@ use serde_json::{Value, json};
 
 use crate::terminal::{Failure, Terminal, cell, table};
 
-/// Rows of the table at most; the JSON has every look.
+/// Rows of the table at most; the JSON has every measurement.
 const ROWS: usize = 16;
 
 pub(super) fn run(sessions: &[Session<'_>], terminal: &Terminal) -> Result<ExitCode, Failure> {
     let followed = AugmentedKalman::DEFAULT.follow(sessions).map_err(|error| error.to_string())?;
     let settled = settled_at(&followed);
     let mut table = table(&["look", "run", "way m", "turn °", "left mm", "±", "right mm", "±", "wheelbase mm", "±"], 2);
-    // Looks that lie apart by a constant factor: at first much is learned, later little.
+    // Measurements that lie apart by a constant factor: at first much is learned, later little.
     let mut due = 1.0;
     for step in &followed {
         #[allow(clippy::cast_precision_loss)]
-        let look = step.looks as f64;
-        let is_settling = settled.is_some_and(|settled| settled.looks == step.looks);
-        if look >= due || is_settling || step.looks == followed.len() {
-            while due <= look {
+        let measurement = step.measurements as f64;
+        let is_settling = settled.is_some_and(|settled| settled.measurements == step.measurements);
+        if measurement >= due || is_settling || step.measurements == followed.len() {
+            while due <= measurement {
                 #[allow(clippy::cast_precision_loss)]
                 let factor = (followed.len() as f64).powf(1.0 / (ROWS as f64 - 3.0));
                 due = (due * factor).max(due + 1.0);
@@ -33,9 +33,9 @@ pub(super) fn run(sessions: &[Session<'_>], terminal: &Terminal) -> Result<ExitC
     terminal.say(&table.to_string())?;
     let verdict = match settled {
         Some(step) => format!(
-            "settled after {} looks, {:.1} m and {:.0}° of turns (run {}): no factor moves by more than what it learns, and each is known to 0.2 %",
-            step.looks,
-            step.way_m,
+            "settled after {} measurements, {:.1} m and {:.0}° of turns (run {}): no factor moves by more than what it learns, and each is known to 0.2 %",
+            step.measurements,
+            step.distance_m,
             step.turn_rad.to_degrees(),
             step.run
         ),
@@ -52,9 +52,9 @@ fn row(step: &Followed, is_settling: bool) -> Vec<String> {
     let values = [diameter_m.left, diameter_m.right, step.geometry.wheel_separation_m()];
     let mark = if is_settling { " settled" } else { "" };
     let mut cells = vec![
-        step.looks.to_string() + mark,
+        step.measurements.to_string() + mark,
         step.run.clone(),
-        format!("{:.1}", step.way_m),
+        format!("{:.1}", step.distance_m),
         format!("{:.0}", step.turn_rad.to_degrees()),
     ];
     for (value, sigma) in values.iter().zip(step.sigma_m.iter()) {
@@ -68,8 +68,8 @@ fn document(step: &Followed) -> Value {
     let value = |value: f64, sigma: f64| json!({ "value": value, "sigma": sigma });
     json!({
         "run": step.run,
-        "looks": step.looks,
-        "way_m": step.way_m,
+        "looks": step.measurements,
+        "way_m": step.distance_m,
         "turn_rad": step.turn_rad,
         "settled": step.settled,
         "parameters": {

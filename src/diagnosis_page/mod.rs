@@ -6,7 +6,7 @@ mod words;
 use std::fmt::Write;
 use std::path::Path;
 
-use diagnose::{Alternative, Document, Fate, Residuals, Verdict};
+use diagnose::{Alternative, Document, Residuals, Status, Verdict};
 
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
@@ -71,7 +71,7 @@ impl Page<'_> {
             let score = gain.log_score_per_observation;
             writeln!(
                 page,
-                "{} runs, or blocks of runs, were held out, each once: a value that a look sees there is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
+                "{} runs, or blocks of runs, were held out, each once: a value that a measurement sees there is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
                 gain.held_out_runs,
                 score.extended - score.base,
                 score.low,
@@ -133,9 +133,9 @@ impl Page<'_> {
     }
 
     fn alternatives(&self, page: &mut String) -> std::fmt::Result {
-        let asked = self.alternatives.iter().filter(|alternative| alternative.fate != Fate::NotShown);
+        let asked = self.alternatives.iter().filter(|alternative| alternative.fate != Status::NotShown);
         let (standing, others): (Vec<_>, Vec<_>) =
-            asked.partition(|alternative| alternative.fate != Fate::DoesNotStandOut);
+            asked.partition(|alternative| alternative.fate != Status::DoesNotStandOut);
         if standing.is_empty() && others.is_empty() {
             return Ok(());
         }
@@ -190,7 +190,7 @@ impl Page<'_> {
                 );
                 writeln!(page, "| `{}` | {} | {} |", blind.id, size.trim_end(), blind.why)?;
             }
-            writeln!(page, "\nWith nine chances in ten, at a rate of false alarms of 1e-3.\n")?;
+            writeln!(page, "\nWith nine chances in ten, at a rate of false positives of 1e-3.\n")?;
         }
         let shows: Vec<String> = self
             .document
@@ -239,8 +239,8 @@ impl Page<'_> {
                 let sigma = value.sigma.map_or_else(|| "–".to_owned(), |sigma| format!("{sigma:.1e}"));
                 writeln!(page, "| `{name}` | {:.7} | {sigma} |", value.value)?;
             }
-            for unseen in &method.not_observable {
-                writeln!(page, "\nNot observable: {} – {}", unseen.parameter, unseen.why)?;
+            for unobservable in &method.not_observable {
+                writeln!(page, "\nNot observable: {} – {}", unobservable.parameter, unobservable.why)?;
             }
         }
         match (&self.document.extended_model, &self.document.extended_model_why_null) {

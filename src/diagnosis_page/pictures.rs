@@ -1,6 +1,6 @@
 //! The diagnosis drawn: residuals against what was recorded, and what names predict.
 
-use diagnose::{Against, Component, NextExperiment, Profile, Residuals};
+use diagnose::{Component, NextExperiment, Profile, Residuals, ResidualsByCovariate};
 use report::{Axis, Colour, Figure, Marks, Panel, Range, Series};
 
 /// Half of a band's width, in standard errors: 95 %.
@@ -19,18 +19,18 @@ const AFTER: &str = "extended model";
 pub(super) type Picture = (&'static str, String, Figure);
 
 /// The smallest chance of a covariate's components.
-fn p_value(against: &Against) -> f64 {
+fn p_value(against: &ResidualsByCovariate) -> f64 {
     against.components.iter().map(|component| component.before.varies_p_value).fold(1.0, f64::min)
 }
 
-fn chi_square(against: &Against) -> f64 {
+fn chi_square(against: &ResidualsByCovariate) -> f64 {
     against.components.iter().map(|component| component.before.varies_chi_square).fold(0.0, f64::max)
 }
 
 /// Covariates with which the calibrated model's residuals go, the strongest first.
-pub(super) fn that_matter(residuals: &Residuals) -> Vec<&Against> {
+pub(super) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
     let tests: usize = residuals.against.iter().map(|against| against.components.len()).sum();
-    let mut all: Vec<&Against> = residuals.against.iter().collect();
+    let mut all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
     // Chances of large statistics are all zero in a double: the statistic itself goes on.
     all.sort_by(|a, b| chi_square(b).total_cmp(&chi_square(a)));
     #[allow(clippy::cast_precision_loss)]
@@ -48,7 +48,7 @@ pub(super) fn pictures(residuals: &Residuals, next: Option<&NextExperiment>, ext
         let labels: Vec<&str> = matter.iter().map(|against| &against.label[..]).collect();
         let alt = format!("Mean residuals against {}", labels.join(", "));
         pictures.push(("residuals", alt, figure("Residuals against what matters most", &matter, residuals, extended)));
-        let all: Vec<&Against> = residuals.against.iter().collect();
+        let all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
         let alt = "Mean residuals against every covariate".to_owned();
         pictures.push(("residuals-all", alt, figure("Residuals against every covariate", &all, residuals, extended)));
     }
@@ -58,16 +58,16 @@ pub(super) fn pictures(residuals: &Residuals, next: Option<&NextExperiment>, ext
     pictures
 }
 
-fn figure(title: &str, against: &[&Against], residuals: &Residuals, extended: bool) -> Figure {
+fn figure(title: &str, against: &[&ResidualsByCovariate], residuals: &Residuals, extended: bool) -> Figure {
     let scatter = |name: &str| {
         let of = residuals.against.iter().flat_map(|against| &against.components);
         of.filter(|component| component.component == name).map(|component| 1e3 * component.scatter).fold(0.0, f64::max)
     };
     let caption = format!(
-        "{} looks. A residual is what a look sees beyond what counts, model and the looks before predict. Points: means over bins; bars and band: 95 %, \
-         as if looks erred independently. Single residuals scatter by {:.2} mm along, {:.2} mm across and \
+        "{} measurements. A residual is what a measurement sees beyond what counts, model and the measurements before predict. Points: means over bins; bars and band: 95 %, \
+         as if measurements erred independently. Single residuals scatter by {:.2} mm along, {:.2} mm across and \
          {:.2} mrad of heading: each panel has its own scale.",
-        residuals.looks,
+        residuals.measurements,
         scatter("along"),
         scatter("across"),
         scatter("heading"),
@@ -84,7 +84,7 @@ fn figure(title: &str, against: &[&Against], residuals: &Residuals, extended: bo
     figure
 }
 
-fn panel(against: &Against, component: &Component, extended: bool) -> Panel {
+fn panel(against: &ResidualsByCovariate, component: &Component, extended: bool) -> Panel {
     let unit = if component.unit == "rad" { "mrad" } else { "mm" };
     let mut x = if against.unit.is_empty() {
         Axis::dimensionless(&against.label)

@@ -1,6 +1,6 @@
 //! Findings and checks in words that a roboticist uses.
 
-use diagnose::{Alternative, Check, Compared, Document, Fate, Finding, Value, Verdict};
+use diagnose::{Alternative, Check, Compared, Document, Finding, Status, Value, Verdict};
 use effects::{Estimate, Estimates};
 
 /// What a finding's first name means, with its sizes; the finding's own sentence where that says more.
@@ -91,7 +91,7 @@ pub(super) fn question(check: &Check) -> String {
     }
     match name {
         "run_to_run" => "Is the noise the same in every run?".to_owned(),
-        "outliers" => "Do no looks lie far off? (how many do)".to_owned(),
+        "outliers" => "Do no measurements lie far off? (how many do)".to_owned(),
         "log_spans" => "Does the log last as long as what was seen of the robot? (how many times as long)".to_owned(),
         "log_rows" => "Do all rows of the log go on where the rows around them do? (how many do not)".to_owned(),
         "speed" => "Do residuals not go with speed?".to_owned(),
@@ -116,10 +116,10 @@ pub(super) fn question(check: &Check) -> String {
 /// Why an alternative was not named.
 pub(super) fn fate(alternative: &Alternative) -> &'static str {
     match alternative.fate {
-        Fate::Found => "found",
-        Fate::NotToldApart => "cannot be told from what was found",
-        Fate::ExplainsLess => "explains less than what was found, or nothing beside it",
-        Fate::DoesNotStandOut => "does not stand out",
-        Fate::NotShown => "these data could not show it",
+        Status::Found => "found",
+        Status::NotToldApart => "cannot be told from what was found",
+        Status::ExplainsLess => "explains less than what was found, or nothing beside it",
+        Status::DoesNotStandOut => "does not stand out",
+        Status::NotShown => "these data could not show it",
     }
 }

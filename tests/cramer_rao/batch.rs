@@ -2,7 +2,7 @@
 //! eliminated at the end. What is driven and when it is seen is taken from a simulated run, nothing from the bound's own code.
 
 use dataset::{Run, WheelLog};
-use kinematics::{ArcScatter, DriveGeometry, Increment, Point, Pose, Side, Wheels};
+use kinematics::{BridgeCovariance, DriveGeometry, Increment, Point, Pose, Side, Wheels};
 use motion_programs::{Motion, Platform};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use scenario::{Instrument, Scenario};
@@ -42,7 +42,7 @@ struct Piece {
     motion: usize,
     share: f64,
     /// What looks at its end.
-    looks: (usize, usize),
+    measurements: (usize, usize),
 }
 
 /// What a simulated run tells of when and how much.
@@ -51,7 +51,7 @@ struct Script<'a> {
     /// Controller counts at every standing row.
     rows: Vec<Wheels<f64>>,
     /// Captures and grid readings at the start.
-    first_looks: (usize, usize),
+    first_measurements: (usize, usize),
     pieces: Vec<Piece>,
     counts_per_tick: f64,
     separation_sigma_m: f64,
@@ -93,7 +93,7 @@ impl<'a> Script<'a> {
                 let middle_s = 0.5 * (ends[0] + ends[1]);
                 let motion = rows_s.partition_point(|row_s| *row_s < middle_s) - 1;
                 let share = (ends[1] - ends[0]) / (rows_s[motion + 1] - rows_s[motion]);
-                Piece { motion, share, looks: looks_at(ends[1]) }
+                Piece { motion, share, measurements: looks_at(ends[1]) }
             })
             .collect();
         let counts_per_tick =
@@ -105,7 +105,7 @@ impl<'a> Script<'a> {
         Self {
             scenario,
             rows: rows.collect(),
-            first_looks: looks_at(0.0),
+            first_measurements: looks_at(0.0),
             pieces,
             counts_per_tick: scenario.effects.iter().find_map(counts_per_tick).map_or(1.0, f64::from),
             separation_sigma_m: scenario.effects.iter().find_map(separation_sigma_m).unwrap_or(0.0),
@@ -136,7 +136,7 @@ impl<'a> Script<'a> {
             .expect("ticks");
         let mut pose = Pose::new(unknowns[3], unknowns[4], unknowns[5]);
         let mut readings = Vec::new();
-        self.look(pose, self.first_looks, &mut readings);
+        self.measurement(pose, self.first_measurements, &mut readings);
         for (index, piece) in self.pieces.iter().enumerate() {
             let motion = piece.motion;
             let counted_m = self.travel_m(unknowns, piece);
@@ -153,12 +153,12 @@ impl<'a> Script<'a> {
             let mut arc = increment.arc();
             (arc.x_m, arc.y_m) = (arc.x_m + off.x_m, arc.y_m + off.y_m);
             pose = pose * arc;
-            self.look(pose, piece.looks, &mut readings);
+            self.measurement(pose, piece.measurements, &mut readings);
         }
         (readings, pose)
     }
 
-    fn look(&self, pose: Pose, (captures, grids): (usize, usize), readings: &mut Vec<f64>) {
+    fn measurement(&self, pose: Pose, (captures, grids): (usize, usize), readings: &mut Vec<f64>) {
         for instrument in &self.scenario.instruments {
             match *instrument {
                 Instrument::MotionCapture { lever_x_m, lever_y_m, lever_theta_rad, .. } if captures > 0 => {
@@ -178,7 +178,8 @@ impl<'a> Script<'a> {
 
     /// Variance of every reading, in the order of [`Self::look`].
     fn reading_var(&self) -> Vec<f64> {
-        let looks = std::iter::once(self.first_looks).chain(self.pieces.iter().map(|piece| piece.looks));
+        let measurements =
+            std::iter::once(self.first_measurements).chain(self.pieces.iter().map(|piece| piece.measurements));
         let of = |(captures, grids): (usize, usize)| {
             self.scenario.instruments.iter().flat_map(move |instrument| match *instrument {
                 Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } if captures > 0 => {
@@ -191,7 +192,7 @@ impl<'a> Script<'a> {
                 _ => Vec::new(),
             })
         };
-        looks.flat_map(of).collect()
+        measurements.flat_map(of).collect()
     }
 
     /// Every source of noise with its variance; a rounding's own is a twelfth.
@@ -201,7 +202,7 @@ impl<'a> Script<'a> {
         for (piece, of) in self.pieces.iter().enumerate() {
             let travel_m = self.travel_m(unknowns, of);
             let var_m2 = travel_m.map(|travel_m| k * k * travel_m.abs());
-            let scatter = ArcScatter::within(travel_m, var_m2, unknowns[2]);
+            let scatter = BridgeCovariance::within(travel_m, var_m2, unknowns[2]);
             sources.extend(Side::BOTH.map(|side| (Source::Walk { piece, side }, var_m2[side])));
             if wrong != Wrong::NoScatterWithin {
                 sources.push((Source::Along { piece }, scatter.along_var_m2));

@@ -1,7 +1,7 @@
 //! The Cramér–Rao bound against what does not share its code: textbook cases by hand, finite differences, a batch over raw readings, simulated robots, and
 //! estimators that must not beat it and one that must reach it.
 //!
-//! Statistical tests have fixed seeds; their limits are z scores with Monte-Carlo errors from the samples themselves, and each says its rate of false alarms.
+//! Statistical tests have fixed seeds; their limits are z scores with Monte-Carlo errors from the samples themselves, and each says its rate of false positives.
 
 mod batch;
 mod efficiency;
@@ -237,15 +237,15 @@ fn what_the_covariance_tells_of_the_geometry_is_little() {
     let lengths =
         Matrix3::from_diagonal(&Vector3::new(diameter_m.left, diameter_m.right, geometry.wheel_separation_m()));
     let in_covariance = |program: &MotionProgram| {
-        let look = |scenario: &Scenario| Innovation::of_run(scenario, program).expect("bounded")[0];
+        let measurement = |scenario: &Scenario| Innovation::of_run(scenario, program).expect("bounded")[0];
         let change = |parameter: usize| {
             let h = 1e-5;
             let at = |share: f64| {
                 let mut shares = [0.0; 3];
                 shares[parameter] = share;
-                look(&changed(&scenario, shares)).covariance
+                measurement(&changed(&scenario, shares)).covariance
             };
-            look(&scenario).precision * (at(h) - at(-h)) / (2.0 * h)
+            measurement(&scenario).precision * (at(h) - at(-h)) / (2.0 * h)
         };
         let changes = [change(0), change(1), change(2)];
         Matrix3::from_fn(|i, j| 0.5 * (changes[i] * changes[j]).trace())
@@ -270,7 +270,7 @@ fn dense_truth_tells_more_the_denser_it_is() {
     let motions =
         [Motion::Straight { length_m: 2.0 }, Motion::Spin { turn_rad: 3.0 }, Motion::Straight { length_m: 2.0 }];
     let mut previous = Vector3::zeros();
-    // Each rate's looks are among the next one's, so that information grows for certain.
+    // Each rate's measurements are among the next one's, so that information grows for certain.
     for rate_hz in [1.25, 2.5, 5.0, 10.0, 20.0] {
         scenario.instruments = vec![capture(rate_hz)];
         let found = FisherInformation::of(&scenario, &[program(&motions)]).expect("bounded");
@@ -304,8 +304,8 @@ fn looks_are_those_of_the_simulator() {
         Motion::Measure,
         Motion::Arc { radius_m: 0.3, turn_rad: 1.0 },
     ]);
-    let looks_s = |scenario: &Scenario| -> Vec<f64> {
-        // The first look finds the start and is no innovation.
+    let measurements_s = |scenario: &Scenario| -> Vec<f64> {
+        // The first measurement finds the start and is no innovation.
         let innovations = Innovation::of_run(scenario, &motions).expect("bounded");
         std::iter::once(0.0).chain(innovations.iter().map(|innovation| innovation.t_s)).collect()
     };
@@ -323,16 +323,18 @@ fn looks_are_those_of_the_simulator() {
     // Any effect of speed makes the closed form take ramps apart; this one is too small to matter.
     ramped.effects.push(Effect::SlipSpeed(SlipSpeed { slip_s_m: 1e-12 }));
     for scenario in [&scenario, &ramped] {
-        let (looks_s, seen_s) = (looks_s(scenario), seen_s(scenario));
-        assert_eq!(looks_s.len(), seen_s.len());
+        let (measurements_s, seen_s) = (measurements_s(scenario), seen_s(scenario));
+        assert_eq!(measurements_s.len(), seen_s.len());
         // Clocks sum a hundred steps of seconds.
-        assert!(looks_s.iter().zip(&seen_s).all(|(look_s, seen_s)| (look_s - seen_s).abs() < 1e-12));
+        assert!(
+            measurements_s.iter().zip(&seen_s).all(|(measurement_s, seen_s)| (measurement_s - seen_s).abs() < 1e-12)
+        );
     }
-    assert!(looks_s(&ramped).len() > looks_s(&scenario).len(), "ramps take time");
+    assert!(measurements_s(&ramped).len() > measurements_s(&scenario).len(), "ramps take time");
     // A stepped robot settles: it is seen as often as its ramps say or a little more.
     ramped.engine = Engine::Stepping { step_s: 1e-3 };
-    let (looks, seen) = (looks_s(&ramped).len(), seen_s(&ramped).len());
-    assert!(looks <= seen && seen < looks + looks / 4, "{looks} {seen}");
+    let (measurements, seen) = (measurements_s(&ramped).len(), seen_s(&ramped).len());
+    assert!(measurements <= seen && seen < measurements + measurements / 4, "{measurements} {seen}");
 }
 
 #[test]

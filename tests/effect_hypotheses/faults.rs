@@ -56,20 +56,22 @@ fn one_rewriting_of_faulty_records_is_the_faultless_log_and_names_the_fault() {
     let faultless = drive(&perfect(), 2);
     for (id, sizes, remains) in GROSS {
         let mut scenario = perfect();
-        let fault = effects::effect_of_sizes(id, sizes).expect("an effect");
+        let fault = effects::effect_from_estimates(id, sizes).expect("an effect");
         scenario.effects = vec![fault.clone()];
         let faulty = drive(&scenario, 2);
         let Some(Hypothesis::Records(rewrite)) = effects::hypothesis(id) else { panic!("{id} rewrites records") };
         // Rounding of angles in turns.
         let allowed = remains + 1e-9;
         assert!(apart(&faulty, &faultless) > allowed, "{id} {sizes:?} harms nothing");
-        let rewritings = rewrite(&faulty);
-        let right = rewritings.iter().filter(|rewriting| apart(&rewriting.records, &faultless) <= allowed);
+        let corrections = rewrite(&faulty);
+        let right = corrections.iter().filter(|correction| apart(&correction.records, &faultless) <= allowed);
         let right: Vec<_> = right.collect();
-        let tried: Vec<_> =
-            rewritings.iter().map(|rewriting| (&rewriting.sentence, apart(&rewriting.records, &faultless))).collect();
+        let tried: Vec<_> = corrections
+            .iter()
+            .map(|correction| (&correction.sentence, apart(&correction.records, &faultless)))
+            .collect();
         assert_eq!(right.len(), 1, "{id} {sizes:?}: {tried:?}");
-        let named = effects::effect_of_sizes(id, &right[0].sizes).expect("its sizes make an effect");
+        let named = effects::effect_from_estimates(id, &right[0].sizes).expect("its sizes make an effect");
         named.physical().check().expect("and a physical one");
         if sizes[0].0 == "probability" {
             // A share of 1000 rows and more, or of 2000 counts: five standard deviations.
@@ -90,7 +92,7 @@ fn faultless_records_show_no_fault_that_leaves_a_mark_in_them() {
     let faultless = drive(&perfect(), 2);
     for id in CATALOGUE {
         let Some(Hypothesis::Records(rewrite)) = effects::hypothesis(id) else { continue };
-        let sentences: Vec<String> = rewrite(&faultless).into_iter().map(|rewriting| rewriting.sentence).collect();
+        let sentences: Vec<String> = rewrite(&faultless).into_iter().map(|correction| correction.sentence).collect();
         // Which column is which, and which way it counts, only what was seen outside can say: these two are always tried.
         let always = ["swapped_wheels", "reversed_wheel"].contains(id);
         assert_eq!(sentences.is_empty(), !always, "{id}: {sentences:?}");

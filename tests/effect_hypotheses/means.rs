@@ -1,13 +1,13 @@
-//! Mean terms: at the forward face's sizes they predict what was seen, at others they do not.
+//! Mean terms: at the simulation model's sizes they predict what was seen, at others they do not.
 
-use effects::{CATALOGUE, Effect, Hypothesis, Shape};
+use effects::{CATALOGUE, Effect, Hypothesis, Variant};
 
 use crate::watched::{Watch, drive, missed, perfect};
 
 /// An effect with sizes, as its hypothesis has them.
 struct Case {
     id: &'static str,
-    /// The shape parameter, or what the forward face needs besides.
+    /// The shape parameter, or what the simulation model needs besides.
     held: Option<(&'static str, f64)>,
     sizes: &'static [(&'static str, f64)],
     /// Share of the whole effect that may remain, and why.
@@ -78,19 +78,19 @@ const CASES: &[Case] = &[
 ];
 
 /// The shape of an effect's hypothesis that has these parameters, at these held values.
-fn shape(case: &Case) -> Shape {
-    let Some(Hypothesis::Terms(shapes)) = effects::hypothesis(case.id) else { panic!("{} has mean terms", case.id) };
+fn shape(case: &Case) -> Variant {
+    let Some(Hypothesis::Terms(variants)) = effects::hypothesis(case.id) else { panic!("{} has mean terms", case.id) };
     let names: Vec<&str> = case.sizes.iter().map(|(name, _)| *name).collect();
-    let fits = |shape: &Shape| {
+    let fits = |shape: &Variant| {
         let own: Vec<&str> = shape.term.parameters().iter().map(|parameter| parameter.name).collect();
         own == names && shape.held.iter().all(|held| case.held == Some(*held))
     };
-    shapes.into_iter().find(fits).unwrap_or_else(|| panic!("{}: no shape has {names:?} at {:?}", case.id, case.held))
+    variants.into_iter().find(fits).unwrap_or_else(|| panic!("{}: no shape has {names:?} at {:?}", case.id, case.held))
 }
 
 fn effect(case: &Case) -> Effect {
     let sizes: Vec<(&str, f64)> = case.sizes.iter().copied().chain(case.held).collect();
-    effects::effect_of_sizes(case.id, &sizes).unwrap_or_else(|| panic!("{}: the sizes make an effect", case.id))
+    effects::effect_from_estimates(case.id, &sizes).unwrap_or_else(|| panic!("{}: the sizes make an effect", case.id))
 }
 
 #[test]
@@ -142,27 +142,30 @@ fn every_mean_term_is_tried() {
 #[test]
 fn plausible_sizes_of_every_shape_make_a_physical_effect_that_says_the_same_sizes() {
     for id in CATALOGUE {
-        let Some(Hypothesis::Terms(shapes)) = effects::hypothesis(id) else { continue };
-        for Shape { held, term, .. } in shapes {
+        let Some(Hypothesis::Terms(variants)) = effects::hypothesis(id) else { continue };
+        for Variant { held, term, .. } in variants {
             let parameters = term.parameters();
-            assert!(!parameters.is_empty() && parameters.iter().all(|parameter| parameter.plausible > 0.0), "{id}");
+            assert!(!parameters.is_empty() && parameters.iter().all(|parameter| parameter.prior_sigma > 0.0), "{id}");
             let sizes = |scale: f64| {
-                let fitted = parameters.iter().map(move |parameter| (parameter.name, scale * parameter.plausible));
+                let fitted = parameters.iter().map(move |parameter| (parameter.name, scale * parameter.prior_sigma));
                 fitted.chain(held.iter().copied()).collect::<Vec<_>>()
             };
-            let [one, half] = [1.0, 0.5].map(|scale| effects::effect_of_sizes(id, &sizes(scale)).expect("an effect"));
+            let [one, half] =
+                [1.0, 0.5].map(|scale| effects::effect_from_estimates(id, &sizes(scale)).expect("an effect"));
             assert_eq!(one.id(), *id);
             one.physical().check().expect("plausible is physical");
             assert_ne!(one, half, "{id}: sizes are taken over");
-            assert!(effects::effect_of_sizes(id, &held).is_none(), "{id}: without its sizes there is none");
+            assert!(effects::effect_from_estimates(id, &held).is_none(), "{id}: without its sizes there is none");
         }
     }
-    assert!(effects::effect_of_sizes("motor_ripple", &[]).is_none());
+    assert!(effects::effect_from_estimates("motor_ripple", &[]).is_none());
     // What a fit finds of nothing, on the wrong side of 0: one wheel's is none, both wheels' or a single size is no effect.
-    let gaps = |left, right| effects::effect_of_sizes("backlash", &[("left_gap_m", left), ("right_gap_m", right)]);
+    let gaps =
+        |left, right| effects::effect_from_estimates("backlash", &[("left_gap_m", left), ("right_gap_m", right)]);
     assert_eq!(gaps(1e-3, -1e-5), gaps(1e-3, 0.0));
     assert!(gaps(1e-3, 0.0).is_some() && gaps(-1e-5, -1e-6).is_none());
-    let drag =
-        |drag_rad_m| effects::effect_of_sizes("castor_drag", &[("drag_rad_m", drag_rad_m), ("castor_behind_m", 0.2)]);
+    let drag = |drag_rad_m| {
+        effects::effect_from_estimates("castor_drag", &[("drag_rad_m", drag_rad_m), ("castor_behind_m", 0.2)])
+    };
     assert!(drag(0.1).is_some() && drag(-0.1).is_none() && drag(f64::NAN).is_none());
 }

@@ -1,6 +1,6 @@
 //! What only scatters: the signs that an effect says it leaves in a fit are there, and not in a faultless record.
 //!
-//! The signs are measured on what was seen less what the counts predict from look to look, over some runs; each measure is a pure number that is small
+//! The signs are measured on what was seen less what the counts predict from measurement to measurement, over some runs; each measure is a pure number that is small
 //! without the effect.
 
 use dataset::Dataset;
@@ -9,7 +9,7 @@ use kinematics::{Pose, Rule};
 
 use crate::watched::{drive, perfect};
 
-/// From one look to the next: what was missed of the motion, and the motion by the counts.
+/// From one measurement to the next: what was missed of the motion, and the motion by the counts.
 struct Missed {
     missed: Pose,
     counted: Pose,
@@ -22,7 +22,7 @@ fn look_by_look(dataset: &Dataset) -> Vec<Vec<Missed>> {
         view.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |t_s, pose| {
             reckoned.push((t_s, pose));
         });
-        // Looks and rows are made at the same instants; a standstill has a row of its own.
+        // Measurements and rows are made at the same instants; a standstill has a row of its own.
         let seen = view.observed_poses();
         let pairs: Vec<(Pose, Pose)> = seen
             .iter()
@@ -62,7 +62,7 @@ fn measure(sign: Sign, runs: &[Vec<Missed>]) -> f64 {
             mean(steps().map(|step| of(&step.missed).powi(4))) / second.powi(2) / 3.0 - 1.0
         }
     };
-    // Correlation of a step with the next: −½ where a look's error is undone, 0 where a jump stays.
+    // Correlation of a step with the next: −½ where a measurement's error is undone, 0 where a jump stays.
     let undone = |of: fn(&Pose) -> f64| {
         let second = mean(steps().map(|step| of(&step.missed).powi(2)));
         let product =
@@ -72,11 +72,11 @@ fn measure(sign: Sign, runs: &[Vec<Missed>]) -> f64 {
     let heading = |pose: &Pose| pose.theta_rad;
     let way = |pose: &Pose| pose.x_m;
     match sign {
-        Sign::IsolatedLooks => undone(way) * tails(way).signum().max(0.0),
+        Sign::IsolatedErrors => undone(way) * tails(way).signum().max(0.0),
         Sign::HeadingJumps => tails(heading) * (0.25 - undone(heading)).max(0.0),
-        Sign::WayJumps => tails(way) * (0.25 - undone(way)).max(0.0),
-        // White looks would undo half of each step in the next.
-        Sign::CorrelatedLooks => {
+        Sign::DistanceJumps => tails(way) * (0.25 - undone(way)).max(0.0),
+        // White measurements would undo half of each step in the next.
+        Sign::AutocorrelatedErrors => {
             if size(way) < ROUNDING {
                 0.0
             } else {
@@ -112,23 +112,23 @@ fn specimen(id: &str) -> Effect {
         "truth_outliers" => &[("probability", 0.02), ("jump_m", 0.05), ("jump_rad", 0.1)],
         other => panic!("no specimen of {other}"),
     };
-    effects::effect_of_sizes(id, sizes).expect("an effect")
+    effects::effect_from_estimates(id, sizes).expect("an effect")
 }
 
-/// Correlations of some thousand looks have a standard error of 0.02; kurtosis has no upper bound.
+/// Correlations of some thousand measurements have a standard error of 0.02; kurtosis has no upper bound.
 const SHOWS: f64 = 0.25;
 
 const SIGNS: [Sign; 7] = [
-    Sign::IsolatedLooks,
+    Sign::IsolatedErrors,
     Sign::HeadingJumps,
-    Sign::WayJumps,
-    Sign::CorrelatedLooks,
+    Sign::DistanceJumps,
+    Sign::AutocorrelatedErrors,
     Sign::ScatterWithTurn,
     Sign::ScatterWithSpeed,
     Sign::TailsAtLowSpeed,
 ];
 
-/// A slide lasts over several looks and comes at some speeds only, so that it has something of other signs too.
+/// A slide lasts over several measurements and comes at some speeds only, so that it has something of other signs too.
 const SLIDES: [&str; 2] = ["traction_loss", "stick_slip"];
 
 #[test]

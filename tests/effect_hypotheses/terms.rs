@@ -46,12 +46,12 @@ const CASES: [(Channel, &[&str], f64, f64); 38] = [
     (Channel::Yaw, &["|v|", "sin(theta)"], 0.03, 0.0),
     (Channel::Yaw, &["v"], 0.02, 0.0),
     (Channel::Yaw, &["omega", "|omega|"], 0.01, 0.0),
-    (Channel::SeenAlong, &["v"], 0.05, 0.06),
-    (Channel::SeenAcross, &["omega"], 0.02, 0.06),
-    (Channel::SeenAlong, &["cos(theta)"], 0.02, 0.0),
-    (Channel::SeenHeading, &["sin(theta)"], 0.02, 0.03),
-    (Channel::SeenHeading, &["1"], 0.02, 0.0),
-    (Channel::SeenLate, &["time in run"], 0.1, 0.06),
+    (Channel::OffsetAlong, &["v"], 0.05, 0.06),
+    (Channel::OffsetAcross, &["omega"], 0.02, 0.06),
+    (Channel::OffsetAlong, &["cos(theta)"], 0.02, 0.0),
+    (Channel::OffsetHeading, &["sin(theta)"], 0.02, 0.03),
+    (Channel::OffsetHeading, &["1"], 0.02, 0.0),
+    (Channel::MeasurementDelay, &["time in run"], 0.1, 0.06),
     (Channel::Wheels, &["wheel v", "|wheel v|"], 0.1, 0.0),
     // A wheel that starts within a row has its sense for all of it.
     (Channel::Wheels, &["wheel sense"], 0.003, 0.03),
@@ -79,8 +79,8 @@ fn recorded_data_show_a_term_at_its_size_and_at_no_other() {
     for (channel, covariates, coefficient, remains) in CASES {
         let term = term(channel, covariates, coefficient);
         let dataset = drive(&with(perfect(), &term), 2);
-        let Some(Hypothesis::Terms(shapes)) = Effect::Term(term).hypothesis() else { panic!("a mean term") };
-        let [mut shape] = <[_; 1]>::try_from(shapes).unwrap_or_else(|_| panic!("one shape"));
+        let Some(Hypothesis::Terms(variants)) = Effect::Term(term).hypothesis() else { panic!("a mean term") };
+        let [mut shape] = <[_; 1]>::try_from(variants).unwrap_or_else(|_| panic!("one shape"));
         let mut at = |factor: f64| missed(&dataset, &mut *shape.term, &[factor * coefficient], Watch::FromTheStart);
         let (whole, right) = (at(0.0), at(1.0));
         let allowed = remains * whole + HIDDEN;

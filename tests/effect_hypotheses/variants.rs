@@ -71,10 +71,10 @@ struct SpringyPlay {
 
 impl Forward for SpringyPlay {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { seed_run: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, _stream: Stream) {
+    fn seed_run(&mut self, _stream: Stream) {
         self.lead_m = Wheels::default();
     }
 
@@ -98,10 +98,10 @@ struct RollingCastor {
 
 impl Forward for RollingCastor {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, _stream: Stream) {
+    fn seed_run(&mut self, _stream: Stream) {
         self.psi_rad = 0.0;
     }
 
@@ -109,22 +109,22 @@ impl Forward for RollingCastor {
     fn floor(&mut self, step: &mut Step) {
         const TRAIL_M: f64 = 0.03;
         const BEHIND_M: f64 = 0.2;
-        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
+        let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right);
         let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
         let aside_m = BEHIND_M * turn_rad;
         let before_rad = self.psi_rad;
-        self.psi_rad -= turn_rad + (aside_m * before_rad.cos() + way_m * before_rad.sin()) / TRAIL_M;
+        self.psi_rad -= turn_rad + (aside_m * before_rad.cos() + distance_m * before_rad.sin()) / TRAIL_M;
         // Only a flip drags the tail: rolling on behind the robot does not.
-        let flips = way_m * before_rad.cos() < 0.0;
+        let flips = distance_m * before_rad.cos() < 0.0;
         step.extra_turn_rad += if flips { 0.01 * (before_rad - self.psi_rad) } else { 0.0 };
     }
 }
 
 /// The least that a mean term of one size for all its parameters leaves of what was seen, as a share of the whole, with that size; over all shapes.
 fn best(id: &str, dataset: &Dataset, unit: f64, watch: Watch) -> (f64, f64) {
-    let Some(Hypothesis::Terms(shapes)) = effects::hypothesis(id) else { panic!("{id} has mean terms") };
+    let Some(Hypothesis::Terms(variants)) = effects::hypothesis(id) else { panic!("{id} has mean terms") };
     let mut best = (f64::INFINITY, 0.0);
-    for mut shape in shapes {
+    for mut shape in variants {
         let parameters = shape.term.parameters().len();
         let whole = missed(dataset, &mut *shape.term, &vec![0.0; parameters], watch);
         for step in -40_i32..=40 {

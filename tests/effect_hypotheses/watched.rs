@@ -3,7 +3,7 @@
 use dataset::{Dataset, Protocol, ProtocolSettings, Run, WheelLog};
 use effects::Forward;
 use kinematics::{Increment, Pose, Twist, Wheels};
-use model_term::{Interval, Look, ModelTerm};
+use model_term::{Interval, Measurement, ModelTerm};
 use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
@@ -103,11 +103,11 @@ pub(crate) fn sum(gradient: &[Pose], sizes: &[f64]) -> Pose {
 /// From where a prediction starts.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Watch {
-    /// From each run's first look.
+    /// From each run's first measurement.
     FromTheStart,
     /// From 2 s on: what a run's start leaves unknown, such as where in its gap a wheel was left, is over by then.
     OnceMoving,
-    /// From each look to the next; the root of the mean square counts. For a term that follows the log's beat: where it loses it, at standstills, what it
+    /// From each measurement to the next; the root of the mean square counts. For a term that follows the log's beat: where it loses it, at standstills, what it
     /// misses once would stay in the heading.
     LookByLook,
 }
@@ -117,23 +117,23 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64],
     let from_s = if watch == Watch::OnceMoving { 2.0 } else { 0.0 };
     let geometry = dataset.robot.geometry().expect("valid");
     let ticks_per_rev = dataset.robot.ticks_per_rev.expect("ticks");
-    let (mut session_m, mut worst, mut squares, mut looks) = (0.0, 0.0_f64, 0.0, 0.0);
+    let (mut session_m, mut worst, mut squares, mut measurements) = (0.0, 0.0_f64, 0.0, 0.0);
     for run in &dataset.runs {
         term.restart(&run.info);
         let mut gradient = vec![Pose::IDENTITY; sizes.len()];
         let sighted = |term: &mut dyn ModelTerm, t_s, world_from_body, twist| {
             let mut gradient = vec![Pose::IDENTITY; sizes.len()];
-            term.sight(&Look { t_s, world_from_body, twist, run: &run.info }, &mut gradient);
+            term.measurement(&Measurement { t_s, world_from_body, twist, run: &run.info }, &mut gradient);
             sum(&gradient, sizes)
         };
         let seen = |k: usize| {
             let sample = &run.truth[k];
             Pose::new(sample.x_m, sample.y_m, sample.theta_rad().expect("poses"))
         };
-        // The first look is at the robot at rest.
+        // The first measurement is at the robot at rest.
         let body_from_seen = sighted(term, run.truth[0].t_s, seen(0), Twist::default());
         let mut pose = seen(0) * body_from_seen.inverse();
-        let (mut look, mut previous) = (1, None);
+        let (mut measurement, mut previous) = (1, None);
         for row in rows(run, ticks_per_rev) {
             let travel_m = row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
             let (previous_m, previous_dt_s) = previous.unwrap_or((Wheels::both(0.0), row.dt_s));
@@ -161,27 +161,28 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64],
                     distance_m: share * (base.distance_m + term_moves.x_m),
                     turn_rad: share * (base.turn_rad + term_moves.theta_rad),
                 };
-                increment.scattered_arc(0.0, share * term_moves.y_m).pose()
+                increment.perturbed_arc(0.0, share * term_moves.y_m).pose()
             };
             let twist = Twist { v_m_s: base.distance_m / row.dt_s, omega_rad_s: base.turn_rad / row.dt_s };
-            while look < run.truth.len() && run.truth[look].t_s <= row.t_s + row.dt_s + 1e-9 {
-                let t_s = run.truth[look].t_s;
+            while measurement < run.truth.len() && run.truth[measurement].t_s <= row.t_s + row.dt_s + 1e-9 {
+                let t_s = run.truth[measurement].t_s;
                 let here = pose * share((t_s - row.t_s) / row.dt_s);
                 let predicted = here * sighted(term, t_s, here, twist);
                 if t_s > from_s {
-                    worst = worst.max(difference(predicted, seen(look)));
-                    (squares, looks) = (squares + difference(predicted, seen(look)).powi(2), looks + 1.0);
+                    worst = worst.max(difference(predicted, seen(measurement)));
+                    (squares, measurements) =
+                        (squares + difference(predicted, seen(measurement)).powi(2), measurements + 1.0);
                 }
                 if t_s <= from_s || watch == Watch::LookByLook {
-                    pose = seen(look) * predicted.inverse() * pose;
+                    pose = seen(measurement) * predicted.inverse() * pose;
                 }
-                look += 1;
+                measurement += 1;
             }
             pose = pose * share(1.0);
             session_m += base.distance_m.abs();
         }
     }
-    if watch == Watch::LookByLook { (squares / looks).sqrt() } else { worst }
+    if watch == Watch::LookByLook { (squares / measurements).sqrt() } else { worst }
 }
 
 pub(crate) fn difference(a: Pose, b: Pose) -> f64 {

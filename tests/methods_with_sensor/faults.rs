@@ -276,17 +276,16 @@ fn an_interval_of_a_log_is_not_one_arc() {
     let simulation = sim_yair::simulate(&scenario, 9, 0).expect("simulates");
     let truth = true_geometry(&simulation);
     let session = simulation.dataset.session();
-    let mut excursions = Censi::DEFAULT.excursions(std::slice::from_ref(&session));
+    let mut samples = Censi::DEFAULT.samples(std::slice::from_ref(&session));
     let fitted = |fit: &CensiFit| {
         DriveGeometry::new(fit.radius_m.map(|radius_m| 2.0 * radius_m), fit.separation_m).expect("positive")
     };
-    let [by_rows, _] = solutions(&mut excursions.iter()).expect("exciting");
-    for excursion in &mut excursions {
-        let sum =
-            excursion.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad));
-        excursion.wheel_rad = vec![sum];
+    let [by_rows, _] = solutions(&mut samples.iter()).expect("exciting");
+    for sample in &mut samples {
+        let sum = sample.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad));
+        sample.wheel_rad = vec![sum];
     }
-    let [whole, _] = solutions(&mut excursions.iter()).expect("exciting");
+    let [whole, _] = solutions(&mut samples.iter()).expect("exciting");
     assert!(relative(&fitted(&by_rows.fit), &truth) < 1e-9);
     let off = relative(&fitted(&whole.fit), &truth);
     assert!((off - 0.089).abs() < 0.001, "{off}");

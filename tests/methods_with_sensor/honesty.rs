@@ -18,7 +18,7 @@ fn normalised(found: &Calibration, truth: &DriveGeometry, body_from_sensor: Pose
     let truth = [left, right, separation, x_m, y_m, theta_rad];
     DRIVE
         .into_iter()
-        .chain(Parameter::MOUNTING)
+        .chain(Parameter::EXTRINSICS)
         .zip(truth)
         .filter_map(|(parameter, truth)| {
             let found = found.estimate(parameter)?;
@@ -28,15 +28,15 @@ fn normalised(found: &Calibration, truth: &DriveGeometry, body_from_sensor: Pose
 }
 
 /// A path seen in displacements between instants about a second apart, each with errors of its own; a share of them lies far off.
-fn displaced(trial: &Dataset, number: u64, outliers: f64) -> Dataset {
+fn mahalanobis_distance(trial: &Dataset, number: u64, outliers: f64) -> Dataset {
     const NOISE: StreamName = StreamName::new("displacement");
     let mut seen = trial.clone();
     for (run, position) in seen.runs.iter_mut().zip(0..) {
         let mut stream = Address { seed: 31, point: 0, trial: number, run: position }.stream(NOISE);
         let pose =
             |sample: &dataset::TruthSample| Pose::new(sample.x_m, sample.y_m, sample.theta_rad().expect("a heading"));
-        let looks: Vec<_> = run.truth.iter().step_by(20).collect();
-        run.displacements = looks
+        let measurements: Vec<_> = run.truth.iter().step_by(20).collect();
+        run.displacements = measurements
             .windows(2)
             .map(|pair| {
                 let between = pose(pair[0]).to(pose(pair[1]));
@@ -67,7 +67,7 @@ fn mean_square(errors: &[Moments], trials: u32) -> Vec<f64> {
         .collect()
 }
 
-/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false alarm of 4e-4 a case. Trimming normal errors costs an efficiency
+/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false positive of 4e-4 a case. Trimming normal errors costs an efficiency
 /// that Fisher's information does not know of: 4 % dropped in each of position and heading, up to 1.3 of the variance were it iterated for ever.
 #[test]
 fn censi_finds_drive_and_mounting_and_knows_how_well() {
@@ -81,7 +81,7 @@ fn censi_finds_drive_and_mounting_and_knows_how_well() {
     let driven = |outliers: f64, method: Censi| {
         let (mut errors, mut separation_m) = ([Moments::default(); 6], Moments::default());
         for number in 0..trials {
-            let dataset = displaced(&simulation.dataset, number.into(), outliers);
+            let dataset = mahalanobis_distance(&simulation.dataset, number.into(), outliers);
             let found = method.calibrate(&[dataset.session()]).expect("straights and turns");
             let z = normalised(&found, &truth, MOUNTED);
             errors.iter_mut().zip(&z).for_each(|(errors, z)| errors.push(*z));

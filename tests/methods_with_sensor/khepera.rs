@@ -47,7 +47,7 @@ fn fit(found: &Calibration) -> CensiFit {
     CensiFit {
         radius_m: found.geometry.wheel_diameter_m().map(|diameter_m| 0.5 * diameter_m),
         separation_m: found.geometry.wheel_separation_m(),
-        body_from_sensor: found.mounting.expect("censi finds it").body_from_sensor,
+        body_from_sensor: found.extrinsics.expect("censi finds it").body_from_sensor,
     }
 }
 

@@ -108,13 +108,15 @@ fn without_noise_censi_gives_the_mounting_back() {
         point.body = MOUNTED.inverse() * point.body;
     }
     let found = Censi::DEFAULT.calibrate(&[simulation.dataset.session()]).expect("its own protocol");
-    let place = MOUNTED.to(found.mounting.expect("censi finds it").body_from_sensor);
+    let place = MOUNTED.to(found.extrinsics.expect("censi finds it").body_from_sensor);
     // Roundings as above, on a lever of 0.13 m.
     let off = place.x_m.abs().max(place.y_m.abs()).max(wrap_to_pi(place.theta_rad).abs());
     assert!(off < 1e-9, "{place:?}");
     assert!((found.geometry.wheel_separation_m() / 0.363 - 1.0).abs() < 1e-9);
     // The pose of the drive in the sensor's frame would not pass.
-    assert!(MOUNTED.inverse().position().distance_m(found.mounting.expect("found").body_from_sensor.position()) > 1e-2);
+    assert!(
+        MOUNTED.inverse().position().distance_m(found.extrinsics.expect("found").body_from_sensor.position()) > 1e-2
+    );
 }
 
 /// Which runs a method is left with.

@@ -7,7 +7,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 
 use super::{lengths, motion_capture, with_instrument_sigma};
 
-/// A look a second and a row of the log every 50 ms, as one stream in time.
+/// A measurement a second and a row of the log every 50 ms, as one stream in time.
 enum Row {
     Counts(Wheels<i64>),
     Pose(Pose),
@@ -32,7 +32,7 @@ fn once(session: &Session<'_>, noise: NoiseFilter) -> (AugmentedFilter<i64>, f64
     let m_per_count = nominal.m_per_count(session.robot.ticks_per_rev.expect("ticks")).expect("positive");
     let start = Pose::IDENTITY;
     let mut filter = AugmentedFilter::new(&nominal, m_per_count, 0.05, noise, start, Wheels::both(0_i64));
-    let (mut sum, mut looks) = (0.0, 0.0);
+    let (mut sum, mut measurements) = (0.0, 0.0);
     for run in &session.runs {
         let mut counts = Wheels::both(0);
         let mut begun = false;
@@ -46,7 +46,7 @@ fn once(session: &Session<'_>, noise: NoiseFilter) -> (AugmentedFilter<i64>, f64
                 }
                 Row::Pose(pose) if begun => {
                     sum += filter.update(pose).nis;
-                    looks += 1.0;
+                    measurements += 1.0;
                 }
                 Row::Pose(pose) => {
                     filter.restart(pose, counts);
@@ -55,7 +55,7 @@ fn once(session: &Session<'_>, noise: NoiseFilter) -> (AugmentedFilter<i64>, f64
             }
         }
     }
-    (filter, sum, looks)
+    (filter, sum, measurements)
 }
 
 fn errors_in_sigmas(filter: &AugmentedFilter<i64>, truth: &DriveGeometry) -> [f64; 3] {
@@ -64,7 +64,7 @@ fn errors_in_sigmas(filter: &AugmentedFilter<i64>, truth: &DriveGeometry) -> [f6
     std::array::from_fn(|i| (found[i] - truth[i]) / covariance[(i, i)].sqrt())
 }
 
-/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with three degrees of freedom a look: their sum lies
+/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with three degrees of freedom a measurement: their sum lies
 /// within 4.5 standard deviations √(6 n) (7e-6). Rejects a filter that is told wheels of half the noise.
 #[test]
 fn row_by_row_the_filter_finds_the_drive_and_its_innovations_are_as_large_as_it_says() {
@@ -82,9 +82,9 @@ fn row_by_row_the_filter_finds_the_drive_and_its_innovations_are_as_large_as_it_
         assert!(errors_in_sigmas(&filter, &truth).iter().all(|error| error.abs() < 4.5));
         assert!(filter.is_settled());
     }
-    let (_, sum, looks) = once(&session, told);
-    assert!((sum - 3.0 * looks).abs() < 4.5 * (6.0 * looks).sqrt(), "{sum} of {looks}");
+    let (_, sum, measurements) = once(&session, told);
+    assert!((sum - 3.0 * measurements).abs() < 4.5 * (6.0 * measurements).sqrt(), "{sum} of {measurements}");
     let half = NoiseFilter::new(of(0.5 * scenario.noise.wheel_sigma_m_per_sqrt_m), [true; 3]);
-    let (_, sum, looks) = once(&session, half);
-    assert!((sum - 3.0 * looks).abs() > 4.5 * (6.0 * looks).sqrt(), "{sum} of {looks}");
+    let (_, sum, measurements) = once(&session, half);
+    assert!((sum - 3.0 * measurements).abs() > 4.5 * (6.0 * measurements).sqrt(), "{sum} of {measurements}");
 }

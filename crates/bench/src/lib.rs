@@ -15,8 +15,8 @@ pub use bound::{FisherInformation, Innovation, NoBound};
 pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{
-    AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, Ended, EstimatorResult, FALSE_ALARM_BUDGET, Merged,
-    MethodCost, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan, SweepResult, TRACKED, can_be_written,
-    compare, merge, read_baseline, write_merged, write_results,
+    AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, EstimatorResult, FALSE_ALARM_BUDGET, Merged,
+    MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan, SweepResult, TRACKED,
+    can_be_written, compare, merge, read_baseline, write_merged, write_results,
 };
 pub use trial::Trial;

@@ -9,16 +9,16 @@ use sim_yair::SimulatedRobot;
 
 use super::draw::Draw;
 use super::hidden::{Act, EffectKind, Hidden, hideable};
-use super::looks::Watching;
-use super::oracle::{Shown, TrueNoise};
-use super::power::{TOLD_APART, detection_limit};
+use super::instrument::InstrumentModel;
+use super::oracle::{Detectability, TrueNoise};
+use super::power::{DISCRIMINATION_LEVEL, detection_limit};
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
 
 /// What a case asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Round {
+pub enum CaseKind {
     /// Nothing is hidden.
     Null,
     /// One effect is hidden.
@@ -35,7 +35,7 @@ const NULLS: u64 = 7;
 const SINGLES: u64 = 7;
 const PAIRS: u64 = 2;
 
-impl Round {
+impl CaseKind {
     /// The round of a case, and which of its kind it is.
     pub(crate) const fn of(number: u64) -> (Self, u64) {
         let (block, place) = (number / BLOCK, number % BLOCK);
@@ -79,9 +79,9 @@ pub struct OracleView {
 pub(crate) struct Case {
     seed: u64,
     number: u64,
-    pub(crate) round: Round,
+    pub(crate) round: CaseKind,
     pub(crate) robot: RandomRobot,
-    pub(crate) watching: Watching,
+    pub(crate) instrument_model: InstrumentModel,
     pub(crate) hidden: Vec<Hidden>,
     pub(crate) oracle: Vec<OracleView>,
     pub(crate) datasets: Vec<Dataset>,
@@ -127,7 +127,7 @@ struct Sight<'c> {
     seed: u64,
     number: u64,
     robot: &'c RandomRobot,
-    watching: &'c Watching,
+    instrument_model: &'c InstrumentModel,
 }
 
 fn drive_session(
@@ -145,7 +145,7 @@ fn drive_session(
     scenario.effects.extend(case.robot.harmless(ids));
     // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
     if noisy && point < HELD_OUT {
-        scenario.effects.extend(case.watching.class.effect().filter(|effect| !ids.contains(&effect.id())));
+        scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
     let mut more = Vec::new();
     for hidden in hidden {
@@ -160,16 +160,16 @@ fn drive_session(
     for (number, program) in (0_u32..).zip(&plan.programs) {
         let mut run = Run::default();
         robot.drive_into(program, &mut run)?;
-        // Each run's looks have draws of their own.
+        // Each run's measurements have draws of their own.
         let address = effects::Address { seed: case.seed, point, trial: case.number, run: number };
         let mut draw = Draw(address.stream(StreamName::new("challenge looks")));
-        case.watching.look(&mut run, noisy.then_some(&mut draw));
+        case.instrument_model.measurement(&mut run, noisy.then_some(&mut draw));
         runs.push(run);
     }
     Ok(Dataset {
         provenance: Provenance::default(),
         robot: robot.robot(),
-        truth_noise: case.watching.stated(),
+        truth_noise: case.instrument_model.stated(),
         points: Vec::new(),
         runs,
     })
@@ -178,10 +178,10 @@ fn drive_session(
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
     pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
-        let (round, place) = Round::of(number);
+        let (round, place) = CaseKind::of(number);
         for attempt in 0..ATTEMPTS {
             // Two that show on the same paths must be met; which, is drawn anew.
-            let ids = Self::ids(seed, number, round, place, if round == Round::Pair { attempt } else { 0 });
+            let ids = Self::ids(seed, number, round, place, if round == CaseKind::Pair { attempt } else { 0 });
             if let Some(case) = Self::attempt(seed, number, round, &ids, attempt)? {
                 return Ok(Ok(case));
             }
@@ -191,7 +191,7 @@ impl Case {
 
     /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn have a mean or scatter: a gross fault is one of
     /// a few discrete things.
-    fn ids(seed: u64, number: u64, round: Round, place: u64, attempt: u64) -> Vec<&'static str> {
+    fn ids(seed: u64, number: u64, round: CaseKind, place: u64, attempt: u64) -> Vec<&'static str> {
         let mut draw = Draw::of(seed, number, "what", attempt);
         let all = hideable();
         let of =
@@ -208,9 +208,9 @@ impl Case {
             list[draw.below(list.len())]
         };
         match round {
-            Round::Null => Vec::new(),
-            Round::Single => vec![one(0.1, 0.15)],
-            Round::Pair => {
+            CaseKind::Null => Vec::new(),
+            CaseKind::Single => vec![one(0.1, 0.15)],
+            CaseKind::Pair => {
                 let first = one(0.0, 0.0);
                 let mut second = one(0.0, 0.0);
                 while second == first {
@@ -218,59 +218,62 @@ impl Case {
                 }
                 vec![first, second]
             }
-            Round::LeftOut => vec![all[place as usize % all.len()].0],
+            CaseKind::LeftOut => vec![all[place as usize % all.len()].0],
         }
     }
 
     fn attempt(
         seed: u64,
         number: u64,
-        round: Round,
+        round: CaseKind,
         ids: &[&'static str],
         attempt: u64,
     ) -> Result<Option<Self>, ChallengeError> {
         let mut draw = Draw::of(seed, number, "robot", attempt);
         let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
         let robot = RandomRobot::draw(&mut draw, needs)?;
-        let watching = Watching::draw(&mut draw);
+        let instrument_model = InstrumentModel::draw(&mut draw);
         let mut hidden = Vec::new();
         for id in ids {
             let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(None) };
             hidden.push(effect);
         }
-        let sight = Sight { seed, number, robot: &robot, watching: &watching };
+        let measurement = Sight { seed, number, robot: &robot, instrument_model: &instrument_model };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
         let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: watching.variances() };
-        let ratios = if round == Round::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
+        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: instrument_model.variances() };
+        let ratios = if round == CaseKind::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
-        let plain = if weak { drive(&robot.sessions, &sight, &[], false, 0)? } else { Vec::new() };
-        let mut shown = Vec::new();
+        let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
+        let mut detectability = Vec::new();
         for effect in &mut hidden {
-            let seen = |effect: &Hidden| -> Result<Option<Shown>, ChallengeError> {
-                let exact = drive(&robot.sessions, &sight, &[effect], false, 0)?;
-                Ok(Shown::of(&exact, &plain, &truth, noise))
+            let seen = |effect: &Hidden| -> Result<Option<Detectability>, ChallengeError> {
+                let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
+                Ok(Detectability::of(&exact, &plain, &truth, noise))
             };
             match scale(effect, &mut draw, ratios, seen)? {
-                Chosen::Gross => shown.push(None),
-                Chosen::Shown(found) => shown.push(Some(*found)),
+                Chosen::Gross => detectability.push(None),
+                Chosen::Detectability(found) => detectability.push(Some(*found)),
                 Chosen::Unseen => return Ok(None),
             }
         }
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
-            let exact = drive(&robot.sessions, &sight, &all, false, 0)?;
-            Shown::of(&exact, &plain, &truth, noise)
+            let exact = drive(&robot.sessions, &measurement, &all, false, 0)?;
+            Detectability::of(&exact, &plain, &truth, noise)
         } else {
             None
         };
-        let oracle =
-            hidden.iter().enumerate().map(|(k, effect)| view(effect, k, &shown, both.as_ref(), &hidden)).collect();
-        let best = both.as_ref().or(shown.first().and_then(Option::as_ref));
-        let best_drive = best.map(Shown::best_drive);
-        let datasets = drive(&robot.sessions, &sight, &all, true, 0)?;
+        let oracle = hidden
+            .iter()
+            .enumerate()
+            .map(|(k, effect)| view(effect, k, &detectability, both.as_ref(), &hidden))
+            .collect();
+        let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));
+        let best_drive = best.map(Detectability::best_drive);
+        let datasets = drive(&robot.sessions, &measurement, &all, true, 0)?;
         let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, ChallengeError> {
-            Ok(drive(std::slice::from_ref(&robot.held_out), &sight, hidden, false, HELD_OUT)?.pop())
+            Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT)?.pop())
         };
         let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
         let mut held_out_by_chance = Vec::new();
@@ -281,7 +284,7 @@ impl Case {
             seed,
             number,
             round,
-            watching,
+            instrument_model,
             hidden,
             oracle,
             datasets,
@@ -297,15 +300,22 @@ impl Case {
     /// test between it and the true one by all that was driven.
     pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<More>, ChallengeError> {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
-        let sight = Sight { seed: self.seed, number: self.number, robot: &self.robot, watching: &self.watching };
+        let measurement = Sight {
+            seed: self.seed,
+            number: self.number,
+            robot: &self.robot,
+            instrument_model: &self.instrument_model,
+        };
         let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, ChallengeError> {
-            let mut all = drive(&self.robot.sessions, &sight, hidden, false, 0)?;
-            all.extend(drive(plans, &sight, hidden, false, PLANNED)?);
+            let mut all = drive(&self.robot.sessions, &measurement, hidden, false, 0)?;
+            all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
             Ok(all)
         };
-        let Some(shown) = Shown::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else { return Ok(None) };
-        let rivals = shown.rivals(effect.id, known(effect, &shown));
-        Ok(Some(More { datasets: drive(plans, &sight, &[effect], true, PLANNED)?, rivals }))
+        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else {
+            return Ok(None);
+        };
+        let rivals = detectability.rivals(effect.id, known(effect, &detectability));
+        Ok(Some(More { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
     }
 
     /// The drive that a calibration should find.
@@ -322,7 +332,7 @@ pub(crate) struct More {
 
 enum Chosen {
     Gross,
-    Shown(Box<Shown>),
+    Detectability(Box<Detectability>),
     Unseen,
 }
 
@@ -337,16 +347,16 @@ fn by_form(effect: &Hidden) -> bool {
 }
 
 /// Noncentrality of the test that knows the effect.
-fn known(effect: &Hidden, shown: &Shown) -> f64 {
-    if by_form(effect) { shown.noncentrality_in_form(effect.id) } else { shown.noncentrality() }
+fn known(effect: &Hidden, detectability: &Detectability) -> f64 {
+    if by_form(effect) { detectability.noncentrality_in_form(effect.id) } else { detectability.noncentrality() }
 }
 
 /// λ over that of the detection limit, as a ratio of sizes.
-fn ratio(effect: &Hidden, shown: &Shown) -> f64 {
+fn ratio(effect: &Hidden, detectability: &Detectability) -> f64 {
     match effect.kind {
-        EffectKind::Mean => (known(effect, shown) / detection_limit(shown.freedom(effect.id))).sqrt(),
+        EffectKind::Mean => (known(effect, detectability) / detection_limit(detectability.freedom(effect.id))).sqrt(),
         // λ grows with the fourth power of the size.
-        _ => (shown.scatter / TOLD_APART).powf(0.25),
+        _ => (detectability.scatter / DISCRIMINATION_LEVEL).powf(0.25),
     }
 }
 
@@ -355,7 +365,7 @@ fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
     (low, high): (f64, f64),
-    seen: impl Fn(&Hidden) -> Result<Option<Shown>, ChallengeError>,
+    seen: impl Fn(&Hidden) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
     if effect.kind == EffectKind::Gross {
         return Ok(Chosen::Gross);
@@ -394,14 +404,25 @@ fn scale(
     let off = wanted / found.1;
     let close = (1.0 / CLOSE..=CLOSE).contains(&off);
     // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
-    let described_better =
-        || found.0.rivals(effect.id, known(effect, &found.0)).first().is_some_and(|(_, left)| *left < -TOLD_APART);
+    let described_better = || {
+        found
+            .0
+            .rivals(effect.id, known(effect, &found.0))
+            .first()
+            .is_some_and(|(_, left)| *left < -DISCRIMINATION_LEVEL)
+    };
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > LEAST_SHARE && !described_better());
     let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_taken_up_by_lengths();
-    if close && of_its_kind && of_its_own { Ok(Chosen::Shown(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
+    if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 
-fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Shown>, others: &[Hidden]) -> OracleView {
+fn view(
+    effect: &Hidden,
+    place: usize,
+    detectability: &[Option<Detectability>],
+    both: Option<&Detectability>,
+    others: &[Hidden],
+) -> OracleView {
     let sizes = effect.sizes().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
     let mut view = OracleView {
         id: effect.id.to_owned(),
@@ -414,10 +435,10 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
         rivals: Vec::new(),
         aliases: Vec::new(),
     };
-    let Some(own) = shown[place].as_ref() else { return view };
+    let Some(own) = detectability[place].as_ref() else { return view };
     if effect.kind == EffectKind::Mean {
         let other = others.iter().position(|other| other.id != effect.id);
-        let other = other.and_then(|other| Some((&others[other], shown[other].as_ref()?)));
+        let other = other.and_then(|other| Some((&others[other], detectability[other].as_ref()?)));
         let noncentrality = match (both, other) {
             (Some(both), Some((other, _))) if by_form(effect) => both.noncentrality_beside(effect.id, other.id),
             (Some(both), Some((_, other))) => {
@@ -438,14 +459,15 @@ fn view(effect: &Hidden, place: usize, shown: &[Option<Shown>], both: Option<&Sh
     // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
     view.rivals =
         own.rivals(effect.id, known(effect, own)).into_iter().map(|(id, left)| (id.to_owned(), left)).collect();
-    view.aliases = view.rivals.iter().filter(|(_, left)| *left < TOLD_APART).map(|(id, _)| id.clone()).collect();
+    view.aliases =
+        view.rivals.iter().filter(|(_, left)| *left < DISCRIMINATION_LEVEL).map(|(id, _)| id.clone()).collect();
     view
 }
 
 /// How much of an effect's signature its own hypothesis takes up.
-fn form_share(effect: &Hidden, shown: &Shown) -> f64 {
-    let whole = shown.noncentrality();
-    if whole > 0.0 { shown.noncentrality_in_form(effect.id) / whole } else { 0.0 }
+fn form_share(effect: &Hidden, detectability: &Detectability) -> f64 {
+    let whole = detectability.noncentrality();
+    if whole > 0.0 { detectability.noncentrality_in_form(effect.id) / whole } else { 0.0 }
 }
 
 /// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
@@ -453,7 +475,7 @@ fn form_share(effect: &Hidden, shown: &Shown) -> f64 {
 pub(crate) struct Trial {
     seed: u64,
     robot: RandomRobot,
-    watching: Watching,
+    instrument_model: InstrumentModel,
     hidden: Hidden,
     noise: TrueNoise,
     truth: DriveGeometry,
@@ -463,46 +485,46 @@ pub(crate) struct Trial {
 
 #[cfg(test)]
 impl Trial {
-    /// The first robot that shows the effect, in its catalogue's form, under white noise and many looks.
+    /// The first robot that shows the effect, in its catalogue's form, under white noise and many measurements.
     pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, ChallengeError> {
         for attempt in 0..50 {
             let mut draw = Draw::of(seed, 0, "trial", attempt);
             let robot = RandomRobot::draw(&mut draw, Hidden::needs(id))?;
-            let watching = Watching::draw(&mut draw);
+            let instrument_model = InstrumentModel::draw(&mut draw);
             let Some(mut hidden) = Hidden::draw(id, &robot, &mut draw) else { continue };
-            let plainly =
-                watching.class == super::looks::NoiseClass::White && watching.kind == super::looks::TruthKind::Dense;
+            let plainly = instrument_model.class == super::instrument::NoiseClass::White
+                && instrument_model.kind == super::instrument::TruthKind::Dense;
             if !plainly || hidden.other_form {
                 continue;
             }
             let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
             let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: watching.variances() };
-            let sight = Sight { seed, number: 0, robot: &robot, watching: &watching };
-            let plain = drive(&robot.sessions, &sight, &[], false, 0)?;
+            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: instrument_model.variances() };
+            let measurement = Sight { seed, number: 0, robot: &robot, instrument_model: &instrument_model };
+            let plain = drive(&robot.sessions, &measurement, &[], false, 0)?;
             let mut noncentrality = 0.0;
             for _ in 0..4 {
-                let exact = drive(&robot.sessions, &sight, &[&hidden], false, 0)?;
-                let Some(shown) = Shown::of(&exact, &plain, &truth, noise) else { return Ok(None) };
-                noncentrality = shown.noncentrality_in_form(hidden.id);
-                let off = ratio(&hidden, &shown);
+                let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
+                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise) else { return Ok(None) };
+                noncentrality = detectability.noncentrality_in_form(hidden.id);
+                let off = ratio(&hidden, &detectability);
                 if (0.99..1.01).contains(&off) {
                     break;
                 }
                 hidden.scale /= off;
             }
-            return Ok(Some(Self { seed, robot, watching, hidden, noise, truth, plain, noncentrality }));
+            return Ok(Some(Self { seed, robot, instrument_model, hidden, noise, truth, plain, noncentrality }));
         }
         Ok(None)
     }
 
     /// The oracle's statistic on a drive with noise of its own, with the effect or without.
     pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
-        let Self { seed, robot, watching, .. } = self;
-        let sight = Sight { seed: *seed, number, robot, watching };
+        let Self { seed, robot, instrument_model, .. } = self;
+        let measurement = Sight { seed: *seed, number, robot, instrument_model };
         let all = [&self.hidden];
-        let data = drive(&robot.sessions, &sight, if hidden { &all } else { &[] }, true, 0)?;
-        let shown = Shown::of(&data, &self.plain, &self.truth, self.noise);
-        Ok(shown.map_or(0.0, |shown| shown.statistic(self.hidden.id)))
+        let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
+        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise);
+        Ok(detectability.map_or(0.0, |detectability| detectability.statistic(self.hidden.id)))
     }
 }

@@ -105,17 +105,17 @@ impl Hidden {
         positive: bool,
         draw: &mut Draw,
     ) -> Option<()> {
-        let Some(Hypothesis::Terms(shapes)) = hypothesis(self.id) else { return None };
-        let shape = &shapes[draw.below(shapes.len())];
-        self.held = held(shape.held.clone(), &self.host, &mut draw.0);
-        let parameters = shape.term.parameters();
+        let Some(Hypothesis::Terms(variants)) = hypothesis(self.id) else { return None };
+        let variant = &variants[draw.below(variants.len())];
+        self.held = held(variant.held.clone(), &self.host, &mut draw.0);
+        let parameters = variant.term.parameters();
         // Both wheels, or one of them.
         let spared = ["", "", "left_", "right_"][draw.below(4)];
         for attempt in 0..20 {
             self.sizes = parameters
                 .iter()
                 .map(|parameter| {
-                    let size = draw.0.normal() * parameter.plausible;
+                    let size = draw.0.normal() * parameter.prior_sigma;
                     let spared = !spared.is_empty() && parameter.name.starts_with(spared);
                     // A loss that is a gain is no effect: after some attempts every size is positive.
                     (
@@ -133,7 +133,7 @@ impl Hidden {
             let largest = parameters
                 .iter()
                 .zip(&self.sizes)
-                .map(|(parameter, (_, size))| (size / parameter.plausible).abs())
+                .map(|(parameter, (_, size))| (size / parameter.prior_sigma).abs())
                 .fold(0.0, f64::max);
             if largest == 0.0 {
                 continue;
@@ -157,7 +157,7 @@ impl Hidden {
         let sizes = self.sizes();
         if self.other_form {
             // Physical where the catalogue's form is.
-            effects::effect_of_sizes(self.id, &sizes)?;
+            effects::effect_from_estimates(self.id, &sizes)?;
             return self.benchmark.other_form.map(|form| Act::Other((form.forward)(&sizes, &self.host)));
         }
         effects::effect_at_scale(self.id, &sizes, self.scale, &self.host).map(Act::Catalogue)

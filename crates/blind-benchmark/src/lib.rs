@@ -10,7 +10,7 @@ mod case;
 mod draw;
 mod error;
 mod hidden;
-mod looks;
+mod instrument;
 mod measure;
 mod oracle;
 mod planned;
@@ -27,12 +27,12 @@ use rayon::prelude::*;
 
 use case::Case;
 
-pub use case::{OracleView, Round};
+pub use case::{CaseKind, OracleView};
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
-pub use looks::{NoiseClass, TruthKind};
+pub use instrument::{NoiseClass, TruthKind};
 pub use measure::Measure;
-pub use result::{CaseResult, Planned, Said};
+pub use result::{CaseResult, Planned, Reported};
 pub use robot::PathFamily;
 
 /// What comes of a campaign.

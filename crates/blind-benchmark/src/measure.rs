@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::case::{OracleView, Round};
+use super::case::{CaseKind, OracleView};
 use super::draw::Draw;
 use super::hidden::EffectKind;
-use super::looks::NoiseClass;
+use super::instrument::NoiseClass;
 use super::power::limits;
-use super::result::{CaseResult, Planned, Said};
+use super::result::{CaseResult, Planned, Reported};
 
 /// One measure against its bar.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -58,7 +58,7 @@ enum Naming {
     WrongSet,
 }
 
-fn naming(hidden: &OracleView, first: Option<&Said>) -> Naming {
+fn naming(hidden: &OracleView, first: Option<&Reported>) -> Naming {
     let Some(said) = first else { return Naming::Undetected };
     if said.names[0] == hidden.id {
         Naming::First
@@ -83,27 +83,27 @@ fn is_aliased(hidden: &OracleView) -> bool {
 
 /// All measures.
 pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
-    let of = |round: Round| cases.iter().filter(move |case| case.round == round);
+    let of = |round: CaseKind| cases.iter().filter(move |case| case.round == round);
     let alarm = |case: &CaseResult| case.findings().next().is_some();
     let mut measures = vec![
         share(
             "false_alarms",
             "nulls with an alarm",
-            count(of(Round::Null).filter(|case| case.noise == NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise == NoiseClass::White), alarm),
             0.05,
             true,
         ),
         share(
             "false_alarms_other_noise",
             "nulls with an alarm, other noise",
-            count(of(Round::Null).filter(|case| case.noise != NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise != NoiseClass::White), alarm),
             0.10,
             true,
         ),
         share(
             "nulls_unextended",
             "nulls left unextended",
-            count(of(Round::Null), |case: &CaseResult| !case.extended),
+            count(of(CaseKind::Null), |case: &CaseResult| !case.extended),
             0.95,
             false,
         ),
@@ -116,16 +116,16 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
     measures.push(gain(
         "gain",
         "gain over the oracle's",
-        &of(Round::Single).chain(of(Round::Pair)).collect::<Vec<_>>(),
+        &of(CaseKind::Single).chain(of(CaseKind::Pair)).collect::<Vec<_>>(),
         0.9,
     ));
     let white = |case: &&CaseResult| case.noise == NoiseClass::White;
-    let drawn: Vec<&CaseResult> = of(Round::Single).chain(of(Round::Pair)).filter(white).collect();
+    let drawn: Vec<&CaseResult> = of(CaseKind::Single).chain(of(CaseKind::Pair)).filter(white).collect();
     measures.push(Measure { met: None, ..gain("gain_white", "the same under white noise (shown only)", &drawn, 0.9) });
     measures.push(gain(
         "gain_left_out",
         "left out: gain over the oracle's",
-        &of(Round::LeftOut).collect::<Vec<_>>(),
+        &of(CaseKind::LeftOut).collect::<Vec<_>>(),
         0.7,
     ));
     measures.extend(probabilities(cases));
@@ -135,7 +135,7 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
 fn names(cases: &[CaseResult]) -> Vec<Measure> {
     let singles: Vec<(&OracleView, Naming, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == Round::Single)
+        .filter(|case| case.round == CaseKind::Single)
         .filter_map(|case| {
             let hidden = case.hidden.first()?;
             Some((hidden, naming(hidden, case.findings().next()), case))
@@ -180,7 +180,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     };
     let of: Vec<_> = sets().filter(|(_, planned)| planned.can_be_told()).collect();
     let can = of.len();
-    let shown = share(
+    let detectability = share(
         "sets_that_can_be_told",
         "sets that the oracle could tell after more runs (shown only)",
         (can, sets().count()),
@@ -195,7 +195,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
             0.9,
             false,
         ),
-        Measure { met: None, ..shown },
+        Measure { met: None, ..detectability },
     ]
 }
 
@@ -216,7 +216,7 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
 fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
     let said: Vec<(&OracleView, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == Round::LeftOut && case.findings().next().is_some())
+        .filter(|case| case.round == CaseKind::LeftOut && case.findings().next().is_some())
         .filter_map(|case| Some((case.hidden.first()?, case)))
         .collect();
     let outcome = |(hidden, case): &&(&OracleView, &CaseResult)| without(hidden, case);
@@ -276,7 +276,7 @@ fn pairs(cases: &[CaseResult]) -> Measure {
     let both = |case: &CaseResult| {
         case.hidden.iter().all(|hidden| case.findings().any(|said| said.names.contains(&hidden.id)))
     };
-    let counted = cases.iter().filter(|case| case.round == Round::Pair).filter(both_show);
+    let counted = cases.iter().filter(|case| case.round == CaseKind::Pair).filter(both_show);
     share("pairs", "pairs: both in the findings", count(counted, both), 0.85, false)
 }
 
@@ -287,7 +287,7 @@ fn gain(id: &'static str, what: &'static str, cases: &[&CaseResult], bar: f64) -
 
 /// Findings of singles and pairs: is the first name right as often as stated; do intervals cover?
 fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
-    let rounds = |case: &&CaseResult| matches!(case.round, Round::Single | Round::Pair);
+    let rounds = |case: &&CaseResult| matches!(case.round, CaseKind::Single | CaseKind::Pair);
     let findings: Vec<(f64, bool)> = cases
         .iter()
         .filter(rounds)
@@ -332,7 +332,7 @@ const BOOTSTRAPS: usize = 400;
 fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let mut points: Vec<(f64, f64)> = cases
         .iter()
-        .filter(|case| case.round == Round::Single && case.noise == NoiseClass::White)
+        .filter(|case| case.round == CaseKind::Single && case.noise == NoiseClass::White)
         .filter_map(|case| {
             let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
             Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))

@@ -1,7 +1,7 @@
 //! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
 //!
 //! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the drive that
-//! fits best without the effect, then sees what of the signature the lengths leave. Its χ² less what the drive's lengths take up is the noncentrality λ of the test that knows the effect; how
+//! fits best without the effect, then sees what of the signature the geometry parameters leave. Its χ² less what the drive's geometry parameters take up is the noncentrality λ of the test that knows the effect; how
 //! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
 //! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
 //! No measurement is rejected as an outlier.
@@ -11,14 +11,14 @@
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, hypothesis};
 use estimation::{
-    Column, Evidence, Gate, Information, Model, Noise, Records, Selection, Thinning, inverse, pass_with_innovations,
-    total,
+    Column, Information, Model, Noise, NormalEquations, OutlierGate, Records, Selection, Thinning, inverse,
+    pass_with_innovations, total,
 };
 use kinematics::DriveGeometry;
 use model_term::{ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector};
 
-/// What is known of the lengths before any data, as a share: the tool holds to nominal what it sees worse.
+/// What is known of the geometry parameters before any data, as a share: the tool holds to nominal what it sees worse.
 const LENGTHS_SD: f64 = 0.05;
 /// A rival's sizes are free up to so many times what is plausible.
 const RIVAL_SD: f64 = 10.0;
@@ -34,9 +34,9 @@ struct Candidate {
 }
 
 /// What noise-free runs show at the true drive.
-pub(crate) struct Shown {
-    /// At the lengths that a calibration without the effect would find: a turn lost all along a path is of second order in it before that.
-    total: Evidence,
+pub(crate) struct Detectability {
+    /// At the geometry parameters that a calibration without the effect would find: a turn lost all along a path is of second order in it before that.
+    total: NormalEquations,
     /// χ² of the signature at the true lengths.
     at_truth: f64,
     /// The drive with those lengths.
@@ -64,22 +64,23 @@ impl TrueNoise {
     }
 }
 
-/// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on average over the looks' errors.
+/// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    look(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * seen.total.chi_square)
+    measurement(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * seen.total.chi_square)
 }
 
-/// The same with the lengths and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
+/// The same with the geometry parameters and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
 pub(crate) fn misfit_of_form(
     datasets: &[Dataset],
     model: &Model,
     noise: TrueNoise,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> f64 {
-    let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain((0..model.sizes.len()).map(Column::Term)).collect();
+    let columns: Vec<Column> =
+        Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
     for _ in 0..=LENGTH_STEPS {
-        let Some(seen) = look(datasets, &model, noise, terms) else { return least };
+        let Some(seen) = measurement(datasets, &model, noise, terms) else { return least };
         least = least.min(0.5 * seen.total.chi_square);
         let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
@@ -88,28 +89,33 @@ pub(crate) fn misfit_of_form(
 }
 
 /// A pass over noise-free runs.
-struct Seen {
-    total: Evidence,
+struct NoiseFreePass {
+    total: NormalEquations,
     /// Whitened innovations, each with its run.
     z: Vec<((usize, usize), f64)>,
 }
 
-fn look(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Option<Seen> {
+fn measurement(
+    datasets: &[Dataset],
+    model: &Model,
+    noise: TrueNoise,
+    terms: &mut [Box<dyn ModelTerm>],
+) -> Option<NoiseFreePass> {
     let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
     let records = Records::of(&sessions);
     let selections = Selection::of(&records, Thinning::NONE, model);
-    let headings = vec![0.0; records.chains.len()];
-    let pass = pass_with_innovations(&records, &selections, model, &noise.noise(), &headings, terms, Gate::Open);
+    let headings = vec![0.0; records.segments.len()];
+    let pass = pass_with_innovations(&records, &selections, model, &noise.noise(), &headings, terms, OutlierGate::Off);
     let total = total(&pass.runs)?;
-    let z = pass.innovations.iter().flatten().map(|found| (records.chains[found.chain].run, found.z)).collect();
-    Some(Seen { total, z })
+    let z = pass.innovations.iter().flatten().map(|found| (records.segments[found.segment].run, found.z)).collect();
+    Some(NoiseFreePass { total, z })
 }
 
 /// Steps of Gauss and Newton to the best lengths.
 const LENGTH_STEPS: usize = 3;
 
-/// The step of the lengths to their best, without any effect.
-fn to_best_lengths(total: &Evidence, at: &[usize]) -> Option<DVector<f64>> {
+/// The step of the geometry parameters to their best, without any effect.
+fn to_best_lengths(total: &NormalEquations, at: &[usize]) -> Option<DVector<f64>> {
     let lengths = Information { matrix: total.block(at, at), gradient: total.gradient_of(at) };
     let (step, _) = lengths.with_precision(at.iter().map(|_| LENGTHS_SD.powi(-2))).solve()?;
     Some(step)
@@ -126,9 +132,9 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
         .sum()
 }
 
-impl Shown {
+impl Detectability {
     /// Looks at noise-free runs with every name's hypotheses at hand. `without` are the same runs without the effect: what they show, rounded counts and
-    /// looks between two rows, is not the effect's.
+    /// measurements between two rows, is not the effect's.
     pub(crate) fn of(
         datasets: &[Dataset],
         without: &[Dataset],
@@ -139,25 +145,25 @@ impl Shown {
         let mut candidates = Vec::new();
         let mut at = Column::BASE.len();
         for id in CATALOGUE {
-            let Some(shapes) = hypothesis(id).and_then(Hypothesis::into_shapes) else { continue };
-            for shape in shapes {
-                let parameters = shape.term.parameters().to_vec();
+            let Some(variants) = hypothesis(id).and_then(Hypothesis::into_variants) else { continue };
+            for variant in variants {
+                let parameters = variant.term.parameters().to_vec();
                 let columns = at..at + parameters.len();
                 at = columns.end;
-                candidates.push(Candidate { id, held: shape.held, parameters, columns });
-                terms.push(shape.term);
+                candidates.push(Candidate { id, held: variant.held, parameters, columns });
+                terms.push(variant.term);
             }
         }
         let free: Vec<usize> = Column::GEOMETRY.iter().map(|column| column.index()).collect();
         let mut model = Model::of(truth, at - Column::BASE.len());
-        let plain = look(without, &model, noise, &mut terms)?;
+        let plain = measurement(without, &model, noise, &mut terms)?;
         let mut at_truth = None;
-        let mut seen = look(datasets, &model, noise, &mut terms)?;
+        let mut seen = measurement(datasets, &model, noise, &mut terms)?;
         for _ in 0..LENGTH_STEPS {
             at_truth.get_or_insert(seen.total.chi_square);
             let step = to_best_lengths(&seen.total, &free)?;
             Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
-            seen = look(datasets, &model, noise, &mut terms)?;
+            seen = measurement(datasets, &model, noise, &mut terms)?;
         }
         if seen.z.len() == plain.z.len() {
             seen.total.gradient -= &plain.total.gradient;
@@ -165,17 +171,17 @@ impl Shown {
             seen.total.chi_square = seen.z.iter().map(|(_, z)| z * z).sum();
         }
         let at_truth = at_truth.unwrap_or(0.0);
-        let best = Model { sizes: Vec::new(), ..model };
+        let best = Model { term_values: Vec::new(), ..model };
         Some(Self { scatter: scatter(&seen.z), total: seen.total, at_truth, best, candidates, free })
     }
 
-    /// How much of χ² the lengths and some candidates take up at their best, and the candidates' sizes there with standard deviations.
+    /// How much of χ² the geometry parameters and some candidates take up at their best, and the candidates' sizes there with standard deviations.
     fn taken_up(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
         let mut at = self.free.clone();
         let mut prior: Vec<f64> = at.iter().map(|_| LENGTHS_SD.powi(-2)).collect();
         for candidate in candidates {
             at.extend(candidate.columns.clone());
-            prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.plausible).powi(-2)));
+            prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.prior_sigma).powi(-2)));
         }
         let free = Information { matrix: self.total.block(&at, &at), gradient: self.total.gradient_of(&at) };
         let Some((step, covariance)) = free.clone().with_precision(prior).solve() else { return (0.0, Vec::new()) };
@@ -183,17 +189,17 @@ impl Shown {
         (-free.gradient.dot(&step), values)
     }
 
-    /// The signature's χ² with the lengths at their best: noncentrality of the test by the true form.
+    /// The signature's χ² with the geometry parameters at their best: noncentrality of the test by the true form.
     pub(crate) fn noncentrality(&self) -> f64 {
         (self.total.chi_square - self.taken_up(&[]).0).max(0.0)
     }
 
-    /// Whether the drive's lengths take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
+    /// Whether the drive's geometry parameters take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
     pub(crate) fn is_taken_up_by_lengths(&self) -> bool {
         self.noncentrality() < 0.01 * self.at_truth
     }
 
-    /// The shape of a name that takes up most, beside the lengths, and how much: noncentrality of the test by the hypothesis's own form.
+    /// The shape of a name that takes up most, beside the geometry parameters, and how much: noncentrality of the test by the hypothesis's own form.
     fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
         let alone = self.taken_up(&[]).0;
         self.candidates
@@ -235,8 +241,9 @@ impl Shown {
                 let between = self.total.block(&own, &self.free);
                 let Some(inverse) = inverse(&free.matrix, 0.0) else { return 0 };
                 let left = self.total.block(&own, &own) - &between * inverse * between.transpose();
-                let plausible = |k: usize| candidate.parameters[k].plausible;
-                let scaled = DMatrix::from_fn(own.len(), own.len(), |i, j| left[(i, j)] * plausible(i) * plausible(j));
+                let prior_sigma = |k: usize| candidate.parameters[k].prior_sigma;
+                let scaled =
+                    DMatrix::from_fn(own.len(), own.len(), |i, j| left[(i, j)] * prior_sigma(i) * prior_sigma(j));
                 scaled.symmetric_eigenvalues().iter().filter(|value| **value >= 1.0).count()
             })
             .max()
@@ -251,7 +258,7 @@ impl Shown {
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
         for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {
             let (taken, values) = self.taken_up(&[candidate]);
-            let sizes: Vec<(&str, f64)> = candidate
+            let term_values: Vec<(&str, f64)> = candidate
                 .parameters
                 .iter()
                 .zip(&values)
@@ -260,7 +267,9 @@ impl Shown {
                 })
                 .chain(candidate.held.iter().copied())
                 .collect();
-            if effects::effect_of_sizes(candidate.id, &sizes).is_none() && sizes.iter().any(|(_, size)| *size != 0.0) {
+            if effects::effect_from_estimates(candidate.id, &term_values).is_none()
+                && term_values.iter().any(|(_, size)| *size != 0.0)
+            {
                 continue;
             }
             let left = own - (taken - alone);

@@ -6,12 +6,12 @@
 use std::f64::consts::TAU;
 
 use diagnose::{HANDLING_S, MINUTES, NextExperiment, Options, diagnose};
-use motion_programs::{Pace, Schedule};
+use motion_programs::{DriveLimits, Schedule};
 
 use super::case::{Case, More};
 use super::hidden::EffectKind;
-use super::power::TOLD_APART;
-use super::result::{CaseResult, Planned, Said, said};
+use super::power::DISCRIMINATION_LEVEL;
+use super::result::{CaseResult, Planned, Reported, said};
 use super::robot::{SessionPlan, programs_of};
 use crate::error::ChallengeError;
 
@@ -22,7 +22,7 @@ pub(crate) fn planned(
     next: Option<&NextExperiment>,
 ) -> Result<Option<Planned>, ChallengeError> {
     let [hidden] = &case.oracle[..] else { return Ok(None) };
-    let among = |said: &&Said| {
+    let among = |said: &&Reported| {
         said.names.contains(&hidden.id) && said.names.iter().filter(|name| *name != "unlisted").count() > 1
     };
     let (EffectKind::Mean, Some(found)) = (hidden.kind, result.findings().find(among)) else { return Ok(None) };
@@ -30,7 +30,7 @@ pub(crate) fn planned(
     let tells = |plans: Vec<SessionPlan>| -> Result<_, ChallengeError> {
         let more = drive(case, plans)?;
         let told = more.as_ref().is_some_and(|more| {
-            more.rivals.iter().filter(|(name, _)| others(name)).all(|(_, left)| *left >= TOLD_APART)
+            more.rivals.iter().filter(|(name, _)| others(name)).all(|(_, left)| *left >= DISCRIMINATION_LEVEL)
         });
         Ok((told, more))
     };
@@ -89,7 +89,7 @@ fn battery(case: &Case) -> Vec<SessionPlan> {
     let (shorter_m, longer_m) = (x_m.min(y_m), x_m.max(y_m));
     let robot = &case.robot.sessions[0].scenario.robot;
     let speed_m_s = case.robot.sessions.iter().map(|plan| plan.scenario.robot.cruise_speed_m_s).fold(0.0, f64::max);
-    let pace = Pace {
+    let drive_limits = DriveLimits {
         wheel_separation_m: robot.wheel_separation_m,
         cruise_speed_m_s: speed_m_s,
         acceleration_m_s2: robot.acceleration_m_s2,
@@ -102,7 +102,7 @@ fn battery(case: &Case) -> Vec<SessionPlan> {
         kinds.push(Schedule::Squares { side_m: shorter_m, runs_each_way: 1 });
         kinds.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
     }
-    let once: f64 = kinds.iter().flat_map(Schedule::programs).map(|program| pace.cost(&program).minutes).sum();
+    let once: f64 = kinds.iter().flat_map(Schedule::programs).map(|program| drive_limits.cost(&program).minutes).sum();
     let pairs = ((MINUTES / once) as u32).max(1);
     let all: Vec<Schedule> = kinds.iter().map(|kind| kind.with_pairs(pairs)).collect();
     vec![session(case, speed_m_s, &all)]

@@ -10,7 +10,7 @@ const LEVEL: f64 = 0.05;
 const POWER: f64 = 0.9;
 
 /// Noncentrality at which two names are told apart at the level and power above: their log likelihood ratio is N(±λ/2, λ), so √λ = z(0.95) + z(0.9).
-pub(crate) const TOLD_APART: f64 = 8.564;
+pub(crate) const DISCRIMINATION_LEVEL: f64 = 8.564;
 
 /// Power of a χ² test at 5 % with this noncentrality.
 pub(crate) fn power(freedom: f64, noncentrality: f64) -> f64 {

@@ -2,14 +2,14 @@
 
 use diagnose::Document;
 
-use super::case::{Case, OracleView, Round};
+use super::case::{Case, CaseKind, OracleView};
 use super::hidden::EffectKind;
-use super::looks::{NoiseClass, TruthKind};
+use super::instrument::{NoiseClass, TruthKind};
 use super::robot::PathFamily;
 
 /// One finding, as far as it is scored.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Said {
+pub struct Reported {
     /// Its names, most probable first.
     pub names: Vec<String>,
     /// Stated probability of the first name.
@@ -28,19 +28,19 @@ pub struct CaseResult {
     /// The case's number: with the seed, all that it takes to drive it again.
     pub case: u64,
     /// What was asked.
-    pub round: Round,
+    pub round: CaseKind,
     /// What was driven.
     pub paths: PathFamily,
     /// What the instrument showed.
     pub truth: TruthKind,
-    /// What the looks err by.
+    /// What the measurements err by.
     pub noise: NoiseClass,
-    /// Sessions, runs and looks.
+    /// Sessions, runs and measurements.
     pub counts: [usize; 3],
     /// What was hidden, as the oracle sees it.
     pub hidden: Vec<OracleView>,
     /// What was found.
-    pub said: Vec<Said>,
+    pub said: Vec<Reported>,
     /// Checks that failed at the end.
     pub failed_checks: Vec<String>,
     /// Why there is no diagnosis.
@@ -54,8 +54,8 @@ pub struct CaseResult {
 }
 
 impl CaseResult {
-    /// The findings that are not right anyway because of what the looks err by.
-    pub(crate) fn findings(&self) -> impl Iterator<Item = &Said> {
+    /// The findings that are not right anyway because of what the measurements err by.
+    pub(crate) fn findings(&self) -> impl Iterator<Item = &Reported> {
         let right = self.noise.right_answers();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
         self.said
@@ -85,7 +85,7 @@ pub struct Planned {
     /// The same after the battery.
     pub told_by_battery: bool,
     /// What was found after the planned runs.
-    pub said: Vec<Said>,
+    pub said: Vec<Reported>,
 }
 
 impl Planned {
@@ -97,7 +97,7 @@ impl Planned {
 }
 
 /// A diagnosis' findings, as far as they are scored.
-pub(crate) fn said(document: &Document, case: &Case) -> Vec<Said> {
+pub(crate) fn said(document: &Document, case: &Case) -> Vec<Reported> {
     document
         .findings
         .iter()
@@ -114,7 +114,7 @@ pub(crate) fn said(document: &Document, case: &Case) -> Vec<Said> {
                     })
                     .collect()
             });
-            Said {
+            Reported {
                 names: finding.names.clone(),
                 probability: finding.probability,
                 z: finding.z,

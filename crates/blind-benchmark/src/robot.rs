@@ -70,7 +70,7 @@ impl RandomRobot {
         base.log = Some(Log { interval_s: if draw.chance(0.5) { 0.05 } else { 0.025 } });
         for instrument in &mut base.instruments {
             if let scenario::Instrument::MotionCapture { rate_hz, sigma_xy_m, sigma_theta_rad, .. } = instrument {
-                // Noise-free: what the looks err by is added when they are chosen.
+                // Noise-free: what the measurements err by is added when they are chosen.
                 (*rate_hz, *sigma_xy_m, *sigma_theta_rad) = (RATE_HZ, 0.0, 0.0);
             }
         }
@@ -121,7 +121,7 @@ impl RandomRobot {
     }
 }
 
-/// Looks of the simulated instrument a second, of which a case takes some.
+/// Measurements of the simulated instrument a second, of which a case takes some.
 pub(crate) const RATE_HZ: f64 = 20.0;
 
 /// Radius of the tightest arc in wheelbases: the inner wheel runs at a sixth of the outer one's speed, which the controllers can still do.
@@ -144,10 +144,10 @@ fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw
     // Ways in seconds of driving, so that slow robots do not drive for hours.
     let speed_m_s = scenario.robot.cruise_speed_m_s;
     let tightest_m = TIGHTEST * scenario.robot.wheel_separation_m;
-    let mut way_m = |low_s: f64, high_s: f64| speed_m_s * draw.uniform(low_s, high_s);
-    let straights = Schedule::Straights { length_m: way_m(3.0, 7.0), runs: 2 * pairs(3.0, share) };
-    let squares = Schedule::Squares { side_m: way_m(2.0, 4.0), runs_each_way: pairs(2.0, share) };
-    let radius_m = way_m(1.0, 2.5).max(tightest_m);
+    let mut distance_m = |low_s: f64, high_s: f64| speed_m_s * draw.uniform(low_s, high_s);
+    let straights = Schedule::Straights { length_m: distance_m(3.0, 7.0), runs: 2 * pairs(3.0, share) };
+    let squares = Schedule::Squares { side_m: distance_m(2.0, 4.0), runs_each_way: pairs(2.0, share) };
+    let radius_m = distance_m(1.0, 2.5).max(tightest_m);
     let circles = Schedule::Circles { radius_m, turns: None, runs_each_way: pairs(2.0, share) };
     let schedules = match family {
         PathFamily::Protocols => {

@@ -2,11 +2,11 @@
 
 use dataset::Dataset;
 use diagnose::{Diagnosis, Options, Verdict, diagnose};
-use effects::{Hypothesis, Shape, hypothesis};
+use effects::{Hypothesis, Variant, hypothesis};
 use estimation::Model;
 use kinematics::DriveGeometry;
 
-use super::case::{Case, Round};
+use super::case::{Case, CaseKind};
 use super::hidden::{EffectKind, kind_of};
 use super::oracle::{misfit, misfit_of_form};
 use super::planned::planned;
@@ -16,7 +16,7 @@ use crate::error::ChallengeError;
 /// Diagnoses a case and scores it.
 pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeError> {
     let without = match case.round {
-        Round::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
+        CaseKind::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
         _ => Vec::new(),
     };
     let diagnosed = diagnose(&case.datasets, &Options { without });
@@ -33,8 +33,8 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
         case: number,
         round: case.round,
         paths: case.robot.family,
-        truth: case.watching.kind,
-        noise: case.watching.class,
+        truth: case.instrument_model.kind,
+        noise: case.instrument_model.class,
         counts,
         hidden: case.oracle.clone(),
         said: Vec::new(),
@@ -52,7 +52,7 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
             result.extended = !diagnosis.found.terms().is_empty();
             debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.said.is_empty());
             result.gain = gain(case, Some(&diagnosis))?;
-            if case.round == Round::Single {
+            if case.round == CaseKind::Single {
                 result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
             }
         }
@@ -85,19 +85,19 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
     Ok(Some([found, possible]))
 }
 
-/// What is left of the effects in which chance has a part, each alone, with its own term and the lengths at the sizes and in the shape that leave least.
+/// What is left of the effects in which chance has a part, each alone, with its own term and the geometry parameters at the sizes and in the shape that leave least.
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];
         let sizes = hidden.sizes();
         let of = |name: &str| sizes.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
-        let of_shape = |shape: Shape| {
+        let of_shape = |variant: Variant| {
             let mut model = Model::of(truth, 0);
-            model.sizes = shape.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
-            misfit_of_form(std::slice::from_ref(log), &model, case.noise, &mut [shape.term])
+            model.term_values = variant.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
+            misfit_of_form(std::slice::from_ref(log), &model, case.noise, &mut [variant.term])
         };
-        let shapes = hypothesis(hidden.id).and_then(Hypothesis::into_shapes)?;
-        Some((shapes.into_iter().map(of_shape).fold(f64::INFINITY, f64::min) - floor).max(0.0))
+        let variants = hypothesis(hidden.id).and_then(Hypothesis::into_variants)?;
+        Some((variants.into_iter().map(of_shape).fold(f64::INFINITY, f64::min) - floor).max(0.0))
     };
     case.held_out_by_chance.iter().filter_map(left).sum()
 }

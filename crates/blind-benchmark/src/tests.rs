@@ -84,6 +84,6 @@ fn rounds_take_turns_and_leave_every_effect_out_once() {
             .all(|kind| all.iter().any(|(_, of)| of == kind))
     );
     let places: Vec<u64> =
-        (0..200).map(Round::of).filter(|(round, _)| *round == Round::LeftOut).map(|(_, place)| place).collect();
+        (0..200).map(CaseKind::of).filter(|(round, _)| *round == CaseKind::LeftOut).map(|(_, place)| place).collect();
     assert_eq!(places, (0..40).collect::<Vec<u64>>());
 }

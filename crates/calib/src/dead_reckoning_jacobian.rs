@@ -1,4 +1,4 @@
-//! Dead reckoning with its derivatives by the three lengths of the drive, for methods that descend on a path's error.
+//! Dead reckoning with its derivatives by the three geometry parameters of the drive, for methods that descend on a path's error.
 //!
 //! Steps are exact arcs (kinematics, `Rule::ExactArc`): position `p += ΔS·sinc(Δθ/2)·u(θ + Δθ/2)`, heading `θ += Δθ`, with `ΔS = (r_R φ_R + r_L φ_L)/2` and
 //! `Δθ = (r_R φ_R − r_L φ_L)/B` (paper, eq. 1 to 3) for wheel turns φ. The derivatives are carried along step by step, so that they are exact too.
@@ -10,7 +10,7 @@ use crate::estimate::Parameter;
 
 /// The lengths that turn wheel turns into motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lengths {
+pub(crate) struct GeometryParameters {
     /// Travel of each wheel for a radian, metres: its radius.
     pub(crate) m_per_rad: Wheels<f64>,
     /// Distance between the wheel contacts, metres.
@@ -23,10 +23,10 @@ pub(crate) struct Step {
     /// Displacement in the frame in which the heading before the step was given, and turn.
     pub(crate) moved: Pose,
     /// ∂(displacement, turn)/∂(left radius, right radius, separation) of this step alone.
-    pub(crate) by_lengths: Matrix3<f64>,
+    pub(crate) by_geometry: Matrix3<f64>,
 }
 
-impl Lengths {
+impl GeometryParameters {
     /// The motion of wheel turns from a heading.
     pub(crate) fn step(&self, theta_rad: f64, wheel_rad: Wheels<f64>) -> Step {
         let travel_m = self.m_per_rad.zip_with(wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -39,48 +39,51 @@ impl Lengths {
         let by_turn = 0.5 * distance_m * (sinc_derivative(half_rad) * along + chord * across);
         let by_distance = RowVector3::new(0.5 * wheel_rad.left, 0.5 * wheel_rad.right, 0.0);
         let turn_by = RowVector3::new(-wheel_rad.left, wheel_rad.right, -turn_rad) / self.separation_m;
-        let mut by_lengths = Matrix3::zeros();
-        by_lengths.fixed_rows_mut::<2>(0).copy_from(&(chord * along * by_distance + by_turn * turn_by));
-        by_lengths.set_row(2, &turn_by);
-        Step { moved: Pose::new(moved.x, moved.y, turn_rad), by_lengths }
+        let mut by_geometry = Matrix3::zeros();
+        by_geometry.fixed_rows_mut::<2>(0).copy_from(&(chord * along * by_distance + by_turn * turn_by));
+        by_geometry.set_row(2, &turn_by);
+        Step { moved: Pose::new(moved.x, moved.y, turn_rad), by_geometry }
     }
 }
 
 /// A pose that is dead reckoned, and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reckoned {
+pub(crate) struct DeadReckoned {
     /// Where the robot is.
     pub(crate) pose: Pose,
     /// ∂(x, y, θ)/∂(left radius, right radius, separation).
-    pub(crate) by_lengths: Matrix3<f64>,
+    pub(crate) by_geometry: Matrix3<f64>,
 }
 
-impl Reckoned {
-    /// Standing at a pose that does not depend on the lengths.
+impl DeadReckoned {
+    /// Standing at a pose that does not depend on the geometry parameters.
     pub(crate) fn at(pose: Pose) -> Self {
-        Self { pose, by_lengths: Matrix3::zeros() }
+        Self { pose, by_geometry: Matrix3::zeros() }
     }
 
     /// Takes one step of the wheels, radians.
-    pub(crate) fn advance(&mut self, lengths: &Lengths, wheel_rad: Wheels<f64>) {
-        let Step { moved, by_lengths } = lengths.step(self.pose.theta_rad, wheel_rad);
+    pub(crate) fn advance(&mut self, geometry_parameters: &GeometryParameters, wheel_rad: Wheels<f64>) {
+        let Step { moved, by_geometry } = geometry_parameters.step(self.pose.theta_rad, wheel_rad);
         // A heading that is off turns the step: the displacement's quarter turn.
-        let heading = self.by_lengths.row(2).into_owned();
+        let heading = self.by_geometry.row(2).into_owned();
         let mut turned = Matrix3::zeros();
         turned.set_row(0, &(-moved.y_m * heading));
         turned.set_row(1, &(moved.x_m * heading));
-        self.by_lengths += by_lengths + turned;
+        self.by_geometry += by_geometry + turned;
         self.pose =
             Pose::new(self.pose.x_m + moved.x_m, self.pose.y_m + moved.y_m, self.pose.theta_rad + moved.theta_rad);
     }
 }
 
 /// The parameter that a direction in the relative sizes of left wheel, right wheel and separation stands for, and what to drive where it is not seen.
-pub(crate) fn unseen(direction: &Vector3<f64>) -> (Parameter, &'static str) {
+pub(crate) fn unobservable(direction: &Vector3<f64>) -> (Parameter, &'static str) {
     let sizes = direction.normalize().abs();
     // All three grow together: every turn stays, every length grows.
     if sizes.min() > 0.3 {
-        (Parameter::CommonScale, "the runs only turn on the spot, or close: add straight runs, or looks on the way")
+        (
+            Parameter::CommonScale,
+            "the runs only turn on the spot, or close: add straight runs, or measurements on the way",
+        )
     } else {
         match sizes.imax() {
             0 => (Parameter::LeftWheelDiameter, "that wheel hardly turns: add straight runs, and turns to both sides"),
@@ -95,31 +98,35 @@ mod tests {
     use super::*;
     use kinematics::DriveGeometry;
 
-    const LENGTHS: Lengths = Lengths { m_per_rad: Wheels { left: 0.0811, right: 0.0797 }, separation_m: 0.363 };
+    const LENGTHS: GeometryParameters =
+        GeometryParameters { m_per_rad: Wheels { left: 0.0811, right: 0.0797 }, separation_m: 0.363 };
 
     /// Straights, arcs, spins and standing, forward and backward; 20 rad of turn of a wheel and 2 m in all.
     const PATH: [(f64, f64); 8] =
         [(3.0, 3.0), (0.0, 0.0), (-2.0, 2.5), (4.0, 3.0), (-3.0, -1.0), (1e-7, 0.0), (5.0, 5.01), (-1.0, 3.0)];
 
-    fn reckon(lengths: &Lengths, steps: &[(f64, f64)]) -> Reckoned {
-        let mut reckoned = Reckoned::at(Pose::new(0.3, -0.2, 0.7));
+    fn reckon(geometry_parameters: &GeometryParameters, steps: &[(f64, f64)]) -> DeadReckoned {
+        let mut dead_reckoned = DeadReckoned::at(Pose::new(0.3, -0.2, 0.7));
         for &(left, right) in steps {
-            reckoned.advance(lengths, Wheels { left, right });
+            dead_reckoned.advance(geometry_parameters, Wheels { left, right });
         }
-        reckoned
+        dead_reckoned
     }
 
     #[test]
     fn the_jacobian_is_the_derivative_and_would_not_pass_wrong() {
         let h = 1e-6;
         for end in 1..=PATH.len() {
-            let reckoned = reckon(&LENGTHS, &PATH[..end]);
+            let dead_reckoned = reckon(&LENGTHS, &PATH[..end]);
             for column in 0..3 {
                 let moved = |by: f64| {
-                    let mut lengths = LENGTHS;
-                    *[&mut lengths.m_per_rad.left, &mut lengths.m_per_rad.right, &mut lengths.separation_m][column] +=
-                        by;
-                    let Pose { x_m, y_m, theta_rad } = reckon(&lengths, &PATH[..end]).pose;
+                    let mut geometry_parameters = LENGTHS;
+                    *[
+                        &mut geometry_parameters.m_per_rad.left,
+                        &mut geometry_parameters.m_per_rad.right,
+                        &mut geometry_parameters.separation_m,
+                    ][column] += by;
+                    let Pose { x_m, y_m, theta_rad } = reckon(&geometry_parameters, &PATH[..end]).pose;
                     [x_m, y_m, theta_rad]
                 };
                 let (plus, minus) = (moved(h), moved(-h));
@@ -127,7 +134,7 @@ mod tests {
                     let difference = (plus[row] - minus[row]) / (2.0 * h);
                     // Third derivatives stay under 2 m·(20/0.363)³ ≈ 3e5: truncation h²/6 of it 6e-8. Rounding 1e-15/1e-6 = 1e-9.
                     let tolerance = 1e-7;
-                    let found = reckoned.by_lengths[(row, column)];
+                    let found = dead_reckoned.by_geometry[(row, column)];
                     assert!((found - difference).abs() < tolerance, "{end} {row} {column}: {found} {difference}");
                     assert!((found + 1e-3 - difference).abs() > tolerance);
                 }
@@ -142,9 +149,9 @@ mod tests {
         let product = PATH.iter().fold(Pose::new(0.3, -0.2, 0.7), |pose, &(left, right)| {
             pose * geometry.increment(Wheels { left: 0.0811 * left, right: 0.0797 * right }).arc()
         });
-        let reckoned = reckon(&LENGTHS, &PATH).pose;
+        let dead_reckoned = reckon(&LENGTHS, &PATH).pose;
         // Eight steps of half a metre at most: a few roundings each.
-        assert!(reckoned.position().distance_m(product.position()) < 1e-14);
-        assert!((reckoned.theta_rad - product.theta_rad).abs() < 1e-14);
+        assert!(dead_reckoned.position().distance_m(product.position()) < 1e-14);
+        assert!((dead_reckoned.theta_rad - product.theta_rad).abs() < 1e-14);
     }
 }

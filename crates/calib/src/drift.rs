@@ -132,7 +132,7 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     let first_s = observed[0].0;
     let moved = if first_s > log_start_s + SAME_INSTANT_S {
         match at(&log, first_s, &mut 0) {
-            Some(reckoned) => start * reckoned.inverse(),
+            Some(dead_reckoned) => start * dead_reckoned.inverse(),
             None => return unknown(run, length_m, "the truth does not overlap the odometry in time"),
         }
     } else {
@@ -141,11 +141,11 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     let identity = moved == Pose::IDENTITY;
     let (mut row, mut largest, mut last) = (0, None::<(f64, f64)>, None);
     for (t_s, world_from_sensor) in &observed {
-        let Some(reckoned) = at(&log, *t_s, &mut row) else { continue };
-        let reckoned = if identity { reckoned } else { moved * reckoned };
+        let Some(dead_reckoned) = at(&log, *t_s, &mut row) else { continue };
+        let dead_reckoned = if identity { dead_reckoned } else { moved * dead_reckoned };
         let seen = *world_from_sensor * body_from_sensor.inverse();
-        let position_m = reckoned.position().distance_m(seen.position());
-        let heading_rad = wrap_to_pi(reckoned.theta_rad - seen.theta_rad).abs();
+        let position_m = dead_reckoned.position().distance_m(seen.position());
+        let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - seen.theta_rad).abs();
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
         largest = Some((position_m.max(max_position_m), heading_rad.max(max_heading_rad)));
         last = Some((position_m, heading_rad));

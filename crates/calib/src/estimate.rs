@@ -62,7 +62,7 @@ impl Parameter {
     ];
 
     /// The parameters of [`Mounting`], in the order of its covariance.
-    pub const MOUNTING: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
+    pub const EXTRINSICS: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
 }
 
 /// A value with its standard deviation.
@@ -81,7 +81,7 @@ pub type Covariance = DMatrix<f64>;
 
 /// Where the outside instrument sits on the robot, for methods that find it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mounting {
+pub struct Extrinsics {
     /// The instrument's frame on the robot.
     pub body_from_sensor: Pose,
     /// Covariance of x, y (m²) and heading (rad²), in this order; `None` when the data do not show a scatter.
@@ -90,7 +90,7 @@ pub struct Mounting {
 
 /// The instrument of a session or a run that stands apart from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OwnInstrument {
+pub struct GroupInstrument {
     /// The session's name, and the run's id where each run has its own.
     pub of: String,
     /// Ahead of the drive's centre, metres; `None`, as the others, where it is common to all or these runs do not show it.
@@ -133,11 +133,11 @@ pub struct Calibration {
     /// Covariance of the geometry; `None` when the data do not show a scatter (one run a direction, say).
     pub covariance: Option<Covariance>,
     /// Where the outside instrument sits on the robot; `None` for methods that take it to be at the drive's centre.
-    pub mounting: Option<Mounting>,
+    pub extrinsics: Option<Extrinsics>,
     /// How late the outside instrument stamps what it sees, seconds, with one standard deviation; `None` for methods that take it to be in time.
     pub latency_s: Option<(f64, Option<f64>)>,
     /// Mountings and latencies that sessions or runs have for themselves; the two above are then their means.
-    pub own_instruments: Vec<OwnInstrument>,
+    pub group_instruments: Vec<GroupInstrument>,
     /// What the data do not determine.
     pub not_observable: Vec<NotObservable>,
     /// How many runs the values rest on.
@@ -160,9 +160,9 @@ impl Calibration {
             geometry,
             ticks_per_rev,
             covariance: None,
-            mounting: None,
+            extrinsics: None,
             latency_s: None,
-            own_instruments: Vec::new(),
+            group_instruments: Vec::new(),
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
@@ -194,16 +194,16 @@ impl Calibration {
     }
 
     fn mounted(&self, parameter: Parameter) -> Option<Estimate> {
-        let mounting = self.mounting?;
-        let row = Parameter::MOUNTING.iter().position(|of| *of == parameter)?;
-        let Pose { x_m, y_m, theta_rad } = mounting.body_from_sensor;
-        let sigma = mounting.covariance.map(|covariance| covariance[(row, row)].sqrt());
+        let extrinsics = self.extrinsics?;
+        let row = Parameter::EXTRINSICS.iter().position(|of| *of == parameter)?;
+        let Pose { x_m, y_m, theta_rad } = extrinsics.body_from_sensor;
+        let sigma = extrinsics.covariance.map(|covariance| covariance[(row, row)].sqrt());
         Some(Estimate { parameter, value: [x_m, y_m, theta_rad][row], sigma })
     }
 
     /// Remarks on values that are far from nominal: calibration corrects per cents, and a factor is a fault of another kind.
     #[must_use]
-    pub fn hard_to_believe(&self, robot: &NominalRobot) -> Vec<String> {
+    pub fn plausibility_warnings(&self, robot: &NominalRobot) -> Vec<String> {
         let nominal = [
             (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
             (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
@@ -222,7 +222,7 @@ impl Calibration {
 
     /// Every value that the method has.
     pub fn estimates(&self) -> impl Iterator<Item = Estimate> + '_ {
-        let all = Parameter::ESTIMATED.into_iter().chain(Parameter::MOUNTING);
+        let all = Parameter::ESTIMATED.into_iter().chain(Parameter::EXTRINSICS);
         all.chain([Parameter::Latency]).filter_map(|parameter| self.estimate(parameter))
     }
 }

@@ -20,7 +20,8 @@ pub use compare::{
 pub use drift::{CalibrationDrift, RunDrift, evaluate};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
-    CalibError, Calibration, Covariance, Estimate, Method, Mounting, NotObservable, OwnInstrument, Parameter, Rejected,
+    CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, Parameter,
+    Rejected,
 };
 pub use methods::{METHODS, method};
 pub use report::{

@@ -1,15 +1,15 @@
-//! What an outside instrument's poses say of a run: looks far enough apart, and how the wheels turned between them.
+//! What an outside instrument's poses say of a run: measurements far enough apart, and how the wheels turned between them.
 //!
 //! An instrument that looks twenty times a second says little more of the wheels than one that looks once a metre, and what is wrong with its clock or with a
-//! start from standstill is in every one of its looks.
+//! start from standstill is in every one of its measurements.
 
 use dataset::{NominalRobot, RunView, Session};
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
 
 use crate::estimate::{CalibError, Rejected};
-use estimation::WheelTrack;
+use estimation::WheelAngleInterpolator;
 
-/// How far the nominal robot moves from look to look.
+/// How far the nominal robot moves from measurement to measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spacing {
     /// Travel of its centre, metres, …
@@ -19,14 +19,14 @@ pub(crate) struct Spacing {
 }
 
 impl Spacing {
-    /// From the first look within the log to the last one.
+    /// From the first measurement within the log to the last one.
     pub(crate) const ENDS: Self = Self { every_m: f64::INFINITY, every_rad: f64::INFINITY };
 }
 
-/// A later look.
+/// A later measurement.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Look {
-    /// Turns of the wheels since the look before, row by row, radians.
+pub(crate) struct PoseMeasurement {
+    /// Turns of the wheels since the measurement before, row by row, radians.
     pub(crate) wheel_rad: Vec<Wheels<f64>>,
     /// What was seen, in the room; whole turns since the start are counted.
     pub(crate) pose: Pose,
@@ -34,20 +34,20 @@ pub(crate) struct Look {
 
 /// The looks at one run.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Looks<'a> {
+pub(crate) struct PoseMeasurements<'a> {
     /// The run's id.
     pub(crate) run: &'a str,
-    /// The first look within the log.
+    /// The first measurement within the log.
     pub(crate) start: Pose,
     /// Those after it, the last within the log included.
-    pub(crate) later: Vec<Look>,
+    pub(crate) later: Vec<PoseMeasurement>,
 }
 
-impl<'a> Looks<'a> {
+impl<'a> PoseMeasurements<'a> {
     /// The looks at a run; `None` when fewer than two poses lie within its log, or the log has gaps.
     pub(crate) fn at(
         run: &RunView<'a>,
-        track: &WheelTrack<'_>,
+        track: &WheelAngleInterpolator<'_>,
         nominal: &DriveGeometry,
         spacing: Spacing,
     ) -> Option<Self> {
@@ -70,7 +70,7 @@ impl<'a> Looks<'a> {
             // Whole turns come from the wheels, a pose at a time.
             theta_rad = unwrap_near(seen.theta_rad, theta_rad + turned_rad);
             if distance_m >= spacing.every_m || turn_rad >= spacing.every_rad || number + 1 == within {
-                later.push(Look { wheel_rad: track.steps(from_s, t_s)?, pose: Pose { theta_rad, ..seen } });
+                later.push(PoseMeasurement { wheel_rad: track.steps(from_s, t_s)?, pose: Pose { theta_rad, ..seen } });
                 (from_s, distance_m, turn_rad) = (t_s, 0.0, 0.0);
             }
         }
@@ -86,40 +86,41 @@ impl<'a> Looks<'a> {
         sessions: &[Session<'a>],
         spacing: Spacing,
     ) -> Result<(Vec<Self>, Vec<Rejected>), CalibError> {
-        let (mut looks, mut rejected) = (Vec::new(), Vec::new());
+        let (mut measurements, mut rejected) = (Vec::new(), Vec::new());
         for session in sessions {
             let nominal = session.robot.geometry().map_err(|source| CalibError::NotADrive { method, source })?;
             for run in session.runs.iter().filter(|run| run.observed_ends().is_some()) {
-                let Some(track) = WheelTrack::of(run, session.robot) else { continue };
+                let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
                 match Self::at(run, &track, &nominal, spacing) {
-                    Some(found) => looks.push(found),
+                    Some(found) => measurements.push(found),
                     None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_LOOKS.to_owned() }),
                 }
             }
         }
-        if looks.is_empty() {
+        if measurements.is_empty() {
             let first = rejected.first().map(|rejected| format!("; {}: {}", rejected.run, rejected.why));
             let why = format!("{NO_POSES}{}", first.unwrap_or_default());
             return Err(CalibError::NotApplicable { method, why });
         }
-        Ok((looks, rejected))
+        Ok((measurements, rejected))
     }
 }
 
 /// Where a run was first and last seen, and how the wheels turned in between.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Ends {
+pub(crate) struct ConvergenceCriterion {
     pub(crate) start: Pose,
     /// Whole turns since the start are counted.
     pub(crate) end: Pose,
     wheel_rad: Vec<Wheels<f64>>,
 }
 
-impl Ends {
-    /// The first and the last look within the log; `None` as for [`Looks::at`].
+impl ConvergenceCriterion {
+    /// The first and the last measurement within the log; `None` as for [`Looks::at`].
     pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
-        let Looks { start, mut later, .. } = Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
-        let Look { wheel_rad, pose } = later.pop()?;
+        let PoseMeasurements { start, mut later, .. } =
+            PoseMeasurements::at(run, &WheelAngleInterpolator::of(run, robot)?, nominal, Spacing::ENDS)?;
+        let PoseMeasurement { wheel_rad, pose } = later.pop()?;
         Some(Self { start, end: pose, wheel_rad })
     }
 
@@ -129,7 +130,7 @@ impl Ends {
     }
 
     /// Where the robot ends by its wheels, from the origin, by the midpoint rule.
-    pub(crate) fn reckoned(&self, geometry: &DriveGeometry) -> Pose {
+    pub(crate) fn dead_reckoned(&self, geometry: &DriveGeometry) -> Pose {
         self.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
             pose * geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad)).midpoint()
         })
@@ -184,20 +185,28 @@ mod tests {
     fn looks_are_spaced_end_with_the_log_and_count_whole_turns() {
         let dataset = dataset(true);
         let spacing = Spacing { every_m: 0.5, every_rad: 4.0 };
-        let (looks, rejected) = Looks::of_all("test", &[dataset.session()], spacing).expect("poses");
+        let (measurements, rejected) = PoseMeasurements::of_all("test", &[dataset.session()], spacing).expect("poses");
         assert!(rejected.is_empty());
-        let looks = &looks[0];
+        let measurements = &measurements[0];
         // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at 27.75 s.
-        assert_eq!(looks.start.x_m, 0.0625);
-        let xs: Vec<f64> = looks.later.iter().take(4).map(|look| look.pose.x_m).collect();
+        assert_eq!(measurements.start.x_m, 0.0625);
+        let xs: Vec<f64> = measurements.later.iter().take(4).map(|measurement| measurement.pose.x_m).collect();
         assert_eq!(xs, [0.5625, 1.0625, 1.5625, 2.0]);
-        let last = looks.later.last().expect("looks");
+        let last = measurements.later.last().expect("looks");
         assert!((last.pose.theta_rad - (3.0 + 19.75)).abs() < 1e-12, "{}", last.pose.theta_rad);
-        let turned: f64 = looks.later.iter().flat_map(|look| &look.wheel_rad).map(|rad| rad.right - rad.left).sum();
+        let turned: f64 = measurements
+            .later
+            .iter()
+            .flat_map(|measurement| &measurement.wheel_rad)
+            .map(|rad| rad.right - rad.left)
+            .sum();
         // 19.75 rad over 0.25 m on wheels of 1/2π m radius.
         assert!((turned / std::f64::consts::TAU * 1.0 / 0.25 - 19.75).abs() < 1e-12);
         // From end to end.
-        assert_eq!(Looks::of_all("test", &[dataset.session()], Spacing::ENDS).expect("poses").0[0].later.len(), 1);
+        assert_eq!(
+            PoseMeasurements::of_all("test", &[dataset.session()], Spacing::ENDS).expect("poses").0[0].later.len(),
+            1
+        );
     }
 
     #[test]
@@ -206,7 +215,9 @@ mod tests {
         let mut late = dataset(true);
         late.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s += 100.0);
         for dataset in [dataset(false), late] {
-            let why = Looks::of_all("test", &[dataset.session()], spacing).expect_err("no looks").to_string();
+            let why = PoseMeasurements::of_all("test", &[dataset.session()], spacing)
+                .expect_err("no measurements")
+                .to_string();
             assert!(
                 why.contains("two instants") && why.ends_with("a: its log has gaps, or does not span two of its poses"),
                 "{why}"

@@ -8,7 +8,7 @@ use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{CalibError, Calibration, OwnInstrument, Parameter};
+use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter};
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -83,7 +83,8 @@ pub struct MethodReport {
     pub parameters: BTreeMap<String, ReportedValue>,
     /// Instruments that sessions or runs have for themselves, null where these runs do not show it; their means stand among the parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub own_instruments: Vec<OwnInstrument>,
+    #[serde(rename = "own_instruments")]
+    pub group_instruments: Vec<GroupInstrument>,
     /// What the data do not determine.
     #[serde(default)]
     pub not_observable: Vec<ReportedBlindness>,
@@ -162,7 +163,7 @@ impl MethodReport {
             method: method.to_owned(),
             error: None,
             parameters: BTreeMap::new(),
-            own_instruments: Vec::new(),
+            group_instruments: Vec::new(),
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
@@ -185,7 +186,7 @@ impl MethodReport {
                 .estimates()
                 .map(|estimate| (estimate.parameter.key().to_owned(), value(estimate)))
                 .collect(),
-            own_instruments: calibration.own_instruments.clone(),
+            group_instruments: calibration.group_instruments.clone(),
             not_observable: calibration
                 .not_observable
                 .iter()
@@ -202,7 +203,7 @@ impl MethodReport {
                 .collect(),
             one_step: calibration.one_step,
             converged: calibration.converged,
-            warnings: calibration.hard_to_believe(nominal),
+            warnings: calibration.plausibility_warnings(nominal),
             ..empty
         }
     }
@@ -246,7 +247,7 @@ impl CalibrationReport {
         for method in &report.methods {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
                 let length =
-                    !Parameter::MOUNTING.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
+                    !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
                 !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
             }) {
                 let message = format!(
@@ -318,7 +319,7 @@ impl NamedCalibration {
     #[must_use]
     pub fn body_from_sensor(&self) -> Pose {
         let [x_m, y_m, theta_rad] =
-            Parameter::MOUNTING.map(|parameter| self.values.get(parameter.key()).copied().unwrap_or(0.0));
+            Parameter::EXTRINSICS.map(|parameter| self.values.get(parameter.key()).copied().unwrap_or(0.0));
         Pose::new(x_m, y_m, theta_rad)
     }
 }
@@ -332,7 +333,7 @@ mod tests {
         CalibrationReport {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
-                own_instruments: Vec::new(),
+                group_instruments: Vec::new(),
                 method: "umbmark".to_owned(),
                 error: None,
                 parameters: [
@@ -346,7 +347,7 @@ mod tests {
                 }],
                 runs_used: 6,
                 runs_rejected: vec![ReportedRejection { run: "run-01".to_owned(), why: "far".to_owned() }],
-                one_step: Some(OneStep { looks: 1_000_000, first_looks: 65_536, passes: 1 }),
+                one_step: Some(OneStep { measurements: 1_000_000, first_measurements: 65_536, passes: 1 }),
                 converged: true,
                 warnings: Vec::new(),
             }],

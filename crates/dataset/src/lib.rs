@@ -5,11 +5,11 @@
 //! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
 //! simulator here, a real robot elsewhere.
 
-mod ahead;
 mod counter;
 mod error;
 pub mod import;
 mod imported;
+mod prefetch;
 mod read;
 mod record;
 mod session;
@@ -17,9 +17,9 @@ mod table;
 mod warning;
 mod write;
 
-pub use ahead::read_ahead;
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
+pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,

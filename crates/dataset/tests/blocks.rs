@@ -8,7 +8,7 @@ use dataset::{
 };
 use kinematics::Wheels;
 
-fn run(id: &str, rows: usize, looks: usize) -> Run {
+fn run(id: &str, rows: usize, measurements: usize) -> Run {
     let times = |rows: usize, step_s: f64| (0..rows).map(move |row| row as f64 * step_s);
     let counts = |by: i64| (0..i64::try_from(rows).expect("small")).map(move |row| row * by).collect();
     let odometry = Odometry {
@@ -16,8 +16,9 @@ fn run(id: &str, rows: usize, looks: usize) -> Run {
         wheels: WheelLog::Ticks(Wheels { left: counts(7), right: counts(-9) }),
         ..Odometry::default()
     };
-    // Looks from before the log until after it.
-    let truth = times(looks, 0.0137).map(|t_s| TruthSample::new(t_s - 1.0, t_s, -t_s, Some(0.5 * t_s))).collect();
+    // Measurements from before the log until after it.
+    let truth =
+        times(measurements, 0.0137).map(|t_s| TruthSample::new(t_s - 1.0, t_s, -t_s, Some(0.5 * t_s))).collect();
     Run { info: RunInfo { id: id.to_owned(), ..RunInfo::default() }, odometry, truth, ..Run::default() }
 }
 
@@ -69,7 +70,12 @@ fn parts_of_runs_are_slices_of_the_whole_in_any_order() {
         assert_eq!(found.right, ticks.right[rows.clone()]);
         let from_s = if of.start == 0 { f64::NEG_INFINITY } else { run.odometry.t_s[rows.start] };
         let to_s = if rows.end == run.odometry.t_s.len() { f64::INFINITY } else { run.odometry.t_s[rows.end - 1] };
-        let seen: Vec<_> = run.truth.iter().filter(|look| look.t_s >= from_s && look.t_s <= to_s).copied().collect();
+        let seen: Vec<_> = run
+            .truth
+            .iter()
+            .filter(|measurement| measurement.t_s >= from_s && measurement.t_s <= to_s)
+            .copied()
+            .collect();
         assert_eq!(part.truth, seen, "run {number}, blocks {of:?}");
         assert_eq!(part.displacements, run.displacements);
     }

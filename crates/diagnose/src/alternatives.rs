@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::cause::Cause;
 use crate::finding::Finding;
 use crate::ranking::tests_in;
-use crate::selection::Found;
+use crate::selection::SearchResult;
 use crate::settings::SCAN_LEVEL;
 use crate::statistics::z_of_p;
 
@@ -14,20 +14,20 @@ use crate::statistics::z_of_p;
 pub struct Alternative {
     /// The effect.
     pub id: String,
-    /// How far out a normal variable of its chance would be, trials of shapes paid for.
+    /// How far out a normal variable of its chance would be, trials of variants paid for.
     pub z: f64,
     /// Log of the chance of the data with the effect over that without; to second order, before any refit.
     pub log_odds: f64,
     /// The same less that of the best.
     pub to_the_best: f64,
     /// What became of it.
-    pub fate: Fate,
+    pub fate: Status,
 }
 
 /// What became of an alternative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fate {
+pub enum Status {
     /// The first name of a finding.
     Found,
     /// Among the names of a finding.
@@ -41,25 +41,25 @@ pub enum Fate {
 }
 
 /// The alternatives, most probable first.
-pub(crate) fn alternatives(found: &Found<'_>, findings: &[Finding]) -> Vec<Alternative> {
+pub(crate) fn alternatives(found: &SearchResult<'_>, findings: &[Finding]) -> Vec<Alternative> {
     let entries = &found.first_scan;
     let best = entries.iter().map(|entry| entry.scored.log_odds).fold(0.0, f64::max);
     let tests = tests_in(entries);
     let mut all: Vec<Alternative> = entries
         .iter()
         .map(|entry| {
-            let (id, log_odds) = (entry.scored.choice.id(), entry.scored.log_odds);
+            let (id, log_odds) = (entry.scored.candidate.id(), entry.scored.log_odds);
             let z = if entry.p_value > 1e-290 { z_of_p(entry.p_value) } else { entry.scored.statistic.sqrt() };
             let fate = if findings.iter().any(|finding| *finding.first() == Cause::Effect(id)) {
-                Fate::Found
+                Status::Found
             } else if findings.iter().any(|finding| finding.names(&Cause::Effect(id))) {
-                Fate::NotToldApart
+                Status::NotToldApart
             } else if entry.scored.dimensions == 0 {
-                Fate::NotShown
+                Status::NotShown
             } else if entry.p_value * tests > SCAN_LEVEL {
-                Fate::DoesNotStandOut
+                Status::DoesNotStandOut
             } else {
-                Fate::ExplainsLess
+                Status::ExplainsLess
             };
             Alternative { id: id.to_owned(), z, log_odds, to_the_best: log_odds - best, fate }
         })

@@ -5,23 +5,25 @@ use model_term::{ModelTerm, TermParameter};
 
 use crate::cause::Cause;
 
-/// A mean term with its shape held.
+/// A mean term with its variant held.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Choice {
-    /// One of the shapes of an effect of the catalogue; between them where `at` says so.
-    Effect { id: &'static str, shape: usize, at: Option<f64> },
+pub(crate) enum Candidate {
+    /// One of the variants of an effect of the catalogue; between them where `at` says so.
+    Effect { id: &'static str, variant: usize, at: Option<f64> },
     /// A product of covariates on one channel.
     Sparse(Sparse),
 }
 
-impl Choice {
-    /// The term, at the start of its life; `None` only for a shape that the catalogue does not have.
+impl Candidate {
+    /// The term, at the start of its life; `None` only for a variant that the catalogue does not have.
     pub(crate) fn term(&self) -> Option<Box<dyn ModelTerm>> {
         match self {
-            Self::Effect { id, shape, at } => shapes(id).into_iter().nth(*shape).map(|shape| match at.zip(shape.at) {
-                Some((value, at)) => at(value),
-                None => shape.term,
-            }),
+            Self::Effect { id, variant, at } => {
+                variants(id).into_iter().nth(*variant).map(|variant| match at.zip(variant.at) {
+                    Some((value, at)) => at(value),
+                    None => variant.term,
+                })
+            }
             Self::Sparse(sparse) => Some(sparse.term()),
         }
     }
@@ -42,8 +44,8 @@ impl Choice {
         }
     }
 
-    /// Whether both are the same effect of the catalogue, perhaps in two of its shapes.
-    pub(crate) fn is_shape_of(&self, other: &Self) -> bool {
+    /// Whether both are the same effect of the catalogue, perhaps in two of its variants.
+    pub(crate) fn is_variant_of(&self, other: &Self) -> bool {
         matches!((self, other), (Self::Effect { id, .. }, Self::Effect { id: of, .. }) if id == of)
     }
 
@@ -55,11 +57,11 @@ impl Choice {
         }
     }
 
-    /// Its held shape parameters.
+    /// Its held variant parameters.
     pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
         match self {
-            Self::Effect { id, shape, at } => {
-                let mut held = shapes(id).into_iter().nth(*shape).map(|shape| shape.held).unwrap_or_default();
+            Self::Effect { id, variant, at } => {
+                let mut held = variants(id).into_iter().nth(*variant).map(|variant| variant.held).unwrap_or_default();
                 if let (Some(value), [(_, own)]) = (at, &mut held[..]) {
                     *own = *value;
                 }
@@ -69,18 +71,19 @@ impl Choice {
         }
     }
 
-    /// The values of its shape parameter that the scan tries, where anything between them is as possible.
+    /// The values of its variant parameter that the scan tries, where anything between them is as possible.
     pub(crate) fn grid(&self) -> Vec<f64> {
         let Self::Effect { id, .. } = self else { return Vec::new() };
-        let shapes = shapes(id);
-        let values = shapes.iter().filter(|shape| shape.at.is_some()).filter_map(|shape| Some(shape.held.first()?.1));
+        let variants = variants(id);
+        let values =
+            variants.iter().filter(|variant| variant.at.is_some()).filter_map(|variant| Some(variant.held.first()?.1));
         values.collect()
     }
 
-    /// The same effect with its shape parameter anywhere.
+    /// The same effect with its variant parameter anywhere.
     pub(crate) fn moved_to(&self, value: f64) -> Self {
         match self {
-            Self::Effect { id, shape, .. } => Self::Effect { id, shape: *shape, at: Some(value) },
+            Self::Effect { id, variant, .. } => Self::Effect { id, variant: *variant, at: Some(value) },
             Self::Sparse(_) => self.clone(),
         }
     }
@@ -90,35 +93,35 @@ impl Choice {
     }
 }
 
-/// The terms of choices, in order.
-pub(crate) fn terms(choices: &[Choice]) -> Vec<Box<dyn ModelTerm>> {
-    choices.iter().filter_map(Choice::term).collect()
+/// The terms of candidates, in order.
+pub(crate) fn terms(candidates: &[Candidate]) -> Vec<Box<dyn ModelTerm>> {
+    candidates.iter().filter_map(Candidate::term).collect()
 }
 
 /// The terms of candidates, in order; products that follow each other come as one.
-pub(crate) fn terms_together<'c>(choices: impl Iterator<Item = &'c Choice>) -> Vec<Box<dyn ModelTerm>> {
-    let product = |choice: &&Choice| matches!(choice, Choice::Sparse(sparse) if sparse.shares_moments());
-    let choices: Vec<&Choice> = choices.collect();
-    let of_chunk = |chunk: &[&Choice]| {
-        let sparse = chunk.iter().filter_map(|choice| match choice {
-            Choice::Sparse(sparse) => Some(sparse.clone()),
-            Choice::Effect { .. } => None,
+pub(crate) fn terms_together<'c>(candidates: impl Iterator<Item = &'c Candidate>) -> Vec<Box<dyn ModelTerm>> {
+    let product = |candidate: &&Candidate| matches!(candidate, Candidate::Sparse(sparse) if sparse.shares_moments());
+    let candidates: Vec<&Candidate> = candidates.collect();
+    let of_chunk = |chunk: &[&Candidate]| {
+        let sparse = chunk.iter().filter_map(|candidate| match candidate {
+            Candidate::Sparse(sparse) => Some(sparse.clone()),
+            Candidate::Effect { .. } => None,
         });
         if product(&chunk[0]) { Sparse::together(&sparse.collect::<Vec<_>>()) } else { chunk[0].term() }
     };
-    choices.chunk_by(|a, b| product(a) && product(b)).filter_map(of_chunk).collect()
+    candidates.chunk_by(|a, b| product(a) && product(b)).filter_map(of_chunk).collect()
 }
 
-fn shapes(id: &str) -> Vec<effects::Shape> {
-    hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_default()
+fn variants(id: &str) -> Vec<effects::Variant> {
+    hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_default()
 }
 
-/// Every shape of every effect whose hypothesis is a mean term, without those taken out.
-pub(crate) fn mean_terms(without: &[String]) -> Vec<Choice> {
+/// Every variant of every effect whose hypothesis is a mean term, without those taken out.
+pub(crate) fn mean_terms(without: &[String]) -> Vec<Candidate> {
     CATALOGUE
         .iter()
         .filter(|id| !without.iter().any(|out| out == *id))
-        .flat_map(|id| (0..shapes(id).len()).map(|shape| Choice::Effect { id, shape, at: None }))
+        .flat_map(|id| (0..variants(id).len()).map(|variant| Candidate::Effect { id, variant, at: None }))
         .collect()
 }
 
@@ -129,9 +132,9 @@ mod tests {
     #[test]
     fn an_effect_can_be_left_out() {
         let all = mean_terms(&[]);
-        assert!(all.iter().any(|choice| choice.id() == "slip_speed"));
+        assert!(all.iter().any(|candidate| candidate.id() == "slip_speed"));
         let fewer = mean_terms(&["slip_speed".to_owned()]);
-        assert!(fewer.iter().all(|choice| choice.id() != "slip_speed") && fewer.len() < all.len());
-        assert!(all.iter().all(|choice| !choice.parameters().is_empty()));
+        assert!(fewer.iter().all(|candidate| candidate.id() != "slip_speed") && fewer.len() < all.len());
+        assert!(all.iter().all(|candidate| !candidate.parameters().is_empty()));
     }
 }

@@ -1,22 +1,22 @@
 //! Covariates that depend on the records: those of runs, and cycles of a wheel's turn.
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::JointFit;
+use estimation::ModelFit;
 use kinematics::Side;
 
 /// The covariates of runs that differ between runs.
-pub(crate) fn of_runs(fit: &JointFit<'_>) -> Vec<Covariate> {
-    let chains = &fit.records.chains;
-    let mut keys: Vec<&String> = chains.iter().flat_map(|chain| chain.info.covariates.keys()).collect();
+pub(crate) fn of_runs(fit: &ModelFit<'_>) -> Vec<Covariate> {
+    let segments = &fit.records.segments;
+    let mut keys: Vec<&String> = segments.iter().flat_map(|segment| segment.info.covariates.keys()).collect();
     keys.sort();
     keys.dedup();
     keys.into_iter().filter_map(|key| Covariate::of_run(key, &values_of_runs(fit, key))).collect()
 }
 
 /// What each run says of a covariate, 0 where it says nothing.
-pub(crate) fn values_of_runs(fit: &JointFit<'_>, key: &str) -> Vec<f64> {
-    let runs = fit.records.chains.chunk_by(|a, b| a.run == b.run);
-    runs.map(|chains| chains[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
+pub(crate) fn values_of_runs(fit: &ModelFit<'_>, key: &str) -> Vec<f64> {
+    let runs = fit.records.segments.chunk_by(|a, b| a.run == b.run);
+    runs.map(|segments| segments[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
 }
 
 /// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.

@@ -2,53 +2,58 @@
 //!
 //! A size shows with nine chances in ten at a false-alarm rate of 1e-3 when √λ = 4.57 (discovery by a score test; λ = size² of the projected information).
 
-use crate::augmented_model::Extended;
-use crate::candidate::Choice;
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::Candidate;
 use crate::document::{Blind, Smallest};
-use crate::fit_cache::Known;
-use crate::settings::SHOWS;
+use crate::fit_cache::FitCache;
+use crate::settings::DETECTION_SQRT_LAMBDA;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
-pub(crate) fn blind(model: &Extended<'_>, catalogue: &[Choice], known: &mut Known<'_>) -> (Vec<Blind>, Vec<Blind>) {
+pub(crate) fn detectability(
+    model: &AugmentedModel<'_>,
+    catalogue: &[Candidate],
+    known: &mut FitCache<'_>,
+) -> (Vec<Blind>, Vec<Blind>) {
     let mut best: Vec<(Blind, f64)> = Vec::new();
     for scored in known.beside(model, catalogue) {
-        let id = scored.choice.id();
+        let id = scored.candidate.id();
         // The parameter that shows soonest, the others at rest, in units of what would be large.
         let smallest = scored
             .parameters
             .iter()
             .enumerate()
-            .map(|(k, parameter)| (parameter, SHOWS / scored.information[(k, k)].max(0.0).sqrt()))
+            .map(|(k, parameter)| (parameter, DETECTION_SQRT_LAMBDA / scored.information[(k, k)].max(0.0).sqrt()))
             .filter(|(_, size)| size.is_finite())
-            .min_by(|a, b| (a.1 / a.0.plausible).total_cmp(&(b.1 / b.0.plausible)));
+            .min_by(|a, b| (a.1 / a.0.prior_sigma).total_cmp(&(b.1 / b.0.prior_sigma)));
         let entry = match smallest {
             // A million times what would be large is rounding, not information.
-            Some((parameter, size)) if size < 1e6 * parameter.plausible => {
+            Some((parameter, size)) if size < 1e6 * parameter.prior_sigma => {
                 // A ratio has no unit in print.
                 let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
-                let why = if size > parameter.plausible {
+                let why = if size > parameter.prior_sigma {
                     format!(
                         "these runs hardly excite it: {} below {size:.2e}{unit} would not have shown, and {:.1e} is large already",
-                        parameter.name, parameter.plausible
+                        parameter.name, parameter.prior_sigma
                     )
                 } else {
                     format!("{} from {size:.2e}{unit} on would have shown", parameter.name)
                 };
                 let smallest =
                     Smallest { value: size, unit: parameter.unit.to_owned(), parameter: parameter.name.to_owned() };
-                (Blind { id: id.to_owned(), why, smallest_detectable: Some(smallest) }, size / parameter.plausible)
+                (Blind { id: id.to_owned(), why, smallest_detectable: Some(smallest) }, size / parameter.prior_sigma)
             }
             _ => {
                 let why = "no run excites it, or the calibration itself takes it up".to_owned();
                 (Blind { id: id.to_owned(), why, smallest_detectable: None }, f64::INFINITY)
             }
         };
-        match best.iter_mut().find(|(blind, _)| blind.id == id) {
+        match best.iter_mut().find(|(detectability, _)| detectability.id == id) {
             Some(known) if entry.1 < known.1 => *known = entry,
             Some(_) => {}
             None => best.push(entry),
         }
     }
-    let blind = best.iter().filter(|(_, size)| *size > 1.0).map(|(blind, _)| blind.clone()).collect();
-    (best.into_iter().map(|(blind, _)| blind).collect(), blind)
+    let detectability =
+        best.iter().filter(|(_, size)| *size > 1.0).map(|(detectability, _)| detectability.clone()).collect();
+    (best.into_iter().map(|(detectability, _)| detectability).collect(), detectability)
 }

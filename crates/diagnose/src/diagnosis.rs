@@ -3,23 +3,23 @@
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
-use estimation::{EstimationError, FitSettings, JointFit};
+use estimation::{EstimationError, FitSettings, ModelFit};
 use kinematics::DriveGeometry;
 use nalgebra::DMatrix;
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
-use crate::augmented_model::Extended;
-use crate::candidate::{Choice, mean_terms};
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::{Candidate, mean_terms};
 use crate::check::TestResult;
-use crate::detectability::blind;
+use crate::detectability::detectability;
 use crate::document::{Document, Gain};
 use crate::findings::findings;
 use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
-use crate::record_faults::{Fault, fault, follows, left_out, sessions};
+use crate::record_faults::{Fault, fault, follows, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
 use crate::text;
 
@@ -42,10 +42,10 @@ pub enum DiagnoseError {
     },
     /// The base model does not follow the robot, and no gross fault explains it.
     #[error(
-        "the calibrated model leaves out {percent:.0} % of the looks, and no gross fault explains it: there is nothing to build on; add runs with looks on the way"
+        "the calibrated model leaves out {percent:.0} % of the measurements, and no gross fault explains it: there is nothing to build on; add runs with measurements on the way"
     )]
-    NothingFollows {
-        /// Share of looks left out.
+    OdometryUncorrelated {
+        /// Share of measurements left out.
         percent: f64,
     },
     /// There is no base fit.
@@ -73,33 +73,33 @@ pub struct Diagnosis {
 pub struct FittedModel {
     /// Lengths, and sizes in the order of the terms' parameters.
     pub model: estimation::Model,
-    choices: Vec<Choice>,
+    candidates: Vec<Candidate>,
 }
 
 impl FittedModel {
-    fn of(extended: &Extended<'_>) -> Self {
-        Self { model: extended.fit.fit.model.clone(), choices: extended.choices.clone() }
+    fn of(extended: &AugmentedModel<'_>) -> Self {
+        Self { model: extended.fit.fit.model.clone(), candidates: extended.candidates.clone() }
     }
 
     /// Its terms, at the start of their lives.
     #[must_use]
     pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
-        crate::candidate::terms(&self.choices)
+        crate::candidate::terms(&self.candidates)
     }
 }
 
-/// A model that leaves out more of the looks is none.
-const MOST_LEFT_OUT: f64 = 0.2;
-/// With fewer looks a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
-const LEAST_LOOKS_A_RUN: f64 = 3.0;
+/// A model that leaves out more of the measurements is none.
+const MAX_REJECTED: f64 = 0.2;
+/// With fewer measurements a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
+const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 
 #[allow(clippy::cast_precision_loss)] // thousands
-fn looks_a_run(fit: &JointFit<'_>) -> f64 {
+fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
     let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
-    fit.records.looks() as f64 / runs.max(1) as f64
+    fit.records.measurements() as f64 / runs.max(1) as f64
 }
 
-const ALL_LOOKS: FitSettings = FitSettings::GEOMETRY_ONLY;
+const EVERY_MEASUREMENT: FitSettings = FitSettings::GEOMETRY_ONLY;
 /// Diagnoses one robot's sessions.
 ///
 /// # Errors
@@ -117,27 +117,28 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
     let measured = sessions(datasets);
-    let first = ALL_LOOKS.fit(&measured);
-    let astray =
-        first.as_ref().is_ok_and(|first| left_out(first) > MOST_LEFT_OUT && looks_a_run(first) < LEAST_LOOKS_A_RUN);
-    match fault(datasets, first.as_ref().ok(), &options.without, astray) {
+    let first = EVERY_MEASUREMENT.fit(&measured);
+    let outlying = first.as_ref().is_ok_and(|first| {
+        rejected_share(first) > MAX_REJECTED && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
+    });
+    match fault(datasets, first.as_ref().ok(), &options.without, outlying) {
         Some(found) => {
             let rewritten = sessions(&found.records);
-            let base = ALL_LOOKS.fit(&rewritten)?;
+            let base = EVERY_MEASUREMENT.fit(&rewritten)?;
             // One may hide another.
             let without = [&options.without[..], &[found.id.to_owned()]].concat();
             let Some(hidden) = fault(&found.records, Some(&base), &without, false) else {
                 return Ok(continued(&found.records, base, &[&found], options, limits));
             };
             let rewritten = sessions(&hidden.records);
-            let base = ALL_LOOKS.fit(&rewritten)?;
+            let base = EVERY_MEASUREMENT.fit(&rewritten)?;
             Ok(continued(&hidden.records, base, &[&found, &hidden], options, limits))
         }
         None => {
             let first = first?;
-            let share = left_out(&first);
-            if share > MOST_LEFT_OUT {
-                return Err(DiagnoseError::NothingFollows { percent: 100.0 * share });
+            let share = rejected_share(&first);
+            if share > MAX_REJECTED {
+                return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
             }
             Ok(continued(datasets, first, &[], options, limits))
         }
@@ -146,7 +147,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
 
 fn continued(
     datasets: &[Dataset],
-    base: JointFit<'_>,
+    base: ModelFit<'_>,
     faults: &[&Fault],
     options: &Options,
     limits: &Limits,
@@ -160,7 +161,7 @@ fn continued(
     let model = asked.model();
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
     let (gain, gain_why_null) = gain_of(&asked.base, model);
-    let (sensitivity, blind_to) = blind(model, &catalogue, &mut asked.found.known.clone());
+    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut asked.found.known.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
     let extended = crate::extended_scenario::scenario_of(datasets, model);
     let residuals = residuals(&asked.base, model);
@@ -192,11 +193,11 @@ fn continued(
     Diagnosis { document, extended, residuals, alternatives, found }
 }
 
-fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<String>) {
-    if model.choices.is_empty() {
+fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Option<String>) {
+    if model.candidates.is_empty() {
         return (None, Some("nothing was added to the calibrated model's mean".to_owned()));
     }
-    let alone = Extended::alone(base);
+    let alone = AugmentedModel::base(base);
     match gain(&alone, model) {
         Ok(gain) => (Some(gain), None),
         Err(why) => (None, Some(why)),
@@ -204,7 +205,7 @@ fn gain_of(base: &JointFit<'_>, model: &Extended<'_>) -> (Option<Gain>, Option<S
 }
 
 /// The calibration with what was found in the model.
-fn calibration(datasets: &[Dataset], extended: &Extended<'_>) -> Result<Calibration, CalibError> {
+fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
     let fit = &extended.fit;
     let model = &fit.fit.model;
     let not_physical =
@@ -212,12 +213,12 @@ fn calibration(datasets: &[Dataset], extended: &Extended<'_>) -> Result<Calibrat
     let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
         .map_err(not_physical)?;
     let diameter_m = geometry.wheel_diameter_m();
-    let sizes = [diameter_m.left, diameter_m.right, model.separation_m];
-    let covariance = fit.covariance(&mut crate::candidate::terms(&extended.choices));
+    let estimates = [diameter_m.left, diameter_m.right, model.separation_m];
+    let covariance = fit.covariance(&mut crate::candidate::terms(&extended.candidates));
     Ok(Calibration {
         covariance: covariance
             .as_ref()
-            .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
+            .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * estimates[i] * estimates[j])),
         not_observable: calib::methods::joint::not_observable(fit),
         runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         converged: fit.fit.converged,

@@ -80,7 +80,7 @@ pub struct Finding {
     pub probability: f64,
     /// How far out a normal variable of this chance would be.
     pub z: f64,
-    /// Chance of so large an effect when there is none; trials of shapes paid for.
+    /// Chance of so large an effect when there is none; trials of variants paid for.
     pub p_value: f64,
     /// Sizes of the first name.
     pub parameters: BTreeMap<String, Value>,
@@ -95,7 +95,7 @@ pub struct Finding {
 pub struct Value {
     /// In the unit beside it.
     pub value: f64,
-    /// One standard deviation; `None` for a shape parameter that was tried at a few values.
+    /// One standard deviation; `None` for a variant parameter that was tried at a few values.
     pub sigma: Option<f64>,
     /// The unit.
     pub unit: String,
@@ -151,7 +151,7 @@ pub struct Gain {
 const MATERIAL: f64 = 0.05;
 
 impl Gain {
-    /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single looks.
+    /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single measurements.
     #[must_use]
     pub fn drifts_more(&self) -> bool {
         self.drifts_more_by(1.0)
@@ -184,7 +184,7 @@ pub struct Compared {
 pub struct NextExperiment {
     /// What to drive, as the part of a scenario that drives it (TOML).
     pub protocol: String,
-    /// Why, within which floor and time, and where to look.
+    /// Why, within which floor and time, and where to measurement.
     pub why: String,
     /// What each name predicts, or from which size on an effect would show.
     pub predicts: BTreeMap<String, String>,

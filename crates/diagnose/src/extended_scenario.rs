@@ -5,24 +5,24 @@ use std::collections::BTreeMap;
 use dataset::{Dataset, Protocol, WheelLog};
 use effects::{
     Covariate, Effect, PhysicalEffect, Quantization, Sparse, SparseTerm, WheelMismatch, WheelScale, Wheelbase,
-    effect_of_sizes,
+    effect_from_estimates,
 };
 use estimation::NoiseComponent;
 use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
-use crate::augmented_model::Extended;
-use crate::candidate::Choice;
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::Candidate;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
 /// A controller regulates on counts much finer than most logs' ticks.
 const LEAST_COUNTS: f64 = 40_000.0;
-/// Looks farther apart than this, in a run of a few, are readings of a standing robot.
+/// Measurements farther apart than this, in a run of a few, are readings of a standing robot.
 pub(crate) const READ_STANDING_S: f64 = 2.0;
 
 /// The scenario, or why it cannot be written.
-pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<Scenario, String> {
+pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
     let fit = &model.fit.fit;
@@ -33,14 +33,14 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
     robot.right_wheel_diameter_m = nominal.right_wheel_diameter_m;
     robot.wheel_separation_m = nominal.wheel_separation_m;
     robot.encoder.gear_ratio = counts * per_tick / (scenario::QUADRATURE_DECODING * robot.encoder.lines_per_rev);
-    let pace = Pace::of(datasets, model);
-    robot.cruise_speed_m_s = pace.speed_m_s;
+    let sampling = SamplingStatistics::of(datasets, model);
+    robot.cruise_speed_m_s = sampling.speed_m_s;
     let stated =
         first.points.iter().map(|point| Mark { id: point.id.clone(), x_m: point.body.x_m, y_m: point.body.y_m });
     robot.points = stated.collect();
-    let sigma_xy_m = fit.noise.sigma(NoiseComponent::LookPosition);
-    let sigma_theta_rad = fit.noise.sigma(NoiseComponent::LookHeading);
-    let instrument = if pace.between_looks_s > READ_STANDING_S {
+    let sigma_xy_m = fit.noise.sigma(NoiseComponent::MeasurementPosition);
+    let sigma_theta_rad = fit.noise.sigma(NoiseComponent::MeasurementHeading);
+    let instrument = if sampling.between_measurements_s > READ_STANDING_S {
         if robot.points.len() < 2 {
             let half_m = 0.5 * nominal.wheel_separation_m;
             let mark = |id: &str, y_m| Mark { id: id.to_owned(), x_m: 0.0, y_m };
@@ -50,7 +50,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
     } else {
         let mounted = fit.model.body_from_sensor;
         Instrument::MotionCapture {
-            rate_hz: 1.0 / pace.between_looks_s,
+            rate_hz: 1.0 / sampling.between_measurements_s,
             sigma_xy_m,
             sigma_theta_rad,
             latency_s: fit.model.latency_s.max(0.0),
@@ -61,21 +61,21 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
     };
     let mut effects = geometry(model)?.to_vec();
     if per_tick > 1.0 && nominal.ticks_per_rev.is_some() {
-        effects.extend(Quantization::of_sizes(&[("counts_per_tick", per_tick)]).map(Effect::Quantization));
+        effects.extend(Quantization::from_estimates(&[("counts_per_tick", per_tick)]).map(Effect::Quantization));
     }
     let mut at = 0;
-    for choice in &model.choices {
-        let parameters = choice.parameters();
-        let fitted = &fit.model.sizes[at..at + parameters.len()];
+    for candidate in &model.candidates {
+        let parameters = candidate.parameters();
+        let fitted = &fit.model.term_values[at..at + parameters.len()];
         at += parameters.len();
-        let effect = match choice {
-            Choice::Effect { id, .. } => {
+        let effect = match candidate {
+            Candidate::Effect { id, .. } => {
                 let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
-                let sizes: Vec<(&str, f64)> = named.chain(choice.held()).collect();
-                effect_of_sizes(id, &sizes)
+                let estimates: Vec<(&str, f64)> = named.chain(candidate.held()).collect();
+                effect_from_estimates(id, &estimates)
                     .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?
             }
-            Choice::Sparse(sparse) => {
+            Candidate::Sparse(sparse) => {
                 Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
             }
         };
@@ -92,7 +92,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
         noise: Noise { wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel), sensitivity_sigma: 0.0 },
         placement: Placement { half_width_m: 0.05, half_width_rad: 0.02 },
         budget: None,
-        log: (pace.between_rows_s < READ_STANDING_S).then_some(Log { interval_s: pace.between_rows_s }),
+        log: (sampling.between_rows_s < READ_STANDING_S).then_some(Log { interval_s: sampling.between_rows_s }),
         instruments: vec![instrument],
         effects,
         protocols: protocols(datasets),
@@ -104,7 +104,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &Extended<'_>) -> Result<
 }
 
 /// What the runs had of the covariates of a product that are their own.
-fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec<f64>> {
+fn values_of_runs(sparse: &Sparse, model: &AugmentedModel<'_>) -> BTreeMap<String, Vec<f64>> {
     let own = sparse.covariates.iter().filter_map(|covariate| match covariate {
         Covariate::OfRun { key, .. } => Some(key),
         _ => None,
@@ -113,7 +113,7 @@ fn values_of_runs(sparse: &Sparse, model: &Extended<'_>) -> BTreeMap<String, Vec
 }
 
 /// The calibrated lengths as effects on the nominal ones.
-fn geometry(model: &Extended<'_>) -> Result<[Effect; 3], String> {
+fn geometry(model: &AugmentedModel<'_>) -> Result<[Effect; 3], String> {
     let (found, nominal) = (&model.fit.fit.model, &model.fit.nominal);
     let mean = |wheels: kinematics::Wheels<f64>| 0.5 * (wheels.left + wheels.right);
     let ratio = |wheels: kinematics::Wheels<f64>| wheels.right / wheels.left;
@@ -128,14 +128,14 @@ fn geometry(model: &Extended<'_>) -> Result<[Effect; 3], String> {
 }
 
 /// How fast and how often.
-pub(crate) struct Pace {
+pub(crate) struct SamplingStatistics {
     pub(crate) speed_m_s: f64,
     pub(crate) between_rows_s: f64,
-    pub(crate) between_looks_s: f64,
+    pub(crate) between_measurements_s: f64,
 }
 
-impl Pace {
-    pub(crate) fn of(datasets: &[Dataset], model: &Extended<'_>) -> Self {
+impl SamplingStatistics {
+    pub(crate) fn of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Self {
         let mut rows: Vec<f64> = Vec::new();
         let mut speeds: Vec<f64> = Vec::new();
         for dataset in datasets {
@@ -158,12 +158,12 @@ impl Pace {
             }
         }
         speeds.retain(|speed| *speed > 0.01);
-        let mut looks: Vec<f64> = model.fit.records.times_between().collect();
+        let mut measurements: Vec<f64> = model.fit.records.times_between().collect();
         Self {
             // Cruising is the upper end of the speeds: starts and stops are slower.
             speed_m_s: quantile(&mut speeds, 0.75).unwrap_or(0.25).clamp(0.01, 5.0),
             between_rows_s: quantile(&mut rows, 0.5).unwrap_or(10.0).clamp(1e-3, 1e3),
-            between_looks_s: quantile(&mut looks, 0.5).unwrap_or(10.0).clamp(1e-2, 1e3),
+            between_measurements_s: quantile(&mut measurements, 0.5).unwrap_or(10.0).clamp(1e-2, 1e3),
         }
     }
 }

@@ -3,19 +3,19 @@
 use std::collections::BTreeMap;
 
 use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
-use estimation::{JointFit, NoiseComponent};
+use estimation::{ModelFit, NoiseComponent};
 
-use crate::candidate::Choice;
+use crate::candidate::Candidate;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
 use crate::document::{UnlistedTerm, Value};
-use crate::model_comparison::chance;
+use crate::model_comparison::relative_odds;
 use crate::record_faults::Fault;
 use crate::residual_tests::Checked;
 use crate::rivals::Name;
-use crate::selection::Found;
-use crate::settings::{FAINT, FORM_ERROR, LEAST_REACH};
-use crate::statistics::{of_trials, z_of_p};
+use crate::selection::SearchResult;
+use crate::settings::{LOW_SIGNIFICANCE, MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
+use crate::statistics::{sidak, z_of_p};
 use crate::wald::Test;
 
 /// Something that the calibrated model gets wrong.
@@ -58,7 +58,7 @@ impl Finding {
 
     /// Whether it is a mean effect with parameter values.
     fn is_mean(&self) -> bool {
-        hypothesis(self.first().id()).and_then(Hypothesis::into_shapes).is_some() && !self.parameters.is_empty()
+        hypothesis(self.first().id()).and_then(Hypothesis::into_variants).is_some() && !self.parameters.is_empty()
     }
 
     /// Whether it is a mean effect that no uncatalogued cause is held to explain as well.
@@ -77,13 +77,13 @@ impl Finding {
     }
 }
 
-/// The parameters of a choice as found.
-pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<String, Value> {
-    let held = choice.held().into_iter().map(|(name, value)| {
+/// The parameters of a candidate as found.
+pub(crate) fn parameters(candidate: &Candidate, estimates: &[(f64, f64)]) -> BTreeMap<String, Value> {
+    let held = candidate.held().into_iter().map(|(name, value)| {
         let unit = name.rsplit_once('_').map_or("1", |(_, unit)| unit);
         (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() })
     });
-    let fitted = choice.parameters().into_iter().zip(sizes).map(|(parameter, (value, sigma))| {
+    let fitted = candidate.parameters().into_iter().zip(estimates).map(|(parameter, (value, sigma))| {
         let sigma = Some(*sigma).filter(|sigma| sigma.is_finite());
         (parameter.name.to_owned(), Value { value: *value, sigma, unit: parameter.unit.to_owned() })
     });
@@ -91,45 +91,45 @@ pub(crate) fn parameters(choice: &Choice, sizes: &[(f64, f64)]) -> BTreeMap<Stri
 }
 
 /// The findings of a search over the catalogue.
-pub(crate) fn of_search(found: &Found<'_>) -> Vec<Finding> {
-    let places = found.model.choices.iter().zip(&found.names).zip(&found.tests);
-    places.map(|((choice, names), test)| of_choice(choice, names, test, trials(found, choice))).collect()
+pub(crate) fn of_search(found: &SearchResult<'_>) -> Vec<Finding> {
+    let indices = found.model.candidates.iter().zip(&found.names).zip(&found.tests);
+    indices.map(|((candidate, names), test)| of_candidate(candidate, names, test, trials(found, candidate))).collect()
 }
 
 /// How many variants of an effect were tried.
-fn trials(found: &Found<'_>, choice: &Choice) -> usize {
-    let entry = found.first_scan.iter().find(|entry| entry.scored.choice.id() == choice.id());
-    entry.map_or(1, |entry| entry.shapes.max(1))
+fn trials(found: &SearchResult<'_>, candidate: &Candidate) -> usize {
+    let entry = found.first_scan.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
+    entry.map_or(1, |entry| entry.variants.max(1))
 }
 
 /// Whether an effect that a search found is of low significance.
-pub(crate) fn is_faint(found: &Found<'_>, place: usize) -> bool {
-    let (choice, test) = (&found.model.choices[place], &found.tests[place]);
-    z(test, of_trials(test.p_value, trials(found, choice))) < FAINT
+pub(crate) fn is_of_low_significance(found: &SearchResult<'_>, index: usize) -> bool {
+    let (candidate, test) = (&found.model.candidates[index], &found.tests[index]);
+    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE
 }
 
 /// Probability that a finding has an uncatalogued cause that looks like one of the catalogue: one in twenty, as the blind benchmark finds.
-const UNWRITTEN: f64 = 0.05;
+const UNCATALOGUED: f64 = 0.05;
 
 /// The log of that probability over that of a catalogued cause.
-pub(crate) fn unwritten_log_odds() -> f64 {
-    (UNWRITTEN / (1.0 - UNWRITTEN)).ln()
+pub(crate) fn uncatalogued_log_odds() -> f64 {
+    (UNCATALOGUED / (1.0 - UNCATALOGUED)).ln()
 }
 
-fn of_choice(choice: &Choice, names: &[Name], test: &Test, trials: usize) -> Finding {
+fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
-    let weights: f64 = names.iter().map(|name| chance(name.log_odds, top)).sum();
-    let p_value = of_trials(test.p_value, trials);
-    let mut causes: Vec<Cause> = names.iter().map(|name| name.choice.cause()).collect();
+    let weights: f64 = names.iter().map(|name| relative_odds(name.log_odds, top)).sum();
+    let p_value = sidak(test.p_value, trials);
+    let mut causes: Vec<Cause> = names.iter().map(|name| name.candidate.cause()).collect();
     if names.iter().any(|name| name.outdone) {
         causes.push(Cause::Unknown);
     }
     Finding {
         causes,
-        probability: (1.0 - UNWRITTEN) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
+        probability: (1.0 - UNCATALOGUED) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
         z: z(test, p_value),
         p_value,
-        parameters: parameters(choice, &test.sizes),
+        parameters: parameters(candidate, &test.estimates),
         basis: Basis::Mean,
         doubts: Vec::new(),
     }
@@ -140,10 +140,10 @@ fn z(test: &Test, p_value: f64) -> f64 {
     if p_value > 1e-290 { z_of_p(p_value) } else { test.statistic.sqrt() }
 }
 
-/// The finding of a sparse term at the end of a model's choices.
-pub(crate) fn of_sparse(choice: &Choice, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
-    let Choice::Sparse(sparse) = choice else { return None };
-    let (coefficient, sigma) = *test.sizes.first()?;
+/// The finding of a sparse term at the end of a model's candidates.
+pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
+    let Candidate::Sparse(sparse) = candidate else { return None };
+    let (coefficient, sigma) = *test.estimates.first()?;
     let channel = sparse.channel.name().to_owned();
     let term = UnlistedTerm { channel, covariates: sparse.names(), coefficient, sigma };
     Some(Finding {
@@ -191,8 +191,9 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
         return;
     }
     let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    let odds = (against * UNWRITTEN / (1.0 - UNWRITTEN)).min(1.0);
-    let is_incomplete = |finding: &&mut Finding| finding.is_sure() && score > FORM_ERROR * finding.z.powi(2);
+    let odds = (against * UNCATALOGUED / (1.0 - UNCATALOGUED)).min(1.0);
+    let is_incomplete =
+        |finding: &&mut Finding| finding.is_sure() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {
         finding.or_unlisted(odds, Doubt::Incomplete);
     }
@@ -203,8 +204,8 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
 const NONE_OF_THEM: f64 = 3.0 / 7.0;
 
 /// Says of the effects found, where no other doubt is on them, that they may be something else where they are of low significance.
-pub(crate) fn or_faint(findings: &mut [Finding]) {
-    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < FAINT) {
+pub(crate) fn or_of_low_significance(findings: &mut [Finding]) {
+    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE) {
         finding.or_unlisted(NONE_OF_THEM, Doubt::LowSignificance);
     }
 }
@@ -231,13 +232,13 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
 }
 
 /// The counts do not follow the robot, and no gross fault explains it.
-pub(crate) fn of_lost(base: &JointFit<'_>) -> Finding {
+pub(crate) fn of_lost(base: &ModelFit<'_>) -> Finding {
     let sigmas = NoiseComponent::ALL.map(|component| base.fit.noise.sigma(component));
     of_causes(vec![Cause::Unknown], 0.0, BTreeMap::new(), Basis::Uncorrelated(sigmas))
 }
 
 /// Outlying rows that no fault of the catalogue explains.
-pub(crate) fn of_rows_astray(log: Option<&TestResult>) -> Option<Finding> {
+pub(crate) fn of_outlying_rows(log: Option<&TestResult>) -> Option<Finding> {
     let test = log.filter(|test| !test.passes)?;
     let basis = Basis::OutlyingRows(test.statistic);
     Some(of_causes(vec![Cause::Unknown], test.p_value, BTreeMap::new(), basis))
@@ -301,7 +302,7 @@ pub(crate) fn of_causes(
     if causes.is_empty() {
         causes.push(Cause::Unknown);
     }
-    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNWRITTEN) / causes.len() as f64 };
+    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED) / causes.len() as f64 };
     Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new() }
 }
 
@@ -318,13 +319,13 @@ pub(crate) fn of_likely_scatter(
     let best = likely.first().map_or(0.0, |(_, log)| *log);
     let weights: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
     let named = if or_unlisted { likely.len() as f64 / (likely.len() + 1) as f64 } else { 1.0 };
-    likely.retain(|(_, log)| *log > best.max(any) - LEAST_REACH);
+    likely.retain(|(_, log)| *log > best.max(any) - MIN_LOG_ODDS_MARGIN);
     let mut causes: Vec<Cause> = likely.into_iter().map(|(id, _)| Cause::Effect(id)).collect();
     if or_unlisted {
         causes.push(Cause::Unknown);
     }
     let finding = of_causes(causes, p_value, BTreeMap::new(), basis);
-    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNWRITTEN) * named / weights };
+    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED) * named / weights };
     Finding { probability, ..finding }
 }
 
@@ -357,7 +358,7 @@ mod tests {
             found(3.7, &[Cause::Effect("swapped_wheels")]),
         ];
         let before = findings.clone();
-        or_faint(&mut findings);
+        or_of_low_significance(&mut findings);
         assert_eq!(findings[0].causes, [SLIP, CASTOR, Cause::Unknown]);
         // None of the causes in three of ten, whatever their shares among themselves.
         assert!((findings[0].probability - 0.7 * before[0].probability).abs() < 1e-12, "{:?}", findings[0]);

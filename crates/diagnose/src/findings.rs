@@ -10,9 +10,9 @@ use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
-use crate::settings::MOST_EFFECTS;
-use crate::sparse_terms::{Unlisted, lack_of_fit};
-use crate::wald::examine;
+use crate::settings::MAX_EFFECTS;
+use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
+use crate::wald::wald_test;
 
 /// What residuals go with by less chance than this, no scatter makes them go with.
 const BEYOND_SCATTER: f64 = 1e-8;
@@ -39,12 +39,12 @@ pub(crate) fn findings(
     let mut findings: Vec<Finding> = faults.iter().map(|fault| finding::of_fault(fault)).collect();
     findings.extend(finding::of_search(&asked.found));
     let model = asked.model();
-    if let Some(chance) = asked.rivalled {
-        finding::beside_unlisted(&mut findings, chance);
+    if let Some(relative_odds) = asked.competing {
+        finding::beside_unlisted(&mut findings, relative_odds);
     }
-    for (place, p_value, trials) in asked.unlisted.iter().flat_map(Unlisted::terms) {
-        let test = examine(model, place).map(|(test, _)| test);
-        findings.extend(test.and_then(|test| finding::of_sparse(&model.choices[place], &test, p_value, trials)));
+    for (index, p_value, trials) in asked.unlisted.iter().flat_map(UncataloguedTerms::terms) {
+        let test = wald_test(model, index).map(|(test, _)| test);
+        findings.extend(test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials)));
     }
     if lost {
         findings.push(finding::of_lost(&asked.base));
@@ -57,7 +57,7 @@ pub(crate) fn findings(
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
-    let of_log = finding::of_rows_astray(log.as_ref()).into_iter().chain(finding::of_spans(spans.as_ref()));
+    let of_log = finding::of_outlying_rows(log.as_ref()).into_iter().chain(finding::of_spans(spans.as_ref()));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(|finding| finding.is_unlisted());
     findings.extend(named);
     if !nameless.is_empty() {
@@ -75,14 +75,14 @@ pub(crate) fn findings(
     if !(restored || scatters || told) {
         findings.extend(finding::of_failed_checks(&asked.checked));
     }
-    finding::doubt(&mut findings[faults.len()..], asked.found.model.choices.len() >= MOST_EFFECTS);
+    finding::doubt(&mut findings[faults.len()..], asked.found.model.candidates.len() >= MAX_EFFECTS);
     // A term without a name that stands out beside all that was found, though not by enough to be a finding.
     if findings.iter().any(Finding::is_sure)
         && let Some(left) = lack_of_fit(&asked.base, model)
     {
         finding::or_incomplete(&mut findings, left);
     }
-    finding::or_faint(&mut findings);
+    finding::or_of_low_significance(&mut findings);
     // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
     findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     findings

@@ -3,14 +3,14 @@
 //! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
 //! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
 
-use estimation::{Column, EndError, Evidence, JointFit, Model, RIDGE, inverse};
+use estimation::{Column, EndError, Model, ModelFit, NormalEquations, RIDGE, inverse};
 use model_term::ModelTerm;
 use nalgebra::DVector;
 
-use crate::augmented_model::{Extended, left_out_cost};
+use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
-use crate::settings::LEAST_RUNS;
+use crate::settings::MIN_RUNS;
 use crate::statistics::student_95;
 
 const FOLDS: usize = 6;
@@ -18,15 +18,15 @@ const FOLDS: usize = 6;
 /// What one held-out unit scores.
 struct Unit {
     cost: f64,
-    evidence: Evidence,
+    equations: NormalEquations,
     run: (usize, usize),
     fold: usize,
 }
 
 /// The gain, or why there is none to tell.
-pub(crate) fn gain(base: &Extended<'_>, extended: &Extended<'_>) -> Result<Gain, String> {
-    let (before, reckoned_before) = held_out(&base.fit, &mut terms(&base.choices))?;
-    let (after, reckoned_after) = held_out(&extended.fit, &mut terms(&extended.choices))?;
+pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> Result<Gain, String> {
+    let (before, reckoned_before) = held_out(&base.fit, &mut terms(&base.candidates))?;
+    let (after, reckoned_after) = held_out(&extended.fit, &mut terms(&extended.candidates))?;
     if before.len() != after.len() || before.iter().zip(&after).any(|(before, after)| before.run != after.run) {
         return Err("the models do not hold out the same runs".to_owned());
     }
@@ -34,16 +34,16 @@ pub(crate) fn gain(base: &Extended<'_>, extended: &Extended<'_>) -> Result<Gain,
     let freedom = before.len() as f64 - 1.0;
     let per_observation = |units: &[Unit]| -> f64 {
         let constant = 0.5 * std::f64::consts::TAU.ln();
-        -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.evidence.count).sum::<f64>()
+        -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.equations.count).sum::<f64>()
             - constant
     };
-    // A look that one model takes for an outlier and the other does not is charged to the first.
-    let charged = |own: &Unit, other: &Unit| own.cost + left_out_cost(&own.evidence, other.evidence.count);
+    // A measurement that one model takes for an outlier and the other does not is charged to the first.
+    let charged = |own: &Unit, other: &Unit| own.cost + left_out_cost(&own.equations, other.equations.count);
     let pairs: Vec<(f64, f64)> = before
         .iter()
         .zip(&after)
         .map(|(before, after)| {
-            (charged(before, after) - charged(after, before), before.evidence.count.max(after.evidence.count))
+            (charged(before, after) - charged(after, before), before.equations.count.max(after.equations.count))
         })
         .collect();
     let (mean, error) = ratio(&pairs);
@@ -68,11 +68,11 @@ fn drift(before: &[EndError], after: &[EndError]) -> Option<Compared> {
             .collect()
     };
     let (before, after) = (by_run(before), by_run(after));
-    let way_m: f64 = before.iter().map(|run| run.1).sum();
-    if before.len() != after.len() || before.len() < 2 || way_m <= 0.0 {
+    let distance_m: f64 = before.iter().map(|run| run.1).sum();
+    if before.len() != after.len() || before.len() < 2 || distance_m <= 0.0 {
         return None;
     }
-    let percent = |runs: &[(f64, f64)]| 100.0 * runs.iter().map(|run| run.0).sum::<f64>() / way_m;
+    let percent = |runs: &[(f64, f64)]| 100.0 * runs.iter().map(|run| run.0).sum::<f64>() / distance_m;
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
     let (mean, error) = ratio(&pairs);
@@ -92,17 +92,17 @@ fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// Every unit's cost under a fit to the other folds, and its run's dead reckoning under that fit.
-fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
+fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
     let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
-    let (units, blocks) = if runs >= LEAST_RUNS {
+    let (units, blocks) = if runs >= MIN_RUNS {
         (fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
     } else if runs > 0 {
-        (fit.in_blocks(terms, LEAST_RUNS.div_ceil(runs)), true)
+        (fit.in_blocks(terms, MIN_RUNS.div_ceil(runs)), true)
     } else {
-        return Err("no run has looks".to_owned());
+        return Err("no run has measurements".to_owned());
     };
     if units.len() < 3 {
-        return Err("too few runs, and too few looks in them to be held out in blocks".to_owned());
+        return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
     }
     let fold_of = folds(fit, &units, blocks);
     let free = fit.free_basis();
@@ -112,7 +112,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     for fold in 0..FOLDS {
         let mut others = units.iter().zip(&fold_of).filter(|(_, of)| **of != fold).map(|(unit, _)| unit);
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
-        let mut sum: Evidence = first.clone();
+        let mut sum: NormalEquations = first.clone();
         others.for_each(|unit| sum.add(unit, 1.0));
         let mut own = sum.of(&fit.columns);
         // What the other runs do not show of an effect is none of it, not any: a payload that only the held-out run carried.
@@ -128,7 +128,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         models.push(model);
         for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
             let cost = unit.cost_after(&fit.columns, &step);
-            scored.push(Unit { cost, evidence: unit.clone(), run: unit.run, fold });
+            scored.push(Unit { cost, equations: unit.clone(), run: unit.run, fold });
         }
     }
     let mut ends = Vec::new();
@@ -136,7 +136,7 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a part of it.
         let held =
             |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
-        ends.extend(fit.reckoned_of(model, terms, held));
+        ends.extend(fit.dead_reckoned_of(model, terms, held));
     }
     ends.sort_by_key(|end| end.run);
     scored.sort_by_key(|unit| unit.run);
@@ -144,23 +144,23 @@ fn held_out(fit: &JointFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
 }
 
 /// For each column its size and how precisely it is known before: a term's is normal about nothing, as large as is plausible.
-fn prior(fit: &JointFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
-    let plausible: Vec<f64> =
-        terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.plausible).collect();
+fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
+    let prior_sigma: Vec<f64> =
+        terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.prior_sigma).collect();
     let of = |column: &Column| match column {
-        Column::Term(k) => (fit.fit.model.sizes[*k], plausible[*k].powi(-2)),
+        Column::Term(k) => (fit.fit.model.term_values[*k], prior_sigma[*k].powi(-2)),
         _ => (0.0, 0.0),
     };
     fit.columns.iter().map(of).collect()
 }
 
 /// The fold of each unit: each protocol's units in turn.
-fn folds(fit: &JointFit<'_>, units: &[Evidence], blocks: bool) -> Vec<usize> {
+fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usize> {
     if blocks {
         return (0..units.len()).map(|unit| unit % FOLDS).collect();
     }
     let protocol = |run: (usize, usize)| {
-        fit.records.chains.iter().find(|chain| chain.run == run).and_then(|chain| chain.info.protocol)
+        fit.records.segments.iter().find(|segment| segment.run == run).and_then(|segment| segment.info.protocol)
     };
     let mut seen: Vec<Option<dataset::Protocol>> = Vec::new();
     let mut order: Vec<(usize, usize)> = units

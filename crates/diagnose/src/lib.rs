@@ -40,11 +40,11 @@ mod statistics;
 mod text;
 mod wald;
 
-pub use alternatives::{Alternative, Fate};
+pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_within};
 pub use document::{
     Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
     Value, Verdict,
 };
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
-pub use residuals::{Against, Bin, Component, Profile, Residuals};
+pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};

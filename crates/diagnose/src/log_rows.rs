@@ -10,7 +10,7 @@ use statrs::distribution::{DiscreteCDF, Poisson};
 use crate::check::{Check, TestResult};
 
 /// An increment that is off by so many ranges of the four around it is astray.
-const ASTRAY: f64 = 20.0;
+const OUTLYING: f64 = 20.0;
 /// Chance of an increment to be that by the scatter of steady wheels.
 const BY_CHANCE: f64 = 1.6e-5;
 /// Two increments of a steady wheel differ by as many counts, and their range is not less.
@@ -27,7 +27,7 @@ const OTHER_CLOCK: f64 = 30.0;
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let ratio = |run: &Run| {
         let ends = run.displacements.iter().flat_map(|seen| [seen.t0_s, seen.t1_s]);
-        let seen_s = run.truth.iter().map(|look| look.t_s).chain(ends);
+        let seen_s = run.truth.iter().map(|measurement| measurement.t_s).chain(ends);
         let (first_s, last_s) = seen_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t_s| (a.min(t_s), b.max(t_s)));
         let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
         (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
@@ -44,20 +44,20 @@ pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Rows {
     all: usize,
-    astray: usize,
+    outlying: usize,
 }
 
 /// Asks the counts of all runs; robots that report no counts are not asked.
 pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
     let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
         let of = of_run(&run.odometry, run.info.continuous);
-        Rows { all: sum.all + of.all, astray: sum.astray + of.astray }
+        Rows { all: sum.all + of.all, outlying: sum.outlying + of.outlying }
     });
     #[allow(clippy::cast_precision_loss)]
     let chance = Poisson::new(BY_CHANCE * rows.all as f64).ok()?;
-    let p_value = rows.astray.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
+    let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
     #[allow(clippy::cast_precision_loss)]
-    let statistic = rows.astray as f64;
+    let statistic = rows.outlying as f64;
     Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_LEVEL })
 }
 
@@ -67,7 +67,7 @@ fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
         return Rows::default();
     }
     let of = ticks.as_ref().map(|column| of_column(t_s, column));
-    Rows { all: of.left.all + of.right.all, astray: of.left.astray + of.right.astray }
+    Rows { all: of.left.all + of.right.all, outlying: of.left.outlying + of.right.outlying }
 }
 
 #[allow(clippy::cast_precision_loss)] // counts are far under 2⁵³
@@ -88,8 +88,8 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         rows.all += 1;
         let uncertain = ((most - least) * dt_s).max(ROUNDING);
         let stands = rate.abs() < STANDS * mean.abs() || mean == 0.0;
-        if !stands && ((rate - mean) * dt_s).abs() > ASTRAY * uncertain {
-            rows.astray += 1;
+        if !stands && ((rate - mean) * dt_s).abs() > OUTLYING * uncertain {
+            rows.outlying += 1;
         }
     }
     rows
@@ -122,7 +122,7 @@ mod tests {
     fn a_sound_log_has_no_rows_astray() {
         for jitter_s in [0.0, 1e-3, 5e-3] {
             let (t_s, ticks) = column(jitter_s);
-            assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, astray: 0 }, "{jitter_s}");
+            assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, outlying: 0 }, "{jitter_s}");
         }
     }
 
@@ -131,7 +131,7 @@ mod tests {
         let (t_s, sound) = column(0.0);
         let mut torn = sound.clone();
         [100, 130, 200].into_iter().for_each(|row: usize| torn[row] += 256);
-        assert_eq!(of_column(&t_s, &torn).astray, 3);
+        assert_eq!(of_column(&t_s, &torn).outlying, 3);
         let (mut t_s, mut lost) = (t_s, sound);
         for row in [220, 130, 100] {
             let counts = lost[row] - lost[row - 1];
@@ -139,13 +139,13 @@ mod tests {
             t_s.remove(row);
             lost.remove(row);
         }
-        assert_eq!(of_column(&t_s, &lost).astray, 3);
+        assert_eq!(of_column(&t_s, &lost).outlying, 3);
         // Counters that went on over the gap are where they should be.
         let (mut t_s, mut sound) = column(0.0);
         for row in [220, 130, 100] {
             t_s.remove(row);
             sound.remove(row);
         }
-        assert_eq!(of_column(&t_s, &sound).astray, 0);
+        assert_eq!(of_column(&t_s, &sound).outlying, 0);
     }
 }

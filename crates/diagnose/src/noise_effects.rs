@@ -1,4 +1,4 @@
-//! What only scatters: single looks far off, jumps that stay, looks that err alike, and turns that scatter more than the wheels explain.
+//! What only scatters: single measurements far off, jumps that stay, measurements that err alike, and turns that scatter more than the wheels explain.
 //!
 //! A scatter has no mean to be scanned: failed checks of the fit show most of it. Noise of the turns is in every fit; a fit without it says what it is worth,
 //! with half a χ² of one degree of freedom for a variance at its boundary (Chernoff 1954; Self & Liang 1987).
@@ -16,7 +16,7 @@ use crate::document::Value;
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
-use crate::outlier_attribution::{Whose, log_likelihoods};
+use crate::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::residual_tests::what_follows;
 use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::TURNS_LEVEL;
@@ -26,8 +26,8 @@ use crate::statistics::{p_of_chi_square, p_of_z};
 const SCATTER_LEVEL: f64 = 1e-3;
 /// Where tails are heavy, what residuals seem to go with must do so beyond doubt: few large errors make such a test fail.
 const CERTAINLY: f64 = 1e-6;
-/// With more, it is the model that is off, and not the looks.
-const MOST_OUTLIERS: f64 = 0.2;
+/// With more, it is the model that is off, and not the measurements.
+const MAX_OUTLIERS: f64 = 0.2;
 
 /// Scatter that failed checks show.
 pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
@@ -36,7 +36,7 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     let tests = &asked.checked.checks;
     let far = outliers.isolated + outliers.staying;
     #[allow(clippy::cast_precision_loss)]
-    if far as f64 > MOST_OUTLIERS * (outliers.looks + far) as f64 {
+    if far as f64 > MAX_OUTLIERS * (outliers.measurements + far) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
@@ -45,27 +45,28 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     let with_something = with_something.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
     let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
-    let goes_with_something = with_something < tails.max(CERTAINLY);
+    let depends_on_something = with_something < tails.max(CERTAINLY);
     // After the end of a run nothing follows that could be back.
-    let followed = asked.base.selections.first().is_some_and(|taken| taken.mean_looks(&asked.base.records) >= 2.0);
+    let followed =
+        asked.base.selections.first().is_some_and(|taken| taken.mean_measurements(&asked.base.records) >= 2.0);
     if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         #[allow(clippy::cast_precision_loss)]
-        let share = outliers.isolated as f64 / (outliers.looks + far) as f64;
+        let share = outliers.isolated as f64 / (outliers.measurements + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
-        let of = outliers.looks + far;
-        let causes = with_sign(Sign::IsolatedLooks, without_ids);
+        let of = outliers.measurements + far;
+        let causes = with_sign(Sign::IsolatedErrors, without_ids);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
         let basis = Basis::IsolatedErrors(outliers.isolated, of);
         findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
     }
-    if goes_with_something {
+    if depends_on_something {
         // Other large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
         findings.extend(turns.filter(|turns| turns.p_value < with_something));
         return findings;
     }
     if findings.is_empty() {
         // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
-        let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::WayJumps)];
+        let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::DistanceJumps)];
         let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
         let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
         let far_off = outliers.p_value < SCATTER_LEVEL && (outliers.staying > 0 || !followed);
@@ -86,13 +87,18 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
                 ids
             };
             // What jumps ahead may turn as well: a bump costs one wheel its way.
-            let jumps: &[Sign] =
-                if sign == Sign::WayJumps { &[Sign::HeadingJumps, Sign::WayJumps] } else { &[Sign::HeadingJumps] };
-            let (stays, errs) = (named(jumps), named(&[Sign::IsolatedLooks, Sign::TailsAtLowSpeed]));
-            let (ids, any): (_, &[Whose]) = match follows {
-                ResidualPersistence::Persistent => (stays, &[Whose::Robot]),
-                ResidualPersistence::Reverting => (errs, &[Whose::Instrument]),
-                ResidualPersistence::Undecided => ([&stays[..], &errs].concat(), &[Whose::Robot, Whose::Instrument]),
+            let jumps: &[Sign] = if sign == Sign::DistanceJumps {
+                &[Sign::HeadingJumps, Sign::DistanceJumps]
+            } else {
+                &[Sign::HeadingJumps]
+            };
+            let (stays, errs) = (named(jumps), named(&[Sign::IsolatedErrors, Sign::TailsAtLowSpeed]));
+            let (ids, any): (_, &[ErrorSource]) = match follows {
+                ResidualPersistence::Persistent => (stays, &[ErrorSource::Robot]),
+                ResidualPersistence::Reverting => (errs, &[ErrorSource::Instrument]),
+                ResidualPersistence::Undecided => {
+                    ([&stays[..], &errs].concat(), &[ErrorSource::Robot, ErrorSource::Instrument])
+                }
             };
             // Tails have many causes.
             let or_unlisted = follows == ResidualPersistence::Undecided;
@@ -106,9 +112,9 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     if let Some((coefficient, sigmas)) = asked.correlated
         && coefficient > 0.0
     {
-        let mut causes = with_sign(Sign::CorrelatedLooks, without_ids);
+        let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        if !causes.is_empty() && (asked.in_disguise || !asked.found.model.choices.is_empty()) {
+        if !causes.is_empty() && (asked.spurious || !asked.found.model.candidates.is_empty()) {
             causes.push(Cause::Unknown);
         }
         let basis = Basis::Autocorrelated(coefficient);
@@ -126,7 +132,7 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
 fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = asked.model();
-    let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.choices)).ok()?;
+    let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
     let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));

@@ -1,28 +1,28 @@
 //! Whose single large errors are: how likely each cause makes what the innovations at and after them look like.
 //!
-//! Model: a large error at look k is a jump of the robot on its way there or an error of the look, of unknown size: innovations respond to it linearly, and their normal
+//! Model: a large error at look k is a jump of the robot on its way there or an error of the measurement, of unknown size: innovations respond to it linearly, and their normal
 //! equation by its size, (I, u), is what a score test has anyway. The size integrated out, normal about zero with covariance T or one-sided, the chance of the data over
 //! that without it is |1 + TI|^(−½) exp(½ uᵀ(I + T⁻¹)⁻¹u). Causes differ in the directions they jump in and in where they happen:
 //! `bumps` cost one wheel some of its way, anywhere on it; `traction_loss` costs way where a wheel becomes faster and gives some where it becomes slower; `stick_slip` leaves a wheel behind
-//! at starts and stops, and gives it back; `truth_outliers` err in x, y and heading, at any look, and at that look alone: both displacements that share it are off.
+//! at starts and stops, and gives it back; `truth_outliers` err in x, y and heading, at any measurement, and at that measurement alone: both displacements that share it are off.
 //! Scales are common to the errors of a cause and integrated over a grid. One error in twenty may be something else's, so none speaks against a cause by more than ln 20.
 //! Jumps and errors in any direction, anywhere, say what a cause without a name would do as well.
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
 use effects::IsolatedError;
-use estimation::{Chain, Column, Evidence, Innovation, JointFit, total};
+use estimation::{Column, Innovation, ModelFit, NormalEquations, Segment, total};
 use kinematics::{Increment, Pose, Side, Wheels};
-use model_term::{Interval, Look, ModelTerm, TermParameter};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::augmented_model::Extended;
+use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
 
 /// An innovation this large, in standard deviations, is one that the tails are made of.
 const LARGE: f64 = 3.5;
-/// Large innovations with so few looks between them are one error: a filter that followed it wrongly comes back.
+/// Large innovations with so few measurements between them are one error: a filter that followed it wrongly comes back.
 const APART: usize = 3;
 /// Most errors that are asked, the largest: each takes a term's share of a pass.
 const MOST: usize = 24;
@@ -32,10 +32,10 @@ const AT_ONCE: usize = 4;
 const OTHERS: f64 = 0.05;
 /// Share of the errors of wheels that stick or slide that lie at starts and stops.
 const AT_RAMPS: f64 = 0.9;
-/// A look this near to an instant is at it, seconds.
+/// A measurement this near to an instant is at it, seconds.
 const AT_S: f64 = 1e-6;
 
-/// Errors of a look, metres and radians.
+/// Errors of a measurement, metres and radians.
 const ERRORS: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
 
 /// A large error.
@@ -43,22 +43,22 @@ const ERRORS: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
 struct Large {
     run: (usize, usize),
     run_id: String,
-    /// The look before, and the look that is off.
+    /// The measurement before, and the measurement that is off.
     from_s: f64,
     at_s: f64,
     /// What each wheel went between them.
     travel_m: Wheels<f64>,
     is_displacement: bool,
-    /// The way there over that to other looks, on average.
+    /// The way there over that to other measurements, on average.
     way: f64,
-    /// How much more often than at other looks wheels that stick or slide err at this one.
+    /// How much more often than at other measurements wheels that stick or slide err at this one.
     ramp: f64,
     z: f64,
 }
 
-/// Places of a jump between two looks, as shares of the time.
+/// Places of a jump between two measurements, as shares of the time.
 const PLACES: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
-/// Columns of a large error: each wheel's lost way at each place; way lost for a change of its speed; the error of the look, and of the one before; a jump before the look.
+/// Columns of a large error: each wheel's lost way at each place; way lost for a change of its speed; the error of the measurement, and of the one before; a jump before the measurement.
 const SLIDES: usize = 2 * PLACES.len();
 const AT: usize = SLIDES + 2;
 const FROM: usize = AT + 3;
@@ -66,17 +66,17 @@ const ANY: usize = FROM + 3;
 const COLUMNS: usize = ANY + 3;
 
 const PARAMETERS: [TermParameter; COLUMNS] = {
-    const WAY: TermParameter = TermParameter { name: "lost_m", unit: "m", plausible: 1e-3 };
-    const SLIDE: TermParameter = TermParameter { name: "slides_s", unit: "s", plausible: 1e-2 };
-    const ERROR: TermParameter = TermParameter { name: "off_m", unit: "m", plausible: 1e-2 };
-    const TURN: TermParameter = TermParameter { name: "off_rad", unit: "rad", plausible: 1e-2 };
+    const WAY: TermParameter = TermParameter { name: "lost_m", unit: "m", prior_sigma: 1e-3 };
+    const SLIDE: TermParameter = TermParameter { name: "slides_s", unit: "s", prior_sigma: 1e-2 };
+    const ERROR: TermParameter = TermParameter { name: "off_m", unit: "m", prior_sigma: 1e-2 };
+    const TURN: TermParameter = TermParameter { name: "off_rad", unit: "rad", prior_sigma: 1e-2 };
     [WAY, WAY, WAY, WAY, WAY, WAY, SLIDE, SLIDE, ERROR, ERROR, TURN, ERROR, ERROR, TURN, ERROR, ERROR, TURN]
 };
 
 /// Ahead, aside, and turned.
 const ANYWHERE: [Pose; 3] = [Pose::new(1.0, 0.0, 0.0), Pose::new(0.0, 1.0, 0.0), Pose::new(0.0, 0.0, 1.0)];
 
-/// What a large error may be: a jump on the way to its look, or an error of one of the two looks.
+/// What a large error may be: a jump on the way to its look, or an error of one of the two measurements.
 #[derive(Debug, Clone)]
 struct Jump {
     run_id: String,
@@ -96,11 +96,11 @@ impl ModelTerm for Jump {
             return;
         }
         let on = |side: Side, way: f64| interval.change(Wheels::from_sides(|of| if of == side { -way } else { 0.0 }));
-        for (place, share) in PLACES.iter().enumerate() {
+        for (index, share) in PLACES.iter().enumerate() {
             let instant_s = self.from_s + share * (self.at_s - self.from_s);
             if start_s <= instant_s && instant_s < end_s {
                 for (k, side) in Side::BOTH.into_iter().enumerate() {
-                    gradient[2 * place + k] = on(side, sense(interval.travel_m[side]));
+                    gradient[2 * index + k] = on(side, sense(interval.travel_m[side]));
                 }
             }
         }
@@ -113,12 +113,12 @@ impl ModelTerm for Jump {
         }
     }
 
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        if look.run.id != self.run_id {
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        if measurement.run.id != self.run_id {
             return;
         }
         for (at_s, column) in [(self.at_s, AT), (self.from_s, FROM)] {
-            if (look.t_s - at_s).abs() < AT_S {
+            if (measurement.t_s - at_s).abs() < AT_S {
                 gradient[column..column + 3].copy_from_slice(&ANYWHERE);
             }
         }
@@ -132,7 +132,7 @@ fn sense(way: f64) -> f64 {
 
 /// Whose large errors are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Whose {
+pub(crate) enum ErrorSource {
     /// The robot jumps.
     Robot,
     /// The instrument errs.
@@ -141,19 +141,23 @@ pub(crate) enum Whose {
 
 /// Log of the chance of the large errors of a model under each of some causes, and the largest under any cause of some kinds, up to what is common to all; `None` where
 /// there are none, or a cause has no such model.
-pub(crate) fn log_likelihoods(model: &Extended<'_>, ids: &[&'static str], any: &[Whose]) -> Option<(Vec<f64>, f64)> {
-    let fit = model.fit.at_every_look();
-    let mut large = large(&fit, &fit.scan(&mut terms(&model.choices)).innovations);
+pub(crate) fn log_likelihoods(
+    model: &AugmentedModel<'_>,
+    ids: &[&'static str],
+    any: &[ErrorSource],
+) -> Option<(Vec<f64>, f64)> {
+    let fit = model.fit.evaluated_ungated();
+    let mut large = large(&fit, &fit.scan(&mut terms(&model.candidates)).innovations);
     large.sort_by(|a, b| b.z.total_cmp(&a.z));
     large.truncate(MOST);
-    let of_passes: Vec<Vec<Seen>> = large.par_chunks(AT_ONCE).map(|large| seen(model, &fit, large)).collect();
+    let of_passes: Vec<Vec<Measured>> = large.par_chunks(AT_ONCE).map(|large| seen(model, &fit, large)).collect();
     let seen = of_passes.concat();
     if seen.is_empty() {
         return None;
     }
     let speed_m_s = usual_speed_m_s(&large);
     let mut causes: Vec<Vec<Vec<f64>>> = ids.iter().map(|id| of_cause(id, &seen, speed_m_s)).collect::<Option<_>>()?;
-    causes.extend(any.iter().map(|whose| of_any(*whose, &seen)));
+    causes.extend(any.iter().map(|source| of_any(*source, &seen)));
     let mut likelihoods = of_causes(&causes);
     let any = likelihoods.split_off(ids.len()).into_iter().fold(f64::NEG_INFINITY, f64::max);
     Some((likelihoods, any))
@@ -182,80 +186,82 @@ fn log_mean(logs: &[f64]) -> f64 {
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / count).ln()
 }
 
-/// The large errors, from the innovations on every look.
-fn large(fit: &JointFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
+/// The large errors, from the innovations on every measurement.
+fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
     let Some(phase) = innovations.first() else { return Vec::new() };
-    let chains = &fit.records.chains;
-    let since: Vec<Vec<(f64, Wheels<f64>)>> = chains.iter().map(Chain::since_look_before).collect();
-    let at_ramp: Vec<Vec<bool>> = chains.iter().map(Chain::changes_of_speed).collect();
+    let segments = &fit.records.segments;
+    let since: Vec<Vec<(f64, Wheels<f64>)>> = segments.iter().map(Segment::since_previous_measurement).collect();
+    let at_ramp: Vec<Vec<bool>> = segments.iter().map(Segment::changes_of_speed).collect();
     let m_per_rad = fit.fit.model.m_per_rad;
-    // Of each look, with the look before that is taken: its own error, and where it is.
-    let mut looks: Vec<(Large, (usize, bool))> = Vec::new();
+    // Of each measurement, with the measurement before that is taken: its own error, and where it is.
+    let mut measurements: Vec<(Large, (usize, bool))> = Vec::new();
     let mut before = None;
-    for of_look in phase.chunk_by(|a, b| (a.chain, a.look) == (b.chain, b.look)) {
-        let (chain, look) = (of_look[0].chain, of_look[0].look);
-        let of_chain = &chains[chain];
+    for of_look in phase.chunk_by(|a, b| (a.segment, a.measurement) == (b.segment, b.measurement)) {
+        let (segment, measurement) = (of_look[0].segment, of_look[0].measurement);
+        let of_segment = &segments[segment];
         let first = match before {
-            Some((last, taken)) if last == chain => taken + 1,
-            _ if of_chain.is_displacement() => 0,
-            // The chain starts at a look.
-            _ => 1.min(look),
+            Some((last, taken)) if last == segment => taken + 1,
+            _ if of_segment.is_displacement() => 0,
+            // The segment starts at a measurement.
+            _ => 1.min(measurement),
         };
-        before = Some((chain, look));
-        let turned = since[chain][first..=look]
+        before = Some((segment, measurement));
+        let turned = since[segment][first..=measurement]
             .iter()
             .fold(Wheels::both(0.0), |sum, (_, turned)| sum.zip_with(*turned, |a, b| a + b));
         let travel_m = m_per_rad.zip_with(turned, |m_per_rad, rad| m_per_rad * rad);
-        let ways =
-            since[chain][first..=look].iter().map(|(_, turned)| m_per_rad.zip_with(*turned, |a, b| (a * b).abs()));
-        let way = ways.map(|way_m| 0.5 * (way_m.left + way_m.right)).sum();
+        let ways = since[segment][first..=measurement]
+            .iter()
+            .map(|(_, turned)| m_per_rad.zip_with(*turned, |a, b| (a * b).abs()));
+        let way = ways.map(|distance_m| 0.5 * (distance_m.left + distance_m.right)).sum();
         let own = Large {
-            run: of_chain.run,
-            run_id: of_chain.info.id.clone(),
-            from_s: since[chain][first].0,
-            at_s: fit.records.look_s(chain, look).unwrap_or(0.0),
+            run: of_segment.run,
+            run_id: of_segment.info.id.clone(),
+            from_s: since[segment][first].0,
+            at_s: fit.records.measurement_s(segment, measurement).unwrap_or(0.0),
             travel_m,
-            is_displacement: of_chain.is_displacement(),
+            is_displacement: of_segment.is_displacement(),
             way,
             ramp: 0.0,
             z: of_look.iter().map(|innovation| innovation.z.abs()).fold(0.0, f64::max),
         };
-        looks.push((own, (chain, at_ramp[chain][first..=look].contains(&true))));
+        measurements.push((own, (segment, at_ramp[segment][first..=measurement].contains(&true))));
     }
     #[allow(clippy::cast_precision_loss)] // thousands
-    let count = looks.len() as f64;
-    let way = looks.iter().map(|(look, _)| look.way).sum::<f64>() / count;
+    let count = measurements.len() as f64;
+    let way = measurements.iter().map(|(measurement, _)| measurement.way).sum::<f64>() / count;
     #[allow(clippy::cast_precision_loss)]
-    let share = looks.iter().filter(|(_, (_, ramp))| *ramp).count() as f64 / count;
+    let share = measurements.iter().filter(|(_, (_, ramp))| *ramp).count() as f64 / count;
     let mut found = Vec::new();
     let mut last: Option<(usize, usize)> = None;
-    for (number, (look, (chain, ramp))) in looks.into_iter().enumerate() {
-        if look.z <= LARGE {
+    for (number, (measurement, (segment, ramp))) in measurements.into_iter().enumerate() {
+        if measurement.z <= LARGE {
             continue;
         }
-        let follows = last.is_some_and(|(at, of)| number - at <= APART && fit.records.are_in_series(of, chain));
-        last = Some((number, chain));
+        let follows = last.is_some_and(|(at, of)| number - at <= APART && fit.records.are_in_series(of, segment));
+        last = Some((number, segment));
         if follows {
             continue;
         }
         let mostly = AT_RAMPS.max(share);
         let ramp = if ramp { mostly / share } else { (1.0 - mostly) / (1.0 - share) };
-        let way = if way > 0.0 { look.way / way } else { 0.0 };
-        found.push(Large { way, ramp, ..look });
+        let way = if way > 0.0 { measurement.way / way } else { 0.0 };
+        found.push(Large { way, ramp, ..measurement });
     }
     found
 }
 
 /// How fast the robot went where it erred, m/s.
 fn usual_speed_m_s(large: &[Large]) -> f64 {
-    let way_m: f64 = large.iter().map(|large| 0.5 * (large.travel_m.left.abs() + large.travel_m.right.abs())).sum();
+    let distance_m: f64 =
+        large.iter().map(|large| 0.5 * (large.travel_m.left.abs() + large.travel_m.right.abs())).sum();
     let time_s: f64 = large.iter().map(|large| large.at_s - large.from_s).sum();
-    if time_s > 0.0 && way_m > 0.0 { way_m / time_s } else { 1.0 }
+    if time_s > 0.0 && distance_m > 0.0 { distance_m / time_s } else { 1.0 }
 }
 
 /// What the run of a large error says of its size in each column: information and score, what is free in the fit taken out.
 #[derive(Debug, Clone)]
-struct Seen {
+struct Measured {
     large: Large,
     separation_m: f64,
     information: DMatrix<f64>,
@@ -263,13 +269,13 @@ struct Seen {
 }
 
 /// The same of some large errors, from one pass.
-fn seen(model: &Extended<'_>, fit: &JointFit<'_>, large: &[Large]) -> Vec<Seen> {
-    let mut all = terms(&model.choices);
+fn seen(model: &AugmentedModel<'_>, fit: &ModelFit<'_>, large: &[Large]) -> Vec<Measured> {
+    let mut all = terms(&model.candidates);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
     for Large { run_id, from_s, at_s, .. } in large {
         all.push(Box::new(Jump { run_id: run_id.clone(), from_s: *from_s, at_s: *at_s }));
     }
-    let runs: Vec<Evidence> = fit.scan_parts(&mut all, &vec![COLUMNS; large.len()]);
+    let runs: Vec<NormalEquations> = fit.scan_parts(&mut all, &vec![COLUMNS; large.len()]);
     let Some(projection) = total(&runs).and_then(|all| fit.eliminated(&all, &[])) else { return Vec::new() };
     let of = |(number, large): (usize, &Large)| {
         let run = runs.iter().find(|run| run.run == large.run)?;
@@ -277,12 +283,12 @@ fn seen(model: &Extended<'_>, fit: &JointFit<'_>, large: &[Large]) -> Vec<Seen> 
         let of_run = projection.of_columns(run, &own);
         let separation_m = fit.fit.model.separation_m;
         // The gradient is the cost's.
-        Some(Seen { large: large.clone(), separation_m, information: of_run.information, score: -of_run.gradient })
+        Some(Measured { large: large.clone(), separation_m, information: of_run.information, score: -of_run.gradient })
     };
     large.iter().enumerate().filter_map(of).collect()
 }
 
-impl Seen {
+impl Measured {
     /// Log of the chance with a size along a direction that is normal with a scale, but not negative, over that without.
     fn one_sided(&self, direction: &DVector<f64>, scale: f64) -> f64 {
         let information = (direction.transpose() * &self.information * direction)[0].max(0.0);
@@ -294,7 +300,7 @@ impl Seen {
         std::f64::consts::LN_2 - 0.5 * (precision * scale * scale).ln() + 0.5 * mean * mean + positive.ln()
     }
 
-    /// The same of a look's error, whose column is the first of three.
+    /// The same of a measurement's error, whose column is the first of three.
     fn error(&self, column: usize, jump_m: f64, jump_rad: f64) -> f64 {
         let scale = Matrix3::from_diagonal(&Vector3::new(jump_m, jump_m, jump_rad));
         let information = scale * self.information.fixed_view::<3, 3>(column, column) * scale;
@@ -309,8 +315,8 @@ impl Seen {
 
     /// One wheel loses some of its way, where the robot drives.
     fn of_bump(&self, lost_m: f64) -> f64 {
-        let places: Vec<f64> = (0..SLIDES).map(|column| self.one_sided(&self.column(column), lost_m)).collect();
-        log_mean(&places) + self.large.way.ln()
+        let indices: Vec<f64> = (0..SLIDES).map(|column| self.one_sided(&self.column(column), lost_m)).collect();
+        log_mean(&indices) + self.large.way.ln()
     }
 
     /// One wheel or both lose way as they become faster, and go on as they become slower.
@@ -320,7 +326,7 @@ impl Seen {
         log_mean(&ways) + self.large.ramp.ln()
     }
 
-    /// One wheel or both are behind at the look, or fall behind as they become slower and are back as they become faster.
+    /// One wheel or both are behind at the measurement, or fall behind as they become slower and are back as they become faster.
     fn of_wind_up(&self, wound_m: f64, speed_m_s: f64) -> f64 {
         let behind = |side: Side| {
             let lost_m = Wheels::from_sides(|of| if of == side { -sense(self.large.travel_m[side]) } else { 0.0 });
@@ -336,15 +342,15 @@ impl Seen {
         log_mean(&[log_mean(&at_look), log_mean(&on_the_way)]) + self.large.ramp.ln()
     }
 
-    /// The look errs, or the one from which the way there is counted.
+    /// The measurement errs, or the one from which the way there is counted.
     fn of_look(&self, jump_m: f64, jump_rad: f64) -> f64 {
         log_mean(&[AT, FROM].map(|column| self.error(column, jump_m, jump_rad)))
     }
 }
 
 /// For each scale of a cause, what it makes of each large error; `None` where its errors are not single ones.
-fn of_cause(id: &str, seen: &[Seen], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
-    let each = |of: &dyn Fn(&Seen) -> f64| seen.iter().map(of).collect::<Vec<f64>>();
+fn of_cause(id: &str, seen: &[Measured], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
+    let each = |of: &dyn Fn(&Measured) -> f64| seen.iter().map(of).collect::<Vec<f64>>();
     Some(match effects::description(id)?.isolated_error? {
         IsolatedError::LostOnTheWay { scales_m } => {
             scales_m.iter().map(|lost_m| each(&|seen| seen.of_bump(*lost_m))).collect()
@@ -355,19 +361,21 @@ fn of_cause(id: &str, seen: &[Seen], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
         IsolatedError::WoundUp { scales_m } => {
             scales_m.iter().map(|wound_m| each(&|seen| seen.of_wind_up(*wound_m, speed_m_s))).collect()
         }
-        IsolatedError::OfInstrument => of_any(Whose::Instrument, seen),
+        IsolatedError::OfInstrument => of_any(ErrorSource::Instrument, seen),
     })
 }
 
-/// The same of jumps or errors that may be any. An instrument that says how the robot moved may err in each displacement, as if the robot had jumped, or in each look
+/// The same of jumps or errors that may be any. An instrument that says how the robot moved may err in each displacement, as if the robot had jumped, or in each measurement
 /// of which it takes the difference: it does one or the other.
-fn of_any(whose: Whose, seen: &[Seen]) -> Vec<Vec<f64>> {
-    type Of = fn(&Seen, f64, f64) -> f64;
+fn of_any(source: ErrorSource, seen: &[Measured]) -> Vec<Vec<f64>> {
+    type Of = fn(&Measured, f64, f64) -> f64;
     let before_look: Of = |seen, jump_m, jump_rad| seen.error(ANY, jump_m, jump_rad);
-    let kinds: &[Of] = match whose {
-        Whose::Robot => &[before_look],
-        Whose::Instrument if seen.iter().all(|seen| seen.large.is_displacement) => &[Seen::of_look, before_look],
-        Whose::Instrument => &[Seen::of_look],
+    let kinds: &[Of] = match source {
+        ErrorSource::Robot => &[before_look],
+        ErrorSource::Instrument if seen.iter().all(|seen| seen.large.is_displacement) => {
+            &[Measured::of_look, before_look]
+        }
+        ErrorSource::Instrument => &[Measured::of_look],
     };
     let both =
         kinds.iter().flat_map(|of| ERRORS.iter().flat_map(move |m| ERRORS.iter().map(move |rad| (of, *m, *rad))));
@@ -382,8 +390,8 @@ mod tests {
     use estimation::FitSettings;
     use kinematics::{Increment, Pose, Wheels};
 
-    use super::{Whose, log_likelihoods};
-    use crate::augmented_model::Extended;
+    use super::{ErrorSource, log_likelihoods};
+    use crate::augmented_model::AugmentedModel;
 
     const ROW_S: f64 = 0.1;
     const ROWS_A_LOOK: u32 = 10;
@@ -399,39 +407,39 @@ mod tests {
         Wheels { left: share * left, right: share * right }
     }
 
-    /// Six runs of a robot whose wheels lose way and whose looks err as `cause` does, with white errors of a millimetre or so.
-    fn driven(cause: &str, displaced: bool) -> Dataset {
+    /// Six runs of a robot whose wheels lose way and whose measurements err as `cause` does, with white errors of a millimetre or so.
+    fn driven(cause: &str, mahalanobis_distance: bool) -> Dataset {
         let mut runs = Vec::new();
         for run in 0..6_u32 {
             let address = Address { seed: 17, point: 0, trial: 0, run };
             let mut stream: Stream = address.stream(StreamName::new("test"));
             let (mut angles, mut pose) = (Wheels { left: vec![0.0], right: vec![0.0] }, Pose::IDENTITY);
-            let (mut looks, mut behind_m) = (Vec::new(), Wheels::both(0.0));
+            let (mut measurements, mut behind_m) = (Vec::new(), Wheels::both(0.0));
             for row in 0..=680_u32 {
                 if row % ROWS_A_LOOK == 0 {
                     let errs = [stream.normal(), stream.normal(), stream.normal()];
                     let jumps = [stream.normal(), stream.normal(), stream.normal()];
                     let far = if cause == "truth_outliers" && stream.uniform() < 0.03 { 0.02 } else { 0.0 };
                     let [x_m, y_m, theta_rad] = std::array::from_fn(|k| 1e-3 * errs[k] + far * jumps[k]);
-                    looks.push(Pose::new(pose.x_m + x_m, pose.y_m + y_m, pose.theta_rad + theta_rad));
+                    measurements.push(Pose::new(pose.x_m + x_m, pose.y_m + y_m, pose.theta_rad + theta_rad));
                 }
                 let (tread, before) =
                     (tread_m(run, row), if row > 0 { tread_m(run, row - 1) } else { tread_m(run, 84) });
-                let (chance, amount) = (stream.uniform(), stream.uniform());
+                let (relative_odds, amount) = (stream.uniform(), stream.uniform());
                 let mut ground = tread;
                 match cause {
                     // Eight millimetres of one wheel.
-                    "bumps" if tread.left != 0.0 && chance < 0.02 => {
+                    "bumps" if tread.left != 0.0 && relative_odds < 0.02 => {
                         let lost = |m: f64| m - 0.008 * m.signum();
                         if amount < 0.5 { ground.left = lost(ground.left) } else { ground.right = lost(ground.right) }
                     }
                     // One start or stop in four is too hard.
                     "traction_loss" if row % 85 == 2 || row % 85 == 72 => {
-                        let lost = if chance < 0.25 { 0.5 + amount } else { 0.0 };
+                        let lost = if relative_odds < 0.25 { 0.5 + amount } else { 0.0 };
                         ground = tread.zip_with(before, |tread, before| tread - lost * (tread - before));
                     }
                     // Behind while it stands, in one stop of three.
-                    "stick_slip" if row % 85 == 74 && chance < 0.33 => {
+                    "stick_slip" if row % 85 == 74 && relative_odds < 0.33 => {
                         behind_m =
                             Wheels { left: 0.012 * amount, right: 0.0 }.zip_with(tread, |m, tread| m * tread.signum());
                         ground = ground.zip_with(behind_m, |ground, behind| ground - behind);
@@ -443,24 +451,25 @@ mod tests {
                     _ => {}
                 }
                 pose = pose * Increment::from_travel(ground, SEPARATION_M).arc();
-                if cause == "kicked aside" && chance < 0.02 {
+                if cause == "kicked aside" && relative_odds < 0.02 {
                     pose = pose * Pose::new(0.0, 0.03 * (amount - 0.5), 0.0);
                 }
                 angles.left.push(angles.left[row as usize] + tread.left / 0.08);
                 angles.right.push(angles.right[row as usize] + tread.right / 0.08);
             }
-            let look_s = |k: usize| ROW_S * f64::from(ROWS_A_LOOK) * f64::from(u32::try_from(k).expect("few"));
-            let of_poses =
-                |(k, look): (usize, &Pose)| TruthSample::new(look_s(k), look.x_m, look.y_m, Some(look.theta_rad));
+            let measurement_s = |k: usize| ROW_S * f64::from(ROWS_A_LOOK) * f64::from(u32::try_from(k).expect("few"));
+            let of_poses = |(k, measurement): (usize, &Pose)| {
+                TruthSample::new(measurement_s(k), measurement.x_m, measurement.y_m, Some(measurement.theta_rad))
+            };
             let of_pairs = |(k, pair): (usize, &[Pose])| {
                 let moved = pair[0].to(pair[1]);
-                let (t0_s, t1_s) = (look_s(k), look_s(k + 1));
+                let (t0_s, t1_s) = (measurement_s(k), measurement_s(k + 1));
                 Displacement { t0_s, t1_s, dx_m: moved.x_m, dy_m: moved.y_m, dtheta_rad: moved.theta_rad }
             };
-            let (truth, displacements) = if displaced {
-                (Vec::new(), looks.windows(2).enumerate().map(of_pairs).collect())
+            let (truth, displacements) = if mahalanobis_distance {
+                (Vec::new(), measurements.windows(2).enumerate().map(of_pairs).collect())
             } else {
-                (looks.iter().enumerate().map(of_poses).collect(), Vec::new())
+                (measurements.iter().enumerate().map(of_poses).collect(), Vec::new())
             };
             let t_s = (0..=681).map(|row| ROW_S * f64::from(row)).collect();
             let info = RunInfo { id: format!("run-{run}"), ..RunInfo::default() };
@@ -481,8 +490,8 @@ mod tests {
     /// The names with the logs of their chances, the likeliest first, and that of any cause.
     fn order(dataset: &Dataset) -> (Vec<(&'static str, f64)>, f64) {
         let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
-        let any = [Whose::Robot, Whose::Instrument];
-        let (likelihoods, any) = log_likelihoods(&Extended::alone(&fit), &NAMES, &any).expect("large errors");
+        let any = [ErrorSource::Robot, ErrorSource::Instrument];
+        let (likelihoods, any) = log_likelihoods(&AugmentedModel::base(&fit), &NAMES, &any).expect("large errors");
         let mut order: Vec<_> = NAMES.into_iter().zip(likelihoods).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
         (order, any)
@@ -490,7 +499,7 @@ mod tests {
 
     #[test]
     fn the_cause_that_made_them_is_the_likeliest_of_large_errors() {
-        for (cause, displaced) in [
+        for (cause, mahalanobis_distance) in [
             ("bumps", false),
             ("bumps", true),
             ("traction_loss", false),
@@ -498,11 +507,11 @@ mod tests {
             ("truth_outliers", true),
             ("stick_slip", false),
         ] {
-            let (order, any) = order(&driven(cause, displaced));
+            let (order, any) = order(&driven(cause, mahalanobis_distance));
             // Twenty to one: with the signs of ways lost the wrong way round, the first two are not the first.
-            assert_eq!(order[0].0, cause, "{displaced}: {order:?} {any}");
-            assert!(order[0].1 > order[1].1 + 3.0, "{cause} {displaced}: {order:?} {any}");
-            assert!(order[0].1 > any - 3.0, "{cause} {displaced}: {order:?} {any}");
+            assert_eq!(order[0].0, cause, "{mahalanobis_distance}: {order:?} {any}");
+            assert!(order[0].1 > order[1].1 + 3.0, "{cause} {mahalanobis_distance}: {order:?} {any}");
+            assert!(order[0].1 > any - 3.0, "{cause} {mahalanobis_distance}: {order:?} {any}");
         }
     }
 

@@ -1,45 +1,45 @@
 //! Whether estimated parameters make an effect that can be.
 
-use effects::{Effect, effect_of_sizes};
+use effects::{Effect, effect_from_estimates};
 use estimation::NoiseComponent;
 
-use crate::augmented_model::Extended;
-use crate::candidate::Choice;
-use crate::wald::examine;
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::Candidate;
+use crate::wald::wald_test;
 
-/// Whether a choice's sizes make an effect that can be: a share that is lost is no gain.
-pub(crate) fn is_physical(extended: &Extended<'_>, place: usize) -> bool {
-    let choice = &extended.choices[place];
-    let Choice::Effect { .. } = choice else { return true };
-    let Some((test, _)) = examine(extended, place) else { return false };
+/// Whether a candidate's sizes make an effect that can be: a share that is lost is no gain.
+pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
+    let candidate = &extended.candidates[index];
+    let Candidate::Effect { .. } = candidate else { return true };
+    let Some((test, _)) = wald_test(extended, index) else { return false };
     let scatters = |effect: Effect| scatters_enough(extended, effect.physical().scatter_of_contact_m());
-    effect_of(choice, &test.sizes).is_some_and(scatters)
+    effect_of(candidate, &test.estimates).is_some_and(scatters)
 }
 
-/// The effect that a choice is with some sizes, each with its standard deviation, if there can be one. What is within its error of nothing counts as nothing.
-pub(crate) fn effect_of(choice: &Choice, sizes: &[(f64, f64)]) -> Option<Effect> {
-    let parameters = choice.parameters();
-    let fitted = parameters.iter().zip(sizes);
-    let sizes: Vec<(&str, f64)> = fitted
+/// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one. What is within its error of nothing counts as nothing.
+pub(crate) fn effect_of(candidate: &Candidate, estimates: &[(f64, f64)]) -> Option<Effect> {
+    let parameters = candidate.parameters();
+    let fitted = parameters.iter().zip(estimates);
+    let estimates: Vec<(&str, f64)> = fitted
         .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
-        .chain(choice.held())
+        .chain(candidate.held())
         .collect();
-    effect_of_sizes(choice.id(), &sizes).filter(|effect| effect.physical().check().is_ok())
+    effect_from_estimates(candidate.id(), &estimates).filter(|effect| effect.physical().check().is_ok())
 }
 
-/// A scatter of more than so many times a look's variance would be seen in the noise, though it be there in some looks only: a robot creeps or stands in a fourth of them at
+/// A scatter of more than so many times a measurement's variance would be seen in the noise, though it be there in some measurements only: a robot creeps or stands in a fourth of them at
 /// least where its wheels are seen to stick. Of sticking wheels of the blind benchmark it is 2.7 at the most, of play in the wheels that is taken for it 6.8.
 const SEEN_SCATTER: f64 = 4.0;
 
 /// Whether the noise of a fit leaves room for what the contacts of both wheels scatter by.
-fn scatters_enough(extended: &Extended<'_>, contact_m: f64) -> bool {
+fn scatters_enough(extended: &AugmentedModel<'_>, contact_m: f64) -> bool {
     let fit = &extended.fit;
     let variance = |of| fit.fit.noise.sigma(of).powi(2);
-    let way_m = fit.records.way_between_looks_m(&fit.fit.model);
-    let (wheel, separation_m) = (variance(NoiseComponent::Wheel) * way_m, fit.fit.model.separation_m);
+    let distance_m = fit.records.distance_between_measurements_m(&fit.fit.model);
+    let (wheel, separation_m) = (variance(NoiseComponent::Wheel) * distance_m, fit.fit.model.separation_m);
     // Along, half of each wheel; in heading, their difference.
-    let along = variance(NoiseComponent::LookPosition) + 0.5 * wheel;
-    let heading = variance(NoiseComponent::LookHeading) + 2.0 * wheel / separation_m.powi(2);
+    let along = variance(NoiseComponent::MeasurementPosition) + 0.5 * wheel;
+    let heading = variance(NoiseComponent::MeasurementHeading) + 2.0 * wheel / separation_m.powi(2);
     let of_both = contact_m * contact_m;
     (0.5 * of_both / along).max(2.0 * of_both / separation_m.powi(2) / heading) <= SEEN_SCATTER
 }

@@ -2,13 +2,13 @@
 //! known of them widens the sizes.
 //!
 //! Near its minimum the cost is a parabola of the parameter's logarithm; its curvature is what is known of it, beside that it lies in the range that is tried.
-//! A size that goes with the shape is known by as much less: σ² = σ²(θ | x) + w², w being how far the size goes, either way, over the shapes that 95 % of chance
-//! leaves, over 1.96. Where little is known of the shape, a size is far from going with it in a line.
+//! A size that goes with the variant is known by as much less: σ² = σ²(θ | x) + w², w being how far the size goes, either way, over the variants that 95 % of chance
+//! leaves, over 1.96. Where little is known of the variant, a size is far from going with it in a line.
 //! Reference: Cox & Hinkley 1974 (profile likelihood).
 
-use estimation::JointFit;
+use estimation::ModelFit;
 
-use crate::augmented_model::{Extended, cost, count, refit};
+use crate::augmented_model::{AugmentedModel, cost, count, refit};
 
 /// Times that the parabola is drawn anew, each time closer.
 const ROUNDS: usize = 2;
@@ -20,28 +20,28 @@ const CLOSER: f64 = 0.25;
 /// One value of the parameter's logarithm, with the fit there.
 struct Point<'a> {
     x: f64,
-    model: Extended<'a>,
+    model: AugmentedModel<'a>,
 }
 
-/// Fits the shape of a choice of a model, where it has one that may be anything, and says how much wider its sizes are for it: their standard deviations.
-pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place: usize) -> Vec<f64> {
-    let choice = model.choices[place].clone();
-    let parameters = choice.parameters().len();
-    let first = model.range(place).start;
+/// Fits the variant of a candidate of a model, where it has one that may be anything, and says how much wider its sizes are for it: their standard deviations.
+pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a>, index: usize) -> Vec<f64> {
+    let candidate = model.candidates[index].clone();
+    let parameters = candidate.parameters().len();
+    let first = model.range(index).start;
     let none = vec![0.0; parameters];
-    let grid: Vec<f64> = choice.grid().iter().map(|value| value.ln()).collect();
-    let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), choice.held().first()) else {
+    let grid: Vec<f64> = candidate.grid().iter().map(|value| value.ln()).collect();
+    let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), candidate.held().first()) else {
         return none;
     };
     #[allow(clippy::cast_precision_loss)] // a handful of values
     let mut reach = (high - low) / (grid.len().max(2) - 1) as f64;
-    // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other shapes.
+    // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other variants.
     let (low_end, high_end) = (low - 0.5 * reach, high + 0.5 * reach);
     let at = |x: f64| -> Option<Point<'a>> {
         let x = x.clamp(low_end, high_end);
-        let mut choices = model.choices.clone();
-        choices[place] = choice.moved_to(x.exp());
-        Some(Point { x, model: refit(base, model, choices)? })
+        let mut candidates = model.candidates.clone();
+        candidates[index] = candidate.moved_to(x.exp());
+        Some(Point { x, model: refit(base, model, candidates)? })
     };
     let mut best = Point { x: held.ln(), model: model.clone() };
     let mut sigma = 0.0;
@@ -55,11 +55,11 @@ pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place
         let (Some(below), Some(above)) = (at(best.x - reach), at(best.x + reach)) else { return none };
         let most = [&below, &best, &above].map(|point| count(&point.model.fit)).into_iter().fold(0.0, f64::max);
         let costs = [&below, &best, &above].map(|point| cost(&point.model.fit, most));
-        let (slope, bend) =
+        let (slope, curvature) =
             ((costs[2] - costs[0]) / (2.0 * reach), (costs[2] - 2.0 * costs[1] + costs[0]) / (reach * reach));
         // Where nothing is known of it, it lies anywhere in the range that is tried.
-        sigma = bend.max(0.0).sqrt().recip().min(high_end - low_end);
-        let vertex = if bend > 0.0 { best.x + (-slope / bend).clamp(-reach, reach) } else { best.x };
+        sigma = curvature.max(0.0).sqrt().recip().min(high_end - low_end);
+        let vertex = if curvature > 0.0 { best.x + (-slope / curvature).clamp(-reach, reach) } else { best.x };
         let points = [Some(below), at(vertex), Some(above)].into_iter().flatten();
         best = points.fold(best, |best, point| {
             let most = count(&best.model.fit).max(count(&point.model.fit));
@@ -68,12 +68,12 @@ pub(crate) fn fit_shape<'a>(base: &JointFit<'a>, model: &mut Extended<'a>, place
         reach = (1.5 * sigma).clamp(CLOSER * reach, reach);
     }
     let ends = [best.x - WITHIN_95 * sigma, best.x + WITHIN_95 * sigma].map(at);
-    let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.sizes[first + k];
-    let wider = |k: usize| {
+    let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.term_values[first + k];
+    let extra_sigma = |k: usize| {
         let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
         moved.fold(0.0, f64::max) / WITHIN_95
     };
-    let wider = (0..parameters).map(wider).collect();
+    let extra_sigma = (0..parameters).map(extra_sigma).collect();
     *model = best.model;
-    wider
+    extra_sigma
 }

@@ -4,8 +4,8 @@
 //! hides is worse than none.
 
 use dataset::{Dataset, Session};
-use effects::{CATALOGUE, Hypothesis, Rewriting, hypothesis};
-use estimation::{FitSettings, JointFit, NoiseComponent};
+use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
+use estimation::{FitSettings, ModelFit, NoiseComponent};
 
 use crate::augmented_model::{cost, count};
 
@@ -22,11 +22,11 @@ const WHEEL_SIGMA: f64 = 0.01;
 const TURN_SIGMA: f64 = 0.05;
 /// So many times as much and the counts do not follow the robot at all.
 const LOST: f64 = 3.0;
-/// Looks that err by this share of how far they saw the robot go, or by so many radians, hardly saw it.
+/// Measurements that err by this share of how far they saw the robot go, or by so many radians, hardly saw it.
 const BLURRED: f64 = 0.3;
-/// A share of looks that do not fit beyond which something is wrong with the records.
+/// A share of measurements that do not fit beyond which something is wrong with the records.
 const OUTLIERS: f64 = 0.01;
-/// Share of the looks that did not fit before which may still not fit in records that are rewritten, and a share of all looks that may: tails are heavy, rows are lost as
+/// Share of the measurements that did not fit before which may still not fit in records that are rewritten, and a share of all measurements that may: tails are heavy, rows are lost as
 /// well, and each such look is charged.
 const STILL_OFF: f64 = 0.5;
 const MAY_BE_OFF: f64 = 0.1;
@@ -51,67 +51,68 @@ impl Fault {
 const PLAIN: FitSettings = FitSettings::GEOMETRY_ONLY;
 
 /// An instrument turned farther than this on the robot is more of a claim than the fault.
-const MOST_TURNED_RAD: f64 = 1.0;
+const MAX_ROTATED_RAD: f64 = 1.0;
 
 pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one; `astray` leaves it at the former.
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one; `outlying` leaves it at the former.
 pub(crate) fn fault(
     datasets: &[Dataset],
-    base: Option<&JointFit<'_>>,
+    base: Option<&ModelFit<'_>>,
     without: &[String],
-    astray: bool,
+    outlying: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
     let lost = base.is_some_and(|base| !follows(base));
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
-        let Some(Hypothesis::Records(rewritings)) = hypothesis(id) else { continue };
+        let Some(Hypothesis::Records(corrections)) = hypothesis(id) else { continue };
         // What leaves no trace is possible in any records; it is tried where the base fit is hard to believe.
         if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
-        for Form { sizes, sentence, evident, records } in together(datasets, rewritings) {
-            if astray && !evident {
+        for Form { sizes, sentence, visible_in_log, records } in together(datasets, corrections) {
+            if outlying && !visible_in_log {
                 continue;
             }
             let own = sessions(&records);
             let Ok(fit) = PLAIN.fit(&own) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not
-            // restored to the last count: looks may still lie off, but far fewer of them.
-            let most_outliers = base.map_or(MAY_BE_OFF, |base| MAY_BE_OFF.max(STILL_OFF * left_out(base)));
+            // restored to the last count: measurements may still lie off, but far fewer of them.
+            let most_outliers = base.map_or(MAY_BE_OFF, |base| MAY_BE_OFF.max(STILL_OFF * rejected_share(base)));
             let follows = is_drive(&fit)
-                && left_out(&fit) < most_outliers
-                && fit.fit.model.body_from_sensor.theta_rad.abs() <= MOST_TURNED_RAD;
-            if !follows && !evident {
+                && rejected_share(&fit) < most_outliers
+                && fit.fit.model.body_from_sensor.theta_rad.abs() <= MAX_ROTATED_RAD;
+            if !follows && !visible_in_log {
                 continue;
             }
             let gain = base.map_or(f64::MAX, |base| {
-                // Looks that only one of the fits explains are charged as outliers to the other.
-                let looks = count(base).max(count(&fit));
-                cost(base, looks) + implausible(base) - cost(&fit, looks) - implausible(&fit)
+                // Measurements that only one of the fits explains are charged as outliers to the other.
+                let measurements = count(base).max(count(&fit));
+                cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
             });
             // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
-            let least = match evident {
+            let least = match visible_in_log {
                 true if lost => f64::NEG_INFINITY,
                 true => -GAIN,
                 false => GAIN,
             };
-            let better =
-                |(shown, known): &(bool, Fault)| (evident, gain) > (*shown, known.gain + f64::from(u8::from(*shown)));
+            let better = |(shown, known): &(bool, Fault)| {
+                (visible_in_log, gain) > (*shown, known.gain + f64::from(u8::from(*shown)))
+            };
             if gain > least && best.as_ref().is_none_or(better) {
-                best = Some((evident, Fault { id, sizes, sentence, records, gain: gain.max(GAIN) }));
+                best = Some((visible_in_log, Fault { id, sizes, sentence, records, gain: gain.max(GAIN) }));
             }
         }
     }
     best.map(|(_, fault)| fault)
 }
 
-/// How implausible the lengths of a fit are, as a part of its cost.
-fn implausible(fit: &JointFit<'_>) -> f64 {
+/// How implausible the geometry parameters of a fit are, as a part of its cost.
+fn implausible(fit: &ModelFit<'_>) -> f64 {
     let (model, nominal) = (&fit.fit.model, &fit.nominal);
     let off = |of: f64, nominal: f64, sd: f64| 0.5 * ((of / nominal).abs().ln() / sd).powi(2);
     off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_SD)
@@ -120,29 +121,29 @@ fn implausible(fit: &JointFit<'_>) -> f64 {
         + 0.5 * (model.body_from_sensor.theta_rad / MOUNT_SD_RAD).powi(2)
 }
 
-/// Share of looks that a fit takes for outliers.
-pub(crate) fn left_out(fit: &JointFit<'_>) -> f64 {
+/// Share of measurements that a fit takes for outliers.
+pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
     #[allow(clippy::cast_precision_loss)]
-    let share = fit.fit.pass.outliers.len() as f64 / fit.records.looks().max(1) as f64;
+    let share = fit.fit.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64;
     share
 }
 
 /// Does a base fit look like a robot whose counts follow it?
-fn is_sound(fit: &JointFit<'_>) -> bool {
-    is_drive(fit) && left_out(fit) < OUTLIERS
+fn is_sound(fit: &ModelFit<'_>) -> bool {
+    is_drive(fit) && rejected_share(fit) < OUTLIERS
 }
 
 /// Does the robot go where a drive of any lengths would, by the counts?
-pub(crate) fn follows(fit: &JointFit<'_>) -> bool {
+pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.fit.noise.sigma(of);
     sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA
         && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
-        && sigma(NoiseComponent::LookPosition) < BLURRED * fit.records.extent_m()
-        && sigma(NoiseComponent::LookHeading) < BLURRED
+        && sigma(NoiseComponent::MeasurementPosition) < BLURRED * fit.records.extent_m()
+        && sigma(NoiseComponent::MeasurementHeading) < BLURRED
 }
 
 /// Are a fit's lengths and noise those of a drive?
-fn is_drive(fit: &JointFit<'_>) -> bool {
+fn is_drive(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.fit.model, &fit.nominal);
     let near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
     near(model.m_per_rad.left, nominal.m_per_rad.left, 2.0 * WHEEL_SD)
@@ -157,7 +158,7 @@ fn is_drive(fit: &JointFit<'_>) -> bool {
 const ANOTHER_ROBOT: f64 = 1.3;
 
 /// By which factor the wheels of a fit are too large or too small for the robot that its description tells of, if they are.
-pub(crate) fn wrong_wheels(fit: &JointFit<'_>) -> Option<f64> {
+pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
     let ratio = fit.fit.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
     let factor = (ratio.left * ratio.right).sqrt();
     (factor.ln().abs() > ANOTHER_ROBOT.ln()).then_some(factor)
@@ -168,7 +169,7 @@ struct Form {
     sizes: Vec<(&'static str, f64)>,
     sentence: String,
     /// The log of some session shows it by itself.
-    evident: bool,
+    visible_in_log: bool,
     /// The records without it.
     records: Vec<Dataset>,
 }
@@ -185,21 +186,21 @@ fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
 }
 
 /// The same rewriting of all sessions; a session in which it is impossible stays as it is.
-fn together(datasets: &[Dataset], rewritings: fn(&Dataset) -> Vec<Rewriting>) -> Vec<Form> {
-    let each: Vec<Vec<Rewriting>> = datasets.iter().map(rewritings).collect();
+fn together(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrection>) -> Vec<Form> {
+    let each: Vec<Vec<RecordCorrection>> = datasets.iter().map(corrections).collect();
     let mut forms: Vec<Form> = Vec::new();
-    for rewriting in each.iter().flatten() {
-        match forms.iter_mut().find(|form| is_same(&form.sizes, &rewriting.sizes)) {
+    for correction in each.iter().flatten() {
+        match forms.iter_mut().find(|form| is_same(&form.sizes, &correction.sizes)) {
             Some(form) => {
-                form.evident |= rewriting.evident;
-                if form.sentence != rewriting.sentence {
-                    form.sentence = format!("{}; {}", form.sentence, rewriting.sentence);
+                form.visible_in_log |= correction.visible_in_log;
+                if form.sentence != correction.sentence {
+                    form.sentence = format!("{}; {}", form.sentence, correction.sentence);
                 }
             }
             None => forms.push(Form {
-                sizes: rewriting.sizes.clone(),
-                sentence: rewriting.sentence.clone(),
-                evident: rewriting.evident,
+                sizes: correction.sizes.clone(),
+                sentence: correction.sentence.clone(),
+                visible_in_log: correction.visible_in_log,
                 records: Vec::new(),
             }),
         }
@@ -209,8 +210,8 @@ fn together(datasets: &[Dataset], rewritings: fn(&Dataset) -> Vec<Rewriting>) ->
             .iter()
             .zip(&each)
             .map(|(dataset, own)| {
-                let same = own.iter().find(|rewriting| is_same(&form.sizes, &rewriting.sizes));
-                same.map_or_else(|| dataset.clone(), |rewriting| rewriting.records.clone())
+                let same = own.iter().find(|correction| is_same(&form.sizes, &correction.sizes));
+                same.map_or_else(|| dataset.clone(), |correction| correction.records.clone())
             })
             .collect();
     }

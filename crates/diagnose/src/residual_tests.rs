@@ -5,22 +5,22 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::{Chain, Innovation, JointFit, Projected, WHITE_BELOW};
+use estimation::{Innovation, ModelFit, Projected, Segment, WHITE_BELOW};
 use kinematics::Side;
 
-use crate::augmented_model::Extended;
-use crate::candidate::Choice;
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::Candidate;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariates::{of_cycles, of_runs};
-use crate::scan::{ask, freedom, principal};
+use crate::scan::{freedom, principal, scan_parts_of};
 use crate::settings::CHECKS_LEVEL;
-use crate::statistics::{holm, of_trials, p_of_chi_square, p_of_score, p_of_z};
+use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z, sidak};
 
-/// Correlations with so many looks before are summed.
+/// Correlations with so many measurements before are summed.
 const LAGS: usize = 5;
-/// A look off by this much is an outlier with a chance of 1e-5.
+/// A measurement off by this much is an outlier with a chance of 1e-5.
 const OUTLIER_CHANCE: f64 = 1e-5;
-/// The look after an outlier fits unless its chance is below this.
+/// The measurement after an outlier fits unless its chance is below this.
 const BACK_AGAIN: f64 = 0.01;
 /// An innovation this large, in standard deviations, comes from the tail.
 const LARGE: f64 = 3.0;
@@ -32,22 +32,22 @@ const UNDONE: f64 = 0.5;
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
-    /// Displacements that fail to be white: they resemble each other for longer, and less plainly, than what a filter leaves of looks.
-    pub(crate) resemble: bool,
+    /// Displacements that fail to be white: they resemble each other for longer, and less plainly, than what a filter leaves of measurements.
+    pub(crate) autocorrelated: bool,
     pub(crate) checks: Vec<TestResult>,
     /// Correlation of innovations that follow each other: coefficient at lag one, and standard errors.
     pub(crate) correlation: (f64, f64),
     pub(crate) outliers: Outliers,
 }
 
-/// Looks that do not fit.
+/// Measurements that do not fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Outliers {
     /// Those after which the robot is seen where it should be: of displacements, pairs that undo each other.
     pub(crate) isolated: usize,
     /// Those after which the robot is seen where the outlier was, and displacements that no neighbour undoes.
     pub(crate) staying: usize,
-    pub(crate) looks: usize,
+    pub(crate) measurements: usize,
     pub(crate) p_value: f64,
 }
 
@@ -55,13 +55,14 @@ pub(crate) struct Outliers {
 struct Question {
     name: String,
     /// In groups, each of which is tested as a whole: the best of them answers, and pays for all.
-    groups: Vec<Vec<Choice>>,
+    groups: Vec<Vec<Candidate>>,
 }
 
-fn questions(fit: &JointFit<'_>) -> Vec<Question> {
+fn questions(fit: &ModelFit<'_>) -> Vec<Question> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, Bend, CosHeading, CosPhase, LastTurn, RunTime, SessionTime, SinHeading,
-        SinPhase, SinceReversal, Speed, Way, WheelSinceReversal, WheelSpeed, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, Curvature, LastTurn, RunTime, SessionTime,
+        SinHeading, SinPhase, SinceReversal, Speed, Way, WheelSinceReversal, WheelSpeed, X, Y, YawAcceleration,
+        YawRate,
     };
     let mut questions: Vec<(String, Vec<Vec<Covariate>>)> = [
         ("speed", vec![vec![AbsSpeed], vec![Speed, AbsSpeed]]),
@@ -82,7 +83,7 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
         let name = format!("covariate_{}", covariate.name());
         questions.push((name, vec![vec![covariate.clone(), Speed], vec![covariate, YawRate]]));
     }
-    let on = |channel, covariates: &[Covariate]| Choice::Sparse(Sparse { channel, covariates: covariates.to_vec() });
+    let on = |channel, covariates: &[Covariate]| Candidate::Sparse(Sparse { channel, covariates: covariates.to_vec() });
     let on_motion = |product: &Vec<Covariate>| Channel::MOTION.map(|channel| on(channel, product));
     let of_motion = questions
         .into_iter()
@@ -98,21 +99,21 @@ fn questions(fit: &JointFit<'_>) -> Vec<Question> {
             [Channel::LeftWheel, Channel::RightWheel].map(|channel| on(channel, &of_wheel)).to_vec(),
         ],
     };
-    let bends = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Bend])).to_vec();
+    let bends = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Curvature])).to_vec();
     let of_bends = Question { name: "bend".to_owned(), groups: vec![bends] };
     // A row that is longer than usual by its stamps, and not in truth.
-    let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Choice::Sparse(Sparse::of_rows())]] };
+    let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Candidate::Sparse(Sparse::of_rows())]] };
     // A cosine and a sine for each number of cycles in a turn.
     let of_cycles = |(side, name): (Side, &str)| Question {
         name: name.to_owned(),
-        groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Choice::Sparse).collect()).collect(),
+        groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Candidate::Sparse).collect()).collect(),
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
     of_motion.chain([of_reversals, of_bends, of_rows]).chain(of_wheels).collect()
 }
 
 /// Asks the residuals of a model.
-pub(crate) fn check(model: &Extended<'_>) -> Checked {
+pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let fit = &model.fit;
     let mut checks = Vec::new();
     let mut add = |check: Check, statistic: f64, p_value: f64| {
@@ -127,20 +128,20 @@ pub(crate) fn check(model: &Extended<'_>) -> Checked {
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
-    let is_displaced = fit.records.chains.iter().all(Chain::is_displacement);
+    let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
     let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
-    let resemble = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
-    Checked { resemble, checks, correlation, outliers }
+    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
+    Checked { autocorrelated, checks, correlation, outliers }
 }
 
-/// The innovations of the first phase: phases share their looks' errors.
-fn innovations<'f>(fit: &'f JointFit<'_>, component: usize) -> Vec<&'f Innovation> {
+/// The innovations of the first phase: phases share their measurements' errors.
+fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovation> {
     let first = fit.fit.pass.innovations.first();
     first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
 }
 
-/// Σz² over the looks, and how it differs between runs: the noise is one for all.
-fn size(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+/// Σz² over the measurements, and how it differs between runs: the noise is one for all.
+fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let squares: Vec<f64> = innovations(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
         #[allow(clippy::cast_precision_loss)]
@@ -171,9 +172,9 @@ fn size(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     }
 }
 
-/// Ljung & Box over the looks of each chain and the displacements of each run; returns the correlation that stands out most: its
+/// Ljung & Box over the measurements of each segment and the displacements of each run; returns the correlation that stands out most: its
 /// coefficient at lag one, and its standard errors.
-fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64, f64) {
+fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64, f64) {
     let mut strongest = (0.0, 0.0_f64);
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
@@ -187,12 +188,12 @@ fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
         let (mut resembles, mut weights) = (0.0, 0.0_f64);
         for lag in 1..=LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
-            let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].chain, pair[lag].chain);
+            let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
             for pair in series.windows(lag + 1).filter(follows) {
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
                 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // five
-                let weight = fit.records.weight_of_pair(pair[0].chain, pair[lag].chain, lag as i32);
+                let weight = fit.records.weight_of_pair(pair[0].segment, pair[lag].segment, lag as i32);
                 resembles += weight * pair[0].z * pair[lag].z;
                 weights += weight * weight;
             }
@@ -217,7 +218,7 @@ fn whiteness(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
     strongest
 }
 
-fn tails(fit: &JointFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         #[allow(clippy::cast_precision_loss)]
@@ -244,36 +245,38 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
     ((1.0 - 2.0 / (9.0 * a)) - ((1.0 - 2.0 / a) / low.abs()).cbrt() * low.signum()) / (2.0 / (9.0 * a)).sqrt()
 }
 
-/// Looks far off, and what follows large innovations: after a jump of the robot the next looks are off the same way, as the filter has followed only in part;
-/// after an error of one look they are off the other way, or not at all where the look was left out.
+/// Measurements far off, and what follows large innovations: after a jump of the robot the next measurements are off the same way, as the filter has followed only in part;
+/// after an error of one measurement they are off the other way, or not at all where the measurement was left out.
 ///
 /// A displacement starts anew where the instrument stood, and the next is right after a jump of the robot as after an error of its own. But where it is the
-/// difference of two looks, a look that errs spoils the displacement to it and the one from it, and both together are right.
-fn outliers(fit: &JointFit<'_>) -> Outliers {
-    let mut found = Outliers { looks: innovations(fit, 0).len(), ..Outliers::default() };
+/// difference of two measurements, a measurement that errs spoils the displacement to it and the one from it, and both together are right.
+fn outliers(fit: &ModelFit<'_>) -> Outliers {
+    let mut found = Outliers { measurements: innovations(fit, 0).len(), ..Outliers::default() };
     let far = &fit.fit.pass.outliers;
     let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     let mut undone_by = None;
-    for (position, &(chain, look)) in far.iter().enumerate() {
-        if fit.records.chains[chain].is_displacement() {
-            if undone_by == Some(chain) {
+    for (position, &(segment, measurement)) in far.iter().enumerate() {
+        if fit.records.segments[segment].is_displacement() {
+            if undone_by == Some(segment) {
                 undone_by = None;
-            } else if undo(fit, chain, chain + 1, chain) {
-                undone_by = Some(chain + 1);
+            } else if undo(fit, segment, segment + 1, segment) {
+                undone_by = Some(segment + 1);
                 found.isolated += 1;
-            } else if chain > 0 && undo(fit, chain - 1, chain, chain) {
+            } else if segment > 0 && undo(fit, segment - 1, segment, segment) {
                 found.isolated += 1;
             } else {
                 found.staying += 1;
             }
             continue;
         }
-        // Thinned looks have gaps between them: the next that was taken is the neighbour.
-        let next = phase.partition_point(|innovation| (innovation.chain, innovation.look) <= (chain, look));
-        let after = phase[next..].iter().take(3).filter(|innovation| innovation.chain == chain);
+        // Thinned measurements have gaps between them: the next that was taken is the neighbour.
+        let next =
+            phase.partition_point(|innovation| (innovation.segment, innovation.measurement) <= (segment, measurement));
+        let after = phase[next..].iter().take(3).filter(|innovation| innovation.segment == segment);
         let (square, values) = after.fold((0.0, 0.0), |(sum, n), innovation| (sum + innovation.z.powi(2), n + 1.0));
-        let followed = far.get(position + 1).is_some_and(|&(c, l)| c == chain && l == look + 1);
-        let follows = position.checked_sub(1).is_some_and(|before| far[before].0 == chain && far[before].1 + 1 == look);
+        let followed = far.get(position + 1).is_some_and(|&(c, l)| c == segment && l == measurement + 1);
+        let follows =
+            position.checked_sub(1).is_some_and(|before| far[before].0 == segment && far[before].1 + 1 == measurement);
         if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < BACK_AGAIN) {
             found.staying += 1;
         } else {
@@ -281,30 +284,30 @@ fn outliers(fit: &JointFit<'_>) -> Outliers {
         }
     }
     #[allow(clippy::cast_precision_loss)]
-    let (count, expected) = (far.len() as f64, (found.looks + far.len()) as f64 * OUTLIER_CHANCE);
+    let (count, expected) = (far.len() as f64, (found.measurements + far.len()) as f64 * OUTLIER_CHANCE);
     // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
     found
 }
 
 /// Do two displacements that follow each other undo what is wrong with one of them? Together they must be nearer to the wheels by half.
-fn undo(fit: &JointFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
-    let of = |chains| fit.displaced(chains).unwrap_or(f64::INFINITY);
-    fit.records.goes_on(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
+fn undo(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
+    let of = |segments| fit.mahalanobis_distance(segments).unwrap_or(f64::INFINITY);
+    fit.records.continues(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
 }
 
 /// What follows large innovations of a component: the mean of the next in the direction of the large one, in standard errors. After a displacement, which starts
 /// anew, there is nothing to stay: the same says that errors last, and not whose they are.
-pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> ResidualPersistence {
+pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
     let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
-        let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].chain, pair[1].chain));
+        let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));
         if count > 0.0 { sum / count.sqrt() } else { 0.0 }
     };
-    let of_looks = follows(&|chain, next| next == chain);
-    let of_displacements = follows(&|chain, next| next == chain + 1 && fit.records.goes_on(next));
+    let of_looks = follows(&|segment, next| next == segment);
+    let of_displacements = follows(&|segment, next| next == segment + 1 && fit.records.continues(next));
     if of_looks > FOLLOWS {
         ResidualPersistence::Persistent
     } else if of_looks.min(of_displacements) < -FOLLOWS {
@@ -315,23 +318,28 @@ pub(crate) fn what_follows(fit: &JointFit<'_>, component: usize) -> ResidualPers
 }
 
 /// Score tests of every question.
-fn covariates(model: &Extended<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+fn covariates(model: &AugmentedModel<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     let questions = questions(&model.fit);
-    let parts: Vec<&[Choice]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
+    let parts: Vec<&[Candidate]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
     // Statistic and chance of each group that can be seen.
-    let answers = ask(&model.fit, &model.choices, &parts, |own, Projected { information, gradient, .. }, evidence| {
-        let parameters: Vec<_> = own.iter().flat_map(Choice::parameters).collect();
-        let shown = principal(information, gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
-        let (statistic, dimensions) =
-            shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
-        let freedom = freedom(&model.fit, evidence);
-        (dimensions > 0).then(|| (statistic, p_of_score(statistic, dimensions, evidence.count, freedom)))
-    });
+    let answers = scan_parts_of(
+        &model.fit,
+        &model.candidates,
+        &parts,
+        |own, Projected { information, gradient, .. }, equations| {
+            let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
+            let shown = principal(information, gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
+            let (statistic, dimensions) =
+                shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
+            let freedom = freedom(&model.fit, equations);
+            (dimensions > 0).then(|| (statistic, p_of_score(statistic, dimensions, equations.count, freedom)))
+        },
+    );
     let mut answers = answers.into_iter();
     for Question { name, groups } in &questions {
         let own: Vec<(f64, f64)> = answers.by_ref().take(groups.len()).flatten().collect();
         if let Some((statistic, p_value)) = own.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            add(Check::Covariate(name.clone()), *statistic, of_trials(*p_value, own.len()));
+            add(Check::Covariate(name.clone()), *statistic, sidak(*p_value, own.len()));
         }
     }
 }
@@ -339,7 +347,7 @@ fn covariates(model: &Extended<'_>, add: &mut impl FnMut(Check, f64, f64)) {
 #[cfg(test)]
 mod tests {
     use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
-    use estimation::{FitSettings, JointFit};
+    use estimation::{FitSettings, ModelFit};
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{anscombe_glynn, outliers, whiteness};
@@ -419,7 +427,7 @@ mod tests {
         dataset
     }
 
-    fn fitted(dataset: &Dataset) -> JointFit<'_> {
+    fn fitted(dataset: &Dataset) -> ModelFit<'_> {
         FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit")
     }
 
@@ -441,14 +449,14 @@ mod tests {
         assert_eq!(names, ["truth_correlated_noise"]);
     }
 
-    /// A look that errs spoils the displacement to it and the one from it; a displacement that errs alone may be the robot's jump as well.
+    /// A measurement that errs spoils the displacement to it and the one from it; a displacement that errs alone may be the robot's jump as well.
     #[test]
     fn only_displacements_that_undo_each_other_are_errors_of_a_look() {
         let ((mut dataset, paths), mut state) = (driven(), 11);
         let wrong = Pose::new(0.05, -0.03, 0.04);
         for (number, (run, path)) in dataset.runs.iter_mut().zip(&paths).enumerate() {
             let mut path = path.clone();
-            // In the first run a look errs; in the second a displacement does.
+            // In the first run a measurement errs; in the second a displacement does.
             if number == 0 {
                 path[20] = path[20] * wrong;
             }

@@ -1,6 +1,6 @@
 //! What a model leaves, look by look, against everything that was recorded: binned means with their errors, before and after the extension.
 //!
-//! A residual is an innovation: what a look sees beyond what counts, model and the looks before predict, along and across the robot (m) and of its heading (rad). Of a
+//! A residual is an innovation: what a measurement sees beyond what counts, model and the measurements before predict, along and across the robot (m) and of its heading (rad). Of a
 //! right model it has mean zero whatever it is drawn against. A bin's band is its mean ± 1.96 standard errors, from the scatter in the bin; residuals are uncorrelated
 //! where the checks of whiteness pass.
 
@@ -9,34 +9,35 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dataset::RunInfo;
-use estimation::JointFit;
+use estimation::ModelFit;
 use kinematics::{Pose, Side, wrap_to_pi};
-use model_term::{Interval, Look, ModelTerm, TermParameter};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::Serialize;
 
-use crate::augmented_model::Extended;
+use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
 use crate::statistics::p_of_chi_square;
 
 /// Bins of a covariate that varies continuously.
 const BINS: usize = 12;
 /// A bin with fewer residuals has no scatter to speak of.
-const LEAST_IN_BIN: usize = 8;
+const MIN_IN_BIN: usize = 8;
 /// Way back that counts as a reversal, metres: more than the counts of a standstill.
 const REVERSAL_M: f64 = 1e-3;
 
 /// Residuals against every covariate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Residuals {
-    /// How many looks of the calibrated model.
-    pub looks: usize,
+    /// How many measurements of the calibrated model.
+    #[serde(rename = "looks")]
+    pub measurements: usize,
     /// One for each covariate that varies, in the order of the checks.
-    pub against: Vec<Against>,
+    pub against: Vec<ResidualsByCovariate>,
 }
 
 /// Residuals against one covariate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Against {
+pub struct ResidualsByCovariate {
     /// Its name, that of the check that asks for it.
     pub covariate: String,
     /// For people.
@@ -92,19 +93,19 @@ pub struct Bin {
     pub count: usize,
 }
 
-/// What was recorded between two looks.
+/// What was recorded between two measurements.
 #[derive(Debug, Clone, Default)]
 struct Recorded {
     values: Vec<Option<f64>>,
 }
 
-/// A covariate of a look: name, words, unit, and how it is cut into bins.
+/// A covariate of a measurement: name, words, unit, and how it is cut into bins.
 struct Covariate {
     key: String,
     label: &'static str,
     unit: &'static str,
     /// It comes back after a turn.
-    round: bool,
+    periodic: bool,
     /// Varying less, it says nothing.
     least: f64,
 }
@@ -126,37 +127,42 @@ const PLAIN: [(&str, &str, &str, bool, f64); 13] = [
     ("position_y", "position in the room, y", "m", false, 0.05),
 ];
 
-fn covariates(fit: &JointFit<'_>) -> Vec<Covariate> {
-    let plain =
-        PLAIN.map(|(key, label, unit, round, least)| Covariate { key: key.to_owned(), label, unit, round, least });
+fn covariates(fit: &ModelFit<'_>) -> Vec<Covariate> {
+    let plain = PLAIN.map(|(key, label, unit, periodic, least)| Covariate {
+        key: key.to_owned(),
+        label,
+        unit,
+        periodic,
+        least,
+    });
     let of_runs = crate::covariates::of_runs(fit).into_iter().map(|covariate| Covariate {
         key: format!("covariate_{}", covariate.name()),
         label: "",
         unit: "",
-        round: false,
+        periodic: false,
         least: 0.0,
     });
     plain.into_iter().chain(of_runs).collect()
 }
 
-/// Looks by their run and instant.
+/// Measurements by their run and instant.
 type Records = Arc<Mutex<BTreeMap<(usize, u64), Recorded>>>;
 
 fn key(run: &RunInfo, t_s: f64) -> (usize, u64) {
     (std::ptr::from_ref(run) as usize, t_s.to_bits())
 }
 
-/// A term without effect that writes down what it is shown: the likelihood hands every interval and every look to its terms.
+/// A term without effect that writes down what it is shown: the likelihood hands every interval and every measurement to its terms.
 #[derive(Clone)]
 struct Recorder {
     keys: Vec<String>,
     records: Records,
-    way_m: f64,
+    distance_m: f64,
     turn_rad: f64,
     time_s: f64,
     gained_m_s: f64,
     phase_rad: [f64; 2],
-    /// How far each wheel turned since the last look, radians.
+    /// How far each wheel turned since the last measurement, radians.
     turned_rad: [f64; 2],
     session_s: f64,
     session_m: f64,
@@ -170,7 +176,7 @@ impl Recorder {
         Self {
             keys,
             records,
-            way_m: 0.0,
+            distance_m: 0.0,
             turn_rad: 0.0,
             time_s: 0.0,
             gained_m_s: 0.0,
@@ -185,7 +191,7 @@ impl Recorder {
     }
 }
 
-const NOTHING: [TermParameter; 1] = [TermParameter { name: "nothing", unit: "1", plausible: 1.0 }];
+const NOTHING: [TermParameter; 1] = [TermParameter { name: "nothing", unit: "1", prior_sigma: 1.0 }];
 
 impl ModelTerm for Recorder {
     fn parameters(&self) -> &'static [TermParameter] {
@@ -205,7 +211,7 @@ impl ModelTerm for Recorder {
         if self.session_s > 0.0 || interval.t_s > 0.0 {
             self.gained_m_s += 0.5 * (now.left + now.right - before.left - before.right);
         }
-        self.way_m += increment.distance_m;
+        self.distance_m += increment.distance_m;
         self.turn_rad += increment.turn_rad;
         self.time_s += interval.dt_s;
         for (k, side) in Side::BOTH.into_iter().enumerate() {
@@ -224,35 +230,35 @@ impl ModelTerm for Recorder {
         self.since_m = self.since_m.map(|since_m| since_m + increment.distance_m.abs());
     }
 
-    fn sight(&mut self, look: &Look<'_>, _gradient: &mut [Pose]) {
+    fn measurement(&mut self, measurement: &Measurement<'_>, _gradient: &mut [Pose]) {
         if self.time_s <= 0.0 {
             return;
         }
-        let (v, omega) = (self.way_m / self.time_s, self.turn_rad / self.time_s);
+        let (v, omega) = (self.distance_m / self.time_s, self.turn_rad / self.time_s);
         let degrees = |angle_rad: f64| wrap_to_pi(angle_rad).to_degrees();
-        // A wheel that turned on and on between two looks has no one phase.
+        // A wheel that turned on and on between two measurements has no one phase.
         let phase = |k: usize| (self.turned_rad[k].abs() < FRAC_PI_2).then(|| degrees(self.phase_rad[k]));
         let value = |key: &String| match &key[..] {
             "speed" => Some(v),
             "yaw_rate" => Some(omega),
             "speed_times_yaw_rate" => Some(v * omega),
             "acceleration" => Some(self.gained_m_s / self.time_s),
-            "heading_in_the_room" => Some(degrees(look.world_from_body.theta_rad)),
+            "heading_in_the_room" => Some(degrees(measurement.world_from_body.theta_rad)),
             "left_wheel_phase" => phase(0),
             "right_wheel_phase" => phase(1),
-            "time_in_run" => Some(look.t_s),
+            "time_in_run" => Some(measurement.t_s),
             "time_in_session" => Some(self.session_s),
             "distance" => Some(self.session_m),
             "distance_since_reversal" => self.since_m,
-            "position_x" => Some(look.world_from_body.x_m),
-            "position_y" => Some(look.world_from_body.y_m),
-            other => other.strip_prefix("covariate_").and_then(|name| look.run.covariates.get(name).copied()),
+            "position_x" => Some(measurement.world_from_body.x_m),
+            "position_y" => Some(measurement.world_from_body.y_m),
+            other => other.strip_prefix("covariate_").and_then(|name| measurement.run.covariates.get(name).copied()),
         };
         let recorded = Recorded { values: self.keys.iter().map(value).collect() };
         // Of several phases of thinned looks the first is drawn, and the others look at other instants or later.
         let mut records = self.records.lock().unwrap_or_else(PoisonError::into_inner);
-        records.entry(key(look.run, look.t_s)).or_insert(recorded);
-        (self.way_m, self.turn_rad, self.time_s, self.gained_m_s) = (0.0, 0.0, 0.0, 0.0);
+        records.entry(key(measurement.run, measurement.t_s)).or_insert(recorded);
+        (self.distance_m, self.turn_rad, self.time_s, self.gained_m_s) = (0.0, 0.0, 0.0, 0.0);
         self.turned_rad = [0.0; 2];
     }
 }
@@ -265,9 +271,9 @@ struct Residual {
     z: f64,
 }
 
-fn residuals_of(model: &Extended<'_>, keys: &[String]) -> Vec<Residual> {
+fn residuals_of(model: &AugmentedModel<'_>, keys: &[String]) -> Vec<Residual> {
     let records: Records = Arc::default();
-    let mut all = terms(&model.choices);
+    let mut all = terms(&model.candidates);
     all.push(Box::new(Recorder::new(keys.to_vec(), Arc::clone(&records))));
     let pass = model.fit.scan(&mut all);
     let records = records.lock().unwrap_or_else(PoisonError::into_inner);
@@ -275,8 +281,8 @@ fn residuals_of(model: &Extended<'_>, keys: &[String]) -> Vec<Residual> {
     innovations
         .iter()
         .filter_map(|innovation| {
-            let run = model.fit.records.chains.get(innovation.chain)?.info;
-            let t_s = model.fit.records.look_s(innovation.chain, innovation.look)?;
+            let run = model.fit.records.segments.get(innovation.segment)?.info;
+            let t_s = model.fit.records.measurement_s(innovation.segment, innovation.measurement)?;
             let values = records.get(&key(run, t_s))?.values.clone();
             let (component, z) = (innovation.component, innovation.z);
             Some(Residual { values, component, size: z * innovation.sigma, z })
@@ -285,12 +291,12 @@ fn residuals_of(model: &Extended<'_>, keys: &[String]) -> Vec<Residual> {
 }
 
 /// Residuals of the calibrated model and of the extended one.
-pub(crate) fn residuals(base: &JointFit<'_>, model: &Extended<'_>) -> Residuals {
+pub(crate) fn residuals(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Residuals {
     let covariates = covariates(base);
     let keys: Vec<String> = covariates.iter().map(|covariate| covariate.key.clone()).collect();
-    let alone = Extended::alone(base);
+    let alone = AugmentedModel::base(base);
     let (before, after) = (residuals_of(&alone, &keys), residuals_of(model, &keys));
-    let looks = before.iter().filter(|residual| residual.component == 0).count();
+    let measurements = before.iter().filter(|residual| residual.component == 0).count();
     let against = covariates.iter().enumerate().filter_map(|(number, covariate)| {
         let components: Vec<Component> = ["along", "across", "heading"]
             .iter()
@@ -301,7 +307,7 @@ pub(crate) fn residuals(base: &JointFit<'_>, model: &Extended<'_>) -> Residuals 
                     own.filter_map(|residual| Some((residual.values[number]?, residual.size, residual.z))).collect()
                 };
                 let (mut before, mut after) = (own(&before), own(&after));
-                let edges = edges(&mut before, covariate.round, covariate.least)?;
+                let edges = edges(&mut before, covariate.periodic, covariate.least)?;
                 after.sort_by(|a, b| a.0.total_cmp(&b.0));
                 Some(Component {
                     component: (*name).to_owned(),
@@ -319,14 +325,14 @@ pub(crate) fn residuals(base: &JointFit<'_>, model: &Extended<'_>) -> Residuals 
         };
         let (covariate, unit) = (covariate.key.clone(), covariate.unit.to_owned());
         let drawn = |component: &Component| !component.before.bins.is_empty() && !component.after.bins.is_empty();
-        (!components.is_empty() && components.iter().all(drawn)).then_some(Against {
+        (!components.is_empty() && components.iter().all(drawn)).then_some(ResidualsByCovariate {
             covariate,
             label,
             unit,
             components,
         })
     });
-    Residuals { looks, against: against.collect() }
+    Residuals { measurements, against: against.collect() }
 }
 
 /// Bins no nearer to each other than this share of what a covariate spans: nearer, a picture shows a blot.
@@ -334,7 +340,7 @@ const NEAREST: f64 = 0.025;
 
 /// Sorts values and cuts them: a turn into equal parts, few levels each for itself, others into parts of equal counts, or of equal widths where those were too
 /// narrow. `None` when they vary by less than `least`.
-fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<f64>> {
+fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<Vec<f64>> {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (first, last) = (values.first()?.0, values.last()?.0);
     let span = last - first;
@@ -343,7 +349,7 @@ fn edges(values: &mut [(f64, f64, f64)], round: bool, least: f64) -> Option<Vec<
     }
     #[allow(clippy::cast_precision_loss)] // a dozen bins
     let share = |k: usize| k as f64 / BINS as f64;
-    if round {
+    if periodic {
         // About the middle of a bin, not its edge: robots like to start at 0.
         return Some((0..BINS).map(|k| 360.0 * (share(k) + 0.5 * share(1)) - 180.0).collect());
     }
@@ -388,7 +394,7 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         let to = from + values[from..].partition_point(|(value, ..)| *value < edge);
         let own = &values[from..to];
         from = to;
-        if own.len() < LEAST_IN_BIN {
+        if own.len() < MIN_IN_BIN {
             continue;
         }
         #[allow(clippy::cast_precision_loss)]

@@ -2,7 +2,7 @@
 
 use estimation::{Column, total};
 
-use crate::augmented_model::Extended;
+use crate::augmented_model::AugmentedModel;
 use crate::statistics::p_of_chi_square;
 
 /// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.
@@ -10,15 +10,15 @@ use crate::statistics::p_of_chi_square;
 /// Noise of the turns grows with their root, and is soon lost in that of the wheels; a wheelbase that is drawn for each motion errs in proportion to the turn. u_r being
 /// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
 /// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
-pub(crate) fn differs_from_run_to_run(model: &Extended<'_>) -> f64 {
+pub(crate) fn differs_from_run_to_run(model: &AugmentedModel<'_>) -> f64 {
     let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    let Some(evidence) = total(&model.fit.fit.pass.runs) else { return 1.0 };
+    let Some(equations) = total(&model.fit.fit.pass.runs) else { return 1.0 };
     let own = [Column::Separation.index()];
-    let Some(projection) = model.fit.eliminated(&evidence, &own) else { return 1.0 };
+    let Some(projection) = model.fit.eliminated(&equations, &own) else { return 1.0 };
     let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);
     for run in &runs {
-        let variance = projection.variance_of(run, &evidence, &own)[(0, 0)];
-        squares += projection.score_of(run, &evidence, &own)[0].powi(2);
+        let variance = projection.variance_of(run, &equations, &own)[(0, 0)];
+        squares += projection.score_of(run, &equations, &own)[0].powi(2);
         mean += variance;
         spread += variance * variance;
     }

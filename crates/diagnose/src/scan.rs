@@ -5,23 +5,23 @@
 //! directions that even such a size would not show are left out: they cost power and show nothing.
 //! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
 
-use estimation::{Column, Evidence, JointFit, Projected, RIDGE, inverse, total};
+use estimation::{Column, ModelFit, NormalEquations, Projected, RIDGE, inverse, total};
 use model_term::TermParameter;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::candidate::{Choice, terms, terms_together};
+use crate::candidate::{Candidate, terms, terms_together};
 use crate::statistics::p_of_score;
 
 /// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
-const LEAST_SHOWN: f64 = 1.0;
+const MIN_DETECTABLE: f64 = 1.0;
 /// What is left of a column beside the others, as a share of its information, below which it is rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// A candidate's test.
 #[derive(Debug, Clone)]
 pub(crate) struct Scored {
-    pub(crate) choice: Choice,
+    pub(crate) candidate: Candidate,
     pub(crate) parameters: Vec<TermParameter>,
     /// Its projected information.
     pub(crate) information: DMatrix<f64>,
@@ -30,7 +30,7 @@ pub(crate) struct Scored {
     pub(crate) statistic: f64,
     pub(crate) p_value: f64,
     /// Its sizes as one step of the fit finds them, and their standard deviations; none where they cannot be told from each other.
-    pub(crate) sizes: Vec<(f64, f64)>,
+    pub(crate) estimates: Vec<(f64, f64)>,
     /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
     pub(crate) log_odds: f64,
 }
@@ -41,10 +41,11 @@ pub(crate) fn principal(
     gradient: &DVector<f64>,
     parameters: &[TermParameter],
 ) -> Vec<(f64, f64)> {
-    let plausible = DVector::from_fn(parameters.len(), |k, _| parameters[k].plausible);
-    let scaled =
-        DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| information[(i, j)] * plausible[i] * plausible[j]);
-    let scaled_gradient = gradient.component_mul(&plausible);
+    let prior_sigma = DVector::from_fn(parameters.len(), |k, _| parameters[k].prior_sigma);
+    let scaled = DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
+        information[(i, j)] * prior_sigma[i] * prior_sigma[j]
+    });
+    let scaled_gradient = gradient.component_mul(&prior_sigma);
     let eigen = scaled.symmetric_eigen();
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
 }
@@ -57,7 +58,7 @@ const SCALES: i32 = 11;
 /// Sizes are normal about zero with a scale of their own, which is anything from what is plausible down to a thousandth of it with even chances in its logarithm (a
 /// mixture of g-priors; Liang et al. 2008): a small effect is not less likely because a large one would have been plausible. `directions` are principal ones: the
 /// information of a plausible size, and the χ² that the direction explains.
-pub(crate) fn log_weight(directions: &[(f64, f64)]) -> f64 {
+pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     let at = |scale: i32| -> f64 {
         let square = 0.25_f64.powi(scale);
         let of = |(value, explained): &(f64, f64)| {
@@ -72,99 +73,108 @@ pub(crate) fn log_weight(directions: &[(f64, f64)]) -> f64 {
 }
 
 /// How many values the noise was estimated from, after the free columns.
-pub(crate) fn freedom(fit: &JointFit<'_>, evidence: &Evidence) -> f64 {
+pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
     #[allow(clippy::cast_precision_loss)]
     let columns = fit.columns.len() as f64;
-    (evidence.count - columns).max(1.0)
+    (equations.count - columns).max(1.0)
 }
 
 /// Most columns of a pass over a scan's candidates: a whole number of products on three channels. What every pass does for itself, the filter and the model's own terms, is done
 /// again for so many, and a state of so many stays near the processor.
-const MOST_COLUMNS: usize = 126;
+const MAX_COLUMNS: usize = 126;
 
 /// What candidates go with hardly changes within such a time, seconds: rows of a fast log are taken together.
 const STEP_S: f64 = 0.05;
 
-/// Asks something of parts of a scan, each of candidates that are tested as a whole beside the choices that the fit already has: of its candidates, what the fit leaves of
+/// Asks something of parts of a scan, each of candidates that are tested as a whole beside the candidates that the fit already has: of its candidates, what the fit leaves of
 /// their columns, and the evidence. Nothing where the fit's own columns are not determined.
-pub(crate) fn ask<T: Send>(
-    fit: &JointFit<'_>,
-    chosen: &[Choice],
-    parts: &[&[Choice]],
-    answer: impl Fn(&[Choice], &Projected, &Evidence) -> T + Sync,
+pub(crate) fn scan_parts_of<T: Send>(
+    fit: &ModelFit<'_>,
+    chosen: &[Candidate],
+    parts: &[&[Candidate]],
+    answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
-    let Some(coarse) = fit.in_longer_steps(&mut terms(chosen), STEP_S) else {
-        return ask_row_by_row(fit, chosen, parts, &answer);
+    let Some(coarse) = fit.decimated(&mut terms(chosen), STEP_S) else {
+        return scan_parts_row_by_row(fit, chosen, parts, &answer);
     };
-    let goes_by_rows = |part: &&[Choice]| part.iter().any(Choice::goes_by_rows);
-    let (by_rows, others): (Vec<&[Choice]>, Vec<&[Choice]>) = parts.iter().partition(|part| goes_by_rows(part));
-    let mut by_rows = ask_row_by_row(fit, chosen, &by_rows, &answer).into_iter();
-    let mut others = ask_row_by_row(&coarse, chosen, &others, &answer).into_iter();
+    let goes_by_rows = |part: &&[Candidate]| part.iter().any(Candidate::goes_by_rows);
+    let (by_rows, others): (Vec<&[Candidate]>, Vec<&[Candidate]>) = parts.iter().partition(|part| goes_by_rows(part));
+    let mut by_rows = scan_parts_row_by_row(fit, chosen, &by_rows, &answer).into_iter();
+    let mut others = scan_parts_row_by_row(&coarse, chosen, &others, &answer).into_iter();
     parts.iter().filter_map(|part| if goes_by_rows(part) { by_rows.next() } else { others.next() }).collect()
 }
 
 /// The same, all of it by what the fit takes for the log's rows.
-fn ask_row_by_row<T: Send>(
-    fit: &JointFit<'_>,
-    chosen: &[Choice],
-    parts: &[&[Choice]],
-    answer: &(impl Fn(&[Choice], &Projected, &Evidence) -> T + Sync),
+fn scan_parts_row_by_row<T: Send>(
+    fit: &ModelFit<'_>,
+    chosen: &[Candidate],
+    parts: &[&[Candidate]],
+    answer: &(impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync),
 ) -> Vec<T> {
-    let mut passes: Vec<Vec<(usize, &[Choice])>> = Vec::new();
+    let mut passes: Vec<Vec<(usize, &[Candidate])>> = Vec::new();
     let mut columns = 0;
     for part in parts {
-        let own = part.iter().map(|choice| choice.parameters().len()).sum::<usize>();
+        let own = part.iter().map(|candidate| candidate.parameters().len()).sum::<usize>();
         columns += own;
         match passes.last_mut() {
-            Some(last) if columns <= MOST_COLUMNS => last.push((own, part)),
+            Some(last) if columns <= MAX_COLUMNS => last.push((own, part)),
             _ => {
                 passes.push(vec![(own, part)]);
                 columns = own;
             }
         }
     }
-    let of_pass = |parts: &Vec<(usize, &[Choice])>| {
+    let of_pass = |parts: &Vec<(usize, &[Candidate])>| {
         let mut all = terms(chosen);
         let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
         all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
-        let sizes: Vec<usize> = parts.iter().map(|(own, _)| *own).collect();
-        let Some(evidence) = total(&fit.scan_parts(&mut all, &sizes)) else { return Vec::new() };
-        let Some(projection) = fit.eliminated(&evidence, &[]) else { return Vec::new() };
-        let of_part = |(own, part): &(usize, &[Choice])| {
+        let estimates: Vec<usize> = parts.iter().map(|(own, _)| *own).collect();
+        let Some(equations) = total(&fit.scan_parts(&mut all, &estimates)) else { return Vec::new() };
+        let Some(projection) = fit.eliminated(&equations, &[]) else { return Vec::new() };
+        let of_part = |(own, part): &(usize, &[Candidate])| {
             let columns: Vec<usize> = (at..at + own).collect();
             at += own;
-            answer(part, &projection.of_columns(&evidence, &columns), &evidence)
+            answer(part, &projection.of_columns(&equations, &columns), &equations)
         };
         parts.iter().map(of_part).collect::<Vec<T>>()
     };
     passes.par_iter().flat_map_iter(of_pass).collect()
 }
 
-/// Tests every candidate beside the choices that the fit already has.
-pub(crate) fn scan(fit: &JointFit<'_>, chosen: &[Choice], candidates: &[Choice]) -> Vec<Scored> {
-    let each: Vec<&[Choice]> = candidates.chunks(1).collect();
-    ask(fit, chosen, &each, |own, Projected { information, gradient, share }, evidence| {
-        let freedom = freedom(fit, evidence);
+/// Tests every candidate beside the candidates that the fit already has.
+pub(crate) fn scan(fit: &ModelFit<'_>, chosen: &[Candidate], candidates: &[Candidate]) -> Vec<Scored> {
+    let each: Vec<&[Candidate]> = candidates.chunks(1).collect();
+    scan_parts_of(fit, chosen, &each, |own, Projected { information, gradient, share }, equations| {
+        let freedom = freedom(fit, equations);
         // Noise is estimated by likelihood, without its degrees of freedom.
-        let shrink = freedom / evidence.count.max(1.0);
-        let choice = own[0].clone();
-        let parameters = choice.parameters();
+        let shrink = freedom / equations.count.max(1.0);
+        let candidate = own[0].clone();
+        let parameters = candidate.parameters();
         let shown = share.iter().any(|share| *share > ROUNDING);
         let mut directions = Vec::new();
         if shown {
             directions = principal(information, gradient, &parameters);
-            directions.retain(|(value, _)| *value >= LEAST_SHOWN * LEAST_SHOWN);
+            directions.retain(|(value, _)| *value >= MIN_DETECTABLE * MIN_DETECTABLE);
         }
         let dimensions = directions.len();
         let explained: Vec<(f64, f64)> =
             directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
         let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
-        let log_odds = 0.5 * statistic + log_weight(&explained);
-        let p_value = p_of_score(statistic / shrink, dimensions, evidence.count, freedom);
-        let sizes = inverse(information, RIDGE).map_or(Vec::new(), |covariance| {
+        let log_odds = 0.5 * statistic + log_occam_factor(&explained);
+        let p_value = p_of_score(statistic / shrink, dimensions, equations.count, freedom);
+        let estimates = inverse(information, RIDGE).map_or(Vec::new(), |covariance| {
             let step = -(&covariance * gradient);
             step.iter().zip(covariance.diagonal().iter()).map(|(size, var)| (*size, var.sqrt())).collect()
         });
-        Scored { choice, parameters, information: information.clone(), dimensions, statistic, p_value, sizes, log_odds }
+        Scored {
+            candidate,
+            parameters,
+            information: information.clone(),
+            dimensions,
+            statistic,
+            p_value,
+            estimates,
+            log_odds,
+        }
     })
 }

@@ -1,55 +1,55 @@
 //! Structure that no name of the catalogue explains: sparse terms, each if it earns its place on runs that it was not fitted to.
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::JointFit;
+use estimation::ModelFit;
 use kinematics::Side;
 use rayon::prelude::*;
 
-use crate::augmented_model::{Extended, refit};
-use crate::candidate::Choice;
+use crate::augmented_model::{AugmentedModel, refit};
+use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
-use crate::model_comparison::{closed_again, evidence};
+use crate::model_comparison::{log_bayes_factor, regated};
 use crate::scan::{Scored, scan};
 use crate::settings::UNLISTED_LEVEL;
-use crate::statistics::of_trials;
+use crate::statistics::sidak;
 
 /// Refits of the best by their scores.
 const TRIED: usize = 3;
 
 /// A sparse term with its model.
-pub(crate) struct SparseFound<'a> {
-    pub(crate) model: Extended<'a>,
+pub(crate) struct FoundTerm<'a> {
+    pub(crate) model: AugmentedModel<'a>,
     pub(crate) p_value: f64,
     /// How many products were tried.
     pub(crate) trials: usize,
-    /// It gains on held-out runs by more than twice what chance does in 95 % of cases: correlated looks, which differ from run to run, do not do that.
+    /// It gains on held-out runs by more than twice what chance does in 95 % of cases: correlated measurements, which differ from run to run, do not do that.
     pub(crate) certain: bool,
-    /// Looks are likelier with it, but odometry drifts more: it stands for something else.
+    /// Measurements are likelier with it, but odometry drifts more: it stands for something else.
     pub(crate) drifts_more: bool,
 }
 
 /// Log of the trials that a sparse term has to pay for.
 #[allow(clippy::cast_precision_loss)] // hundreds
-fn paid(trials: usize) -> f64 {
+fn log_trials(trials: usize) -> f64 {
     (trials as f64).ln()
 }
 
 /// Sparse terms of one thing at the most: a wheel's phase has a sine and a cosine, and there are two wheels.
-const MOST_SPARSE: usize = 4;
+const MAX_TERMS: usize = 4;
 
-/// What is there without a name: a model, the last of whose choices are sparse terms.
-pub(crate) struct Unlisted<'a> {
-    pub(crate) model: Extended<'a>,
+/// What is there without a name: a model, the last of whose candidates are sparse terms.
+pub(crate) struct UncataloguedTerms<'a> {
+    pub(crate) model: AugmentedModel<'a>,
     /// Of each sparse term, its chance and how many were tried.
     pub(crate) tried: Vec<(f64, usize)>,
 }
 
-impl<'a> Unlisted<'a> {
+impl<'a> UncataloguedTerms<'a> {
     /// A term that was found, and what is left beside it.
-    pub(crate) fn from(base: &JointFit<'a>, first: SparseFound<'a>) -> Self {
+    pub(crate) fn from(base: &ModelFit<'a>, first: FoundTerm<'a>) -> Self {
         let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
-        while all.tried.len() < MOST_SPARSE
+        while all.tried.len() < MAX_TERMS
             && let Some(next) = sparse(base, &all.model, UNLISTED_LEVEL).filter(|next| !next.drifts_more)
         {
             all.model = next.model;
@@ -58,37 +58,37 @@ impl<'a> Unlisted<'a> {
         all
     }
 
-    /// What is there among all looks, those too that lie far off by a model without anything: what is large in few looks hides them.
-    pub(crate) fn among_every_look(base: &JointFit<'a>) -> Option<Self> {
-        let open = base.with_every_look().ok()?;
-        let first = sparse(&open, &Extended::alone(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
+    /// What is there among all measurements, those too that lie far off by a model without anything: what is large in few measurements hides them.
+    pub(crate) fn ungated_terms(base: &ModelFit<'a>) -> Option<Self> {
+        let open = base.refit_ungated().ok()?;
+        let first = sparse(&open, &AugmentedModel::base(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
         let all = Self::from(&open, first);
-        let paid = all.paid();
-        Some(Self { model: closed_again(all.model, base, &Extended::alone(base), paid)?, tried: all.tried })
+        let log_trials = all.log_trials();
+        Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
     }
 
     /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
-    pub(crate) fn evidence(&self, alone: &JointFit<'a>) -> f64 {
-        evidence(alone, &self.model) - self.paid()
+    pub(crate) fn log_bayes_factor(&self, alone: &ModelFit<'a>) -> f64 {
+        log_bayes_factor(alone, &self.model) - self.log_trials()
     }
 
     /// Log of the trials that its sparse terms have to pay for.
-    fn paid(&self) -> f64 {
-        self.tried.iter().map(|(_, trials)| paid(*trials)).sum()
+    fn log_trials(&self) -> f64 {
+        self.tried.iter().map(|(_, trials)| log_trials(*trials)).sum()
     }
 
-    /// The places of its sparse terms among the model's choices, each with its chance and how many were tried.
+    /// The places of its sparse terms among the model's candidates, each with its chance and how many were tried.
     pub(crate) fn terms(&self) -> impl Iterator<Item = (usize, f64, usize)> {
-        let first = self.model.choices.len() - self.tried.len();
+        let first = self.model.candidates.len() - self.tried.len();
         self.tried.iter().enumerate().map(move |(k, &(p_value, trials))| (first + k, p_value, trials))
     }
 }
 
 /// Products of at most three covariates that vanish at standstill.
-fn library(fit: &JointFit<'_>) -> Vec<Choice> {
+fn library(fit: &ModelFit<'_>) -> Vec<Candidate> {
     use Covariate::{
-        AbsSpeed, AbsYawRate, Acceleration, Bend, CosHeading, CosPhase, LastTurn, RunTime, SessionTime, SinHeading,
-        SinPhase, SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
+        AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, Curvature, LastTurn, RunTime, SessionTime,
+        SinHeading, SinPhase, SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
     };
     let rates = [vec![Speed], vec![AbsSpeed], vec![YawRate], vec![AbsYawRate]];
     let modulators = [
@@ -131,24 +131,24 @@ fn library(fit: &JointFit<'_>) -> Vec<Choice> {
         products.push(vec![SinPhase(side, 1)]);
     }
     let wheels = of_wheels(fit).into_iter().flat_map(|covariates| {
-        Channel::WHEELS.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+        Channel::WHEELS.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     let moved = products.into_iter().flat_map(|covariates| {
-        Channel::MOTION.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+        Channel::MOTION.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     // On a spin a bend is the sense of the turn: of the yaw alone it says what speeds do not.
     let bends = [AbsSpeed, AbsYawRate]
-        .map(|rate| Choice::Sparse(Sparse { channel: Channel::Yaw, covariates: vec![rate, Bend] }));
+        .map(|rate| Candidate::Sparse(Sparse { channel: Channel::Yaw, covariates: vec![rate, Curvature] }));
     let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
     let seen = seen.into_iter().flat_map(|covariates| {
-        Channel::SEEN.map(|channel| Choice::Sparse(Sparse { channel, covariates: covariates.clone() }))
+        Channel::SEEN.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
-    let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Choice::Sparse);
-    moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Choice::Sparse(Sparse::of_rows())]).collect()
+    let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Candidate::Sparse);
+    moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Candidate::Sparse(Sparse::of_rows())]).collect()
 }
 
 /// What wheels may do by themselves. Their way alone is their size, which every fit has.
-fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
+fn of_wheels(fit: &ModelFit<'_>) -> Vec<Vec<Covariate>> {
     use Covariate::{
         AbsWheelSpeed, AbsYawRate, CosPhase, RunTime, SessionTime, SinPhase, SinceReversal, SlowWheel, Way,
         WheelAcceleration, WheelSense, WheelSinceReversal, WheelSpeed,
@@ -169,28 +169,29 @@ fn of_wheels(fit: &JointFit<'_>) -> Vec<Vec<Covariate>> {
 }
 
 /// Sparse terms beside a model by their scores, and the best of them refitted.
-pub(crate) struct Sought<'m, 'a> {
-    model: &'m Extended<'a>,
+pub(crate) struct SparseSearch<'m, 'a> {
+    model: &'m AugmentedModel<'a>,
     p_value: f64,
     trials: usize,
-    refitted: Vec<Extended<'a>>,
+    refitted: Vec<AugmentedModel<'a>>,
 }
 
-impl<'m, 'a> Sought<'m, 'a> {
+impl<'m, 'a> SparseSearch<'m, 'a> {
     /// `None` where no term can be seen.
-    pub(crate) fn beside(base: &JointFit<'a>, model: &'m Extended<'a>) -> Option<Self> {
+    pub(crate) fn beside(base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         Self::up_to(1.0, base, model)
     }
 
     /// The same if the best stands out by its score.
-    fn up_to(level: f64, base: &JointFit<'a>, model: &'m Extended<'a>) -> Option<Self> {
+    fn up_to(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         let (scored, p_value) = best_first(base, model)?;
         let trials = scored.len();
         if p_value > level {
             return None;
         }
-        let with =
-            |scored: &Scored| refit(base, model, [&model.choices[..], std::slice::from_ref(&scored.choice)].concat());
+        let with = |scored: &Scored| {
+            refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
+        };
         Some(Self {
             model,
             p_value,
@@ -200,7 +201,7 @@ impl<'m, 'a> Sought<'m, 'a> {
     }
 
     /// The best of them that earns its place, if the best stands out by its score.
-    pub(crate) fn finding(&self, level: f64) -> Option<SparseFound<'a>> {
+    pub(crate) fn finding(&self, level: f64) -> Option<FoundTerm<'a>> {
         if self.p_value > level {
             return None;
         }
@@ -213,7 +214,7 @@ impl<'m, 'a> Sought<'m, 'a> {
                 (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, extended, certain, drifts_more)| SparseFound {
+            .map(|(_, extended, certain, drifts_more)| FoundTerm {
                 model: extended.clone(),
                 p_value: self.p_value,
                 trials: self.trials,
@@ -223,33 +224,33 @@ impl<'m, 'a> Sought<'m, 'a> {
     }
 
     /// Log of the chance of the data under the likeliest of them over that without, the trials paid for.
-    pub(crate) fn evidence(&self) -> f64 {
-        self.refitted.iter().map(|model| self.evidence_of(model)).fold(f64::NEG_INFINITY, f64::max)
+    pub(crate) fn log_bayes_factor(&self) -> f64 {
+        self.refitted.iter().map(|model| self.log_bayes_factor_of(model)).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The same under one of them.
-    pub(crate) fn evidence_of(&self, model: &Extended<'a>) -> f64 {
-        evidence(&self.model.fit, model) - paid(self.trials)
+    pub(crate) fn log_bayes_factor_of(&self, model: &AugmentedModel<'a>) -> f64 {
+        log_bayes_factor(&self.model.fit, model) - log_trials(self.trials)
     }
 }
 
 /// The best sparse term's score beside a model, and its chance where all is explained; `None` where no term can be seen.
-pub(crate) fn lack_of_fit(base: &JointFit<'_>, model: &Extended<'_>) -> Option<(f64, f64)> {
+pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(f64, f64)> {
     let (scored, p_value) = best_first(base, model)?;
     Some((scored.first()?.statistic, p_value))
 }
 
 /// Sparse terms by their scores beside a model, the best first, and the best's chance; `None` where no term can be seen.
-fn best_first(base: &JointFit<'_>, model: &Extended<'_>) -> Option<(Vec<Scored>, f64)> {
+fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Scored>, f64)> {
     let library = library(base);
     let mut scored: Vec<Scored> =
-        scan(&model.fit, &model.choices, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+        scan(&model.fit, &model.candidates, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
-    let p_value = of_trials(scored.first()?.p_value, scored.len());
+    let p_value = sidak(scored.first()?.p_value, scored.len());
     Some((scored, p_value))
 }
 
 /// The best sparse term beside a model.
-pub(crate) fn sparse<'a>(base: &JointFit<'a>, model: &Extended<'a>, level: f64) -> Option<SparseFound<'a>> {
-    Sought::up_to(level, base, model)?.finding(level)
+pub(crate) fn sparse<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, level: f64) -> Option<FoundTerm<'a>> {
+    SparseSearch::up_to(level, base, model)?.finding(level)
 }

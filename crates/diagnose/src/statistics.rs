@@ -54,7 +54,7 @@ pub(crate) fn student_95(freedom: f64) -> f64 {
 }
 
 /// The chance that the best of so many trials is as good as `p`; Šidák 1967.
-pub(crate) fn of_trials(p: f64, trials: usize) -> f64 {
+pub(crate) fn sidak(p: f64, trials: usize) -> f64 {
     #[allow(clippy::cast_precision_loss)]
     let trials = trials as f64;
     -f64::exp_m1(trials * f64::ln_1p(-p.min(1.0 - 1e-16)))
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn the_best_of_trials_pays_for_them() {
-        assert!((of_trials(0.01, 1) - 0.01).abs() < 1e-15);
-        assert!((of_trials(1e-12, 40) - 4e-11).abs() < 1e-20);
+        assert!((sidak(0.01, 1) - 0.01).abs() < 1e-15);
+        assert!((sidak(1e-12, 40) - 4e-11).abs() < 1e-20);
     }
 }

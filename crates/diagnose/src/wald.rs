@@ -1,85 +1,85 @@
-//! How well sizes are known: by the likelihood, by how runs differ, by what is not known of shapes, and by what is not known of the names beside them.
+//! How well sizes are known: by the likelihood, by how runs differ, by what is not known of variants, and by what is not known of the names beside them.
 
 use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
 
-use crate::augmented_model::Extended;
+use crate::augmented_model::AugmentedModel;
 use crate::scan::{freedom, principal};
-use crate::settings::LEAST_RUNS;
+use crate::settings::MIN_RUNS;
 use crate::statistics::{p_of_statistic, p_of_student, student_95};
 
-/// A test of one choice of a fitted model.
+/// A test of one candidate of a fitted model.
 #[derive(Debug, Clone)]
 pub(crate) struct Test {
     pub(crate) statistic: f64,
     pub(crate) p_value: f64,
     /// Value and standard deviation of each parameter.
-    pub(crate) sizes: Vec<(f64, f64)>,
+    pub(crate) estimates: Vec<(f64, f64)>,
 }
 
-/// The test of a choice in its fitted model, and along its principal directions in units of the plausible: information and size.
-pub(crate) fn examine(extended: &Extended<'_>, choice: usize) -> Option<(Test, Vec<(f64, f64)>)> {
-    let evidence = total(&extended.fit.fit.pass.runs)?;
-    let parameters = extended.choices[choice].parameters();
-    let own = extended.columns(choice);
-    let projected = extended.fit.eliminated(&evidence, &own)?.of_columns(&evidence, &own);
-    let sizes = extended.sizes(choice);
-    let gradient = &projected.information * &sizes;
+/// The test of a candidate in its fitted model, and along its principal directions in units of the plausible: information and size.
+pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Option<(Test, Vec<(f64, f64)>)> {
+    let equations = total(&extended.fit.fit.pass.runs)?;
+    let parameters = extended.candidates[candidate].parameters();
+    let own = extended.columns(candidate);
+    let projected = extended.fit.eliminated(&equations, &own)?.of_columns(&equations, &own);
+    let estimates = extended.estimates(candidate);
+    let gradient = &projected.information * &estimates;
     let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
         .into_iter()
         .filter(|(value, _)| *value >= 1.0)
         .map(|(value, gradient)| (value, gradient / value))
         .collect();
-    let freedom = freedom(&extended.fit, &evidence);
-    let shrink = freedom / evidence.count.max(1.0);
+    let freedom = freedom(&extended.fit, &equations);
+    let shrink = freedom / equations.count.max(1.0);
     let statistic = directions.iter().map(|(value, size)| shrink * value * size * size).sum();
     let covariance = inverse(&projected.information, RIDGE);
     let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
     let test = Test {
         statistic,
         p_value: p_of_statistic(statistic, directions.len(), freedom),
-        sizes: sizes.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
+        estimates: estimates.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
     };
     Some((test, directions))
 }
 
-/// Whether a choice's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
-/// motion, looks that resemble each other), and a likelihood that takes looks for independent believes them too much.
+/// Whether a candidate's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
+/// motion, measurements that resemble each other), and a likelihood that takes looks for independent believes them too much.
 ///
 /// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
 /// Liang & Zeger 1986.
-pub(crate) fn holds_over_runs(extended: &Extended<'_>, choice: usize, level: f64) -> bool {
+pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usize, level: f64) -> bool {
     // Fewer runs do not say how a size differs between them.
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < LEAST_RUNS {
+    if runs.len() < MIN_RUNS {
         return true;
     }
-    let Some(evidence) = total(&extended.fit.fit.pass.runs) else { return false };
-    let own = extended.columns(choice);
-    let Some(projection) = extended.fit.eliminated(&evidence, &own) else { return false };
-    let information = projection.of_columns(&evidence, &own).information;
-    let sizes = extended.sizes(choice);
-    let stands = sizes.dot(&(&information * &sizes));
+    let Some(equations) = total(&extended.fit.fit.pass.runs) else { return false };
+    let own = extended.columns(candidate);
+    let Some(projection) = extended.fit.eliminated(&equations, &own) else { return false };
+    let information = projection.of_columns(&equations, &own).information;
+    let estimates = extended.estimates(candidate);
+    let stands = estimates.dot(&(&information * &estimates));
     #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
-    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &evidence, &own).dot(&sizes).powi(2)).sum();
+    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &equations, &own).dot(&estimates).powi(2)).sum();
     let t = stands / (squares * n / (n - 1.0)).sqrt();
     t.is_nan() || p_of_student(t, n - 1.0) < level
 }
 
-/// Standard deviations of a choice's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
+/// Standard deviations of a candidate's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
 /// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
-fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
+fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>> {
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < LEAST_RUNS {
+    if runs.len() < MIN_RUNS {
         return None;
     }
-    let evidence = total(&extended.fit.fit.pass.runs)?;
-    let own = extended.columns(choice);
-    let projection = extended.fit.eliminated(&evidence, &own)?;
-    let inverse = inverse(&projection.of_columns(&evidence, &own).information, RIDGE)?;
+    let equations = total(&extended.fit.fit.pass.runs)?;
+    let own = extended.columns(candidate);
+    let projection = extended.fit.eliminated(&equations, &own)?;
+    let inverse = inverse(&projection.of_columns(&equations, &own).information, RIDGE)?;
     let clusters = runs.iter().map(|run| Information {
-        matrix: projection.variance_of(run, &evidence, &own),
-        gradient: projection.score_of(run, &evidence, &own),
+        matrix: projection.variance_of(run, &equations, &own),
+        gradient: projection.score_of(run, &equations, &own),
     });
     let ClusterRobust { covariance, left_out: 0 } = ClusterRobust::of(&inverse, clusters) else { return None };
     #[allow(clippy::cast_precision_loss)]
@@ -89,22 +89,22 @@ fn over_runs(extended: &Extended<'_>, choice: usize) -> Option<Vec<f64>> {
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
-/// Each choice's test beside the others, and by how much what is not known of shapes and names widens its sizes.
-pub(crate) fn tests_of(model: &Extended<'_>, wider: &[Vec<f64>]) -> Vec<Test> {
-    // As wide as Student's quantile is where looks are few.
-    let Some(evidence) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
-    let few = student_95(freedom(&model.fit, &evidence)) / 1.96;
-    let test = |(choice, wider): (usize, &Vec<f64>)| {
-        let (mut test, _) = examine(model, choice)?;
-        test.sizes.iter_mut().for_each(|(_, sigma)| *sigma *= few);
-        // Where runs differ more than looks say, a size is known no better than by the runs.
-        if let Some(over_runs) = over_runs(model, choice) {
-            test.sizes.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
+/// Each candidate's test beside the others, and by how much what is not known of variants and names widens its sizes.
+pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> Vec<Test> {
+    // As wide as Student's quantile is where measurements are few.
+    let Some(equations) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
+    let few = student_95(freedom(&model.fit, &equations)) / 1.96;
+    let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
+        let (mut test, _) = wald_test(model, candidate)?;
+        test.estimates.iter_mut().for_each(|(_, sigma)| *sigma *= few);
+        // Where runs differ more than measurements say, a size is known no better than by the runs.
+        if let Some(over_runs) = over_runs(model, candidate) {
+            test.estimates.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
         }
-        for ((_, sigma), wider) in test.sizes.iter_mut().zip(wider) {
-            *sigma = sigma.hypot(*wider);
+        for ((_, sigma), extra_sigma) in test.estimates.iter_mut().zip(extra_sigma) {
+            *sigma = sigma.hypot(*extra_sigma);
         }
         Some(test)
     };
-    wider.iter().enumerate().filter_map(test).collect()
+    extra_sigma.iter().enumerate().filter_map(test).collect()
 }

@@ -2,7 +2,7 @@
 //! have for it to show, and another functional form.
 //!
 //! Sizes are drawn as a direction and scaled afterwards to what the data can show, up to the largest of a
-//! real robot. The *other form* is a forward face that departs from the catalogue's, so that the world
+//! real robot. The *other form* is a simulation model that departs from the catalogue's, so that the world
 //! differs from every hypothesis. It stands in the effect's file and shares no code with the hypothesis.
 //! References: Pacejka 2012 for slip that saturates; Armstrong-Hélouvry et al. 1994 for round corners of
 //! friction.
@@ -18,7 +18,7 @@ pub type NamedSize = (&'static str, f64);
 /// Sizes by their names.
 pub type Sizes = Vec<NamedSize>;
 
-/// The forward face of another form, from sizes of the hypothesis, at which it does about as much.
+/// The simulation model of another form, from sizes of the hypothesis, at which it does about as much.
 pub type FormOf = fn(&[NamedSize], &HostRobot) -> Box<dyn Forward>;
 
 /// The robot that an effect is hidden in.
@@ -188,9 +188,9 @@ mod tests {
         match benchmark.sizes {
             SizeLaw::Direction { held, .. } => {
                 let shape =
-                    hypothesis(id).and_then(Hypothesis::into_shapes).and_then(|shapes| shapes.into_iter().next());
+                    hypothesis(id).and_then(Hypothesis::into_variants).and_then(|variants| variants.into_iter().next());
                 let Some(shape) = shape else { return Vec::new() };
-                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.plausible));
+                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.prior_sigma));
                 large.chain(held(shape.held.clone(), &host(), &mut stream)).collect()
             }
             SizeLaw::Scatter(law) => {
@@ -237,8 +237,8 @@ mod tests {
     fn departs(form: &mut dyn Forward) -> bool {
         use crate::catalogue::specimen_step;
         let hooks = form.hooks();
-        if hooks.start_run {
-            form.start_run(stream(0));
+        if hooks.seed_run {
+            form.seed_run(stream(0));
         }
         // A second ahead, and a second back, so that what follows reversals acts.
         (0..2000).any(|k| {
@@ -274,8 +274,8 @@ mod tests {
             forms += 1;
             let mut sizes = drawn(id, 0);
             assert!(departs(&mut *(form.forward)(&sizes, &host())), "{id}");
-            let shapes = hypothesis(id).and_then(Hypothesis::into_shapes).expect("a mean");
-            for parameter in shapes[0].term.parameters() {
+            let variants = hypothesis(id).and_then(Hypothesis::into_variants).expect("a mean");
+            for parameter in variants[0].term.parameters() {
                 sizes.iter_mut().filter(|(name, _)| *name == parameter.name).for_each(|(_, size)| *size = 0.0);
             }
             assert!(!departs(&mut *(form.forward)(&sizes, &host())), "{id} of no size");

@@ -25,13 +25,17 @@ pub enum Channel {
     /// The way of the right wheel's contact, m/s.
     RightWheel,
     /// What the instrument sees, ahead of the robot, metres.
-    SeenAlong,
+    #[serde(rename = "seen_along")]
+    OffsetAlong,
     /// What the instrument sees, to the left of the robot, metres.
-    SeenAcross,
+    #[serde(rename = "seen_across")]
+    OffsetAcross,
     /// The heading that the instrument sees, radians.
-    SeenHeading,
+    #[serde(rename = "seen_heading")]
+    OffsetHeading,
     /// How long before its stamp the instrument sees the robot, seconds.
-    SeenLate,
+    #[serde(rename = "seen_late")]
+    MeasurementDelay,
 }
 
 impl Channel {
@@ -40,7 +44,7 @@ impl Channel {
     /// Of the wheels.
     pub const WHEELS: [Self; 3] = [Self::Wheels, Self::LeftWheel, Self::RightWheel];
     /// Of the instrument.
-    pub const SEEN: [Self; 4] = [Self::SeenAlong, Self::SeenAcross, Self::SeenHeading, Self::SeenLate];
+    pub const SEEN: [Self; 4] = [Self::OffsetAlong, Self::OffsetAcross, Self::OffsetHeading, Self::MeasurementDelay];
 
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -57,10 +61,10 @@ impl Channel {
             Self::Wheels => "wheels",
             Self::LeftWheel => "left_wheel",
             Self::RightWheel => "right_wheel",
-            Self::SeenAlong => "seen_along",
-            Self::SeenAcross => "seen_across",
-            Self::SeenHeading => "seen_heading",
-            Self::SeenLate => "seen_late",
+            Self::OffsetAlong => "seen_along",
+            Self::OffsetAcross => "seen_across",
+            Self::OffsetHeading => "seen_heading",
+            Self::MeasurementDelay => "seen_late",
         }
     }
 
@@ -127,8 +131,8 @@ pub enum Covariate {
     Way,
     /// `exp(-distance since reversal / 0.1 m)`: of the way since the robot last went the other way; 0 before it first does.
     SinceReversal,
-    /// `bend`: ω over √(ω² + (v / 0.2 m)²): 1 on the spot to the left, −1 to the right, 0 straight on.
-    Bend,
+    /// `curvature`: ω over √(ω² + (v / 0.2 m)²): 1 on the spot to the left, −1 to the right, 0 straight on.
+    Curvature,
     /// `last turn`: 1 where the robot last turned to the left, −1 to the right; 0 before it first does.
     LastTurn,
     /// `x`: place in the room, over 1 m.
@@ -181,7 +185,7 @@ impl Covariate {
         Self::SessionTime,
         Self::Way,
         Self::SinceReversal,
-        Self::Bend,
+        Self::Curvature,
         Self::LastTurn,
         Self::X,
         Self::Y,
@@ -212,7 +216,7 @@ impl Covariate {
             Self::SessionTime => "session time",
             Self::Way => "distance driven",
             Self::SinceReversal => "exp(-distance since reversal / 0.1 m)",
-            Self::Bend => "bend",
+            Self::Curvature => "bend",
             Self::LastTurn => "last turn",
             Self::X => "x",
             Self::Y => "y",
@@ -280,7 +284,7 @@ impl Covariate {
         matches!(self, Self::RowLength)
     }
 
-    /// Is it known of a look: of the robot's twist and heading then, and of the time?
+    /// Is it known of a measurement: of the robot's twist and heading then, and of the time?
     #[must_use]
     pub const fn is_of_a_look(&self) -> bool {
         matches!(self, Self::CosHeading | Self::SinHeading | Self::RunTime) || self.is_a_speed()
@@ -301,7 +305,7 @@ impl Covariate {
     }
 
     /// Its value at a moment.
-    pub(crate) fn value(&self, at: &Moment<'_>) -> f64 {
+    pub(crate) fn value(&self, at: &KinematicSample<'_>) -> f64 {
         match self {
             Self::Speed => at.v_m_s,
             Self::AbsSpeed => at.v_m_s.abs(),
@@ -326,8 +330,8 @@ impl Covariate {
             Self::SessionTime => at.session_s / 600.0,
             Self::Way => at.session_m / 100.0,
             Self::SinceReversal => (-at.since_reversal_m / FADES_M).exp(),
-            Self::Bend if at.omega_rad_s == 0.0 => 0.0,
-            Self::Bend => at.omega_rad_s / at.omega_rad_s.hypot(at.v_m_s / BEND_M),
+            Self::Curvature if at.omega_rad_s == 0.0 => 0.0,
+            Self::Curvature => at.omega_rad_s / at.omega_rad_s.hypot(at.v_m_s / BEND_M),
             Self::LastTurn => at.last_turn,
             Self::X => at.x_m,
             Self::Y => at.y_m,
@@ -346,7 +350,7 @@ const WHEEL_FADES_M: f64 = 2e-3;
 
 /// What is left of 1 on average between two ways since a reversal.
 fn mean_left([from_m, to_m]: [f64; 2]) -> f64 {
-    let left = |way_m: f64| (-way_m / WHEEL_FADES_M).exp();
+    let left = |distance_m: f64| (-distance_m / WHEEL_FADES_M).exp();
     let over = (to_m - from_m) / WHEEL_FADES_M;
     // Infinite before the first.
     if over > 0.0 { (left(from_m) - left(to_m)) / over } else { left(to_m) }
@@ -354,7 +358,7 @@ fn mean_left([from_m, to_m]: [f64; 2]) -> f64 {
 
 /// What covariates are made of.
 #[derive(Clone, Copy)]
-pub(crate) struct Moment<'r> {
+pub(crate) struct KinematicSample<'r> {
     pub(crate) v_m_s: f64,
     pub(crate) omega_rad_s: f64,
     pub(crate) acceleration_m_s2: f64,
@@ -383,7 +387,7 @@ pub(crate) struct Moment<'r> {
     pub(crate) of_run: &'r BTreeMap<String, f64>,
 }
 
-impl Moment<'_> {
+impl KinematicSample<'_> {
     /// A wheel's speed times the mean over the interval of a sine, and of a cosine, that comes back so many times a turn.
     pub(crate) fn of_cycle(&self, side: Side, cycles: u8) -> (f64, f64) {
         let cycles = f64::from(cycles);
@@ -430,7 +434,7 @@ mod tests {
     #[test]
     fn every_covariate_is_what_the_document_says_over_its_size() {
         let load = BTreeMap::from([("load".to_owned(), 7.0)]);
-        let at = Moment {
+        let at = KinematicSample {
             v_m_s: -0.3,
             omega_rad_s: -0.7,
             acceleration_m_s2: 0.2,

@@ -21,7 +21,7 @@ pub struct Description {
     pub isolated_error: Option<IsolatedError>,
     /// How its fault of the records is treated; of record faults only.
     pub record_fault: RecordFault,
-    /// Its mean term depends on single rows of the log, not only on what the wheels did between two looks.
+    /// Its mean term depends on single rows of the log, not only on what the wheels did between two measurements.
     pub goes_by_rows: bool,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
@@ -72,7 +72,7 @@ pub enum Excitation {
     Conditions(&'static str),
 }
 
-/// How a single large error of an effect looks in the innovations at and after it. Each grid holds the scales
+/// How a single large error of an effect measurements in the innovations at and after it. Each grid holds the scales
 /// that the error's size is integrated over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IsolatedError {
@@ -92,7 +92,7 @@ pub enum IsolatedError {
         /// Scales of the distance that they are behind, metres.
         scales_m: &'static [f64],
     },
-    /// The outside instrument is wrong at one look alone, in any direction and by any amount.
+    /// The outside instrument is wrong at one measurement alone, in any direction and by any amount.
     OfInstrument,
 }
 
@@ -155,10 +155,10 @@ mod tests {
         for id in CATALOGUE {
             let description = description(id).expect("known");
             let Told::WithSizes(told) = description.told else { continue };
-            let shapes =
-                hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_else(|| panic!("{id} has no sizes"));
-            let parameters = shapes.iter().flat_map(|shape| shape.term.parameters().iter().map(|of| of.name));
-            let names = parameters.chain(shapes.iter().flat_map(|shape| shape.held.iter().map(|(name, _)| *name)));
+            let variants =
+                hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_else(|| panic!("{id} has no sizes"));
+            let parameters = variants.iter().flat_map(|shape| shape.term.parameters().iter().map(|of| of.name));
+            let names = parameters.chain(variants.iter().flat_map(|shape| shape.held.iter().map(|(name, _)| *name)));
             let sizes: Estimates<'_> =
                 names.map(|name| (name, Estimate { value: 0.0125, sigma: Some(1e-3) })).collect();
             let sentence = told(&sizes);

@@ -86,17 +86,17 @@ pub trait PhysicalEffect {
         Ok(0.0)
     }
 
-    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where looks scatter far less, it is another effect.
+    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where measurements scatter far less, it is another effect.
     fn scatter_of_contact_m(&self) -> f64 {
         0.0
     }
 
-    /// The forward face: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
+    /// The simulation model: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
     fn forward(&self) -> Option<Box<dyn Forward>> {
         None
     }
 
-    /// The hypothesis face: how recorded data would show the effect, of whatever size.
+    /// The estimation model: how recorded data would show the effect, of whatever size.
     fn hypothesis() -> Hypothesis
     where
         Self: Sized;
@@ -107,7 +107,7 @@ pub trait PhysicalEffect {
         Self: Sized;
 
     /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make one.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self>
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self>
     where
         Self: Sized,
     {
@@ -116,13 +116,13 @@ pub trait PhysicalEffect {
     }
 
     /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is another
-    /// than [`Self::of_sizes`] makes of them.
+    /// than [`Self::from_estimates`] makes of them.
     fn at_scale(sizes: &[NamedSize], scale: f64, robot: &HostRobot) -> Option<Self>
     where
         Self: Sized,
     {
         let _ = (scale, robot);
-        Self::of_sizes(sizes)
+        Self::from_estimates(sizes)
     }
 
     /// The effect without any harm, for records that have what it needs though it is not hidden: so such

@@ -1,4 +1,4 @@
-//! The forward face: the stages of one simulated step and the hooks with which an effect changes them.
+//! The simulation model: the stages of one simulated step and the hooks with which an effect changes them.
 //!
 //! A step is a stretch of constant wheel rates: a fraction of a millisecond in the stepping engine, a whole motion in the closed form. Every
 //! stage has filled its own fields and all earlier ones when its hook is called; a hook changes the fields of its stage only. A hook that is
@@ -104,7 +104,7 @@ pub struct RunStart<'r> {
 
 /// What the outside instrument sees of the robot at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sighting {
+pub struct PoseReading {
     /// The instant, seconds from the run's start.
     pub t_s: f64,
     /// The robot's pose in the room as the instrument takes it.
@@ -115,10 +115,10 @@ pub struct Sighting {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(clippy::struct_excessive_bools)] // one a hook
 pub struct Hooks {
-    /// [`Forward::begin_run`].
-    pub begin_run: bool,
-    /// [`Forward::start_run`].
-    pub start_run: bool,
+    /// [`Forward::on_run_start`].
+    pub on_run_start: bool,
+    /// [`Forward::seed_run`].
+    pub seed_run: bool,
     /// [`Forward::start_motion`].
     pub start_motion: bool,
     /// [`Forward::command`].
@@ -148,8 +148,8 @@ impl Hooks {
 
     const fn each(acts: bool) -> Self {
         Self {
-            begin_run: acts,
-            start_run: acts,
+            on_run_start: acts,
+            seed_run: acts,
             start_motion: acts,
             command: acts,
             motor: acts,
@@ -170,13 +170,13 @@ pub trait Forward: Send {
         Hooks::ALL
     }
 
-    /// A run begins, at its place in the session; before [`Self::start_run`].
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    /// A run begins, at its place in the session; before [`Self::seed_run`].
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         let _ = run;
     }
 
     /// Draws what is drawn once a run and keeps the stream for what is drawn later.
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         let _ = stream;
     }
 
@@ -219,8 +219,8 @@ pub trait Forward: Send {
     }
 
     /// *Instrument*: what the outside sees.
-    fn instrument(&mut self, sighting: &mut Sighting) {
-        let _ = sighting;
+    fn instrument(&mut self, reading: &mut PoseReading) {
+        let _ = reading;
     }
 
     /// Why the effect cannot be taken over a whole motion at once, or `None` when that is exact.

@@ -1,4 +1,4 @@
-//! The hypothesis face: how recorded data would show an effect.
+//! The estimation model: how recorded data would show an effect.
 //!
 //! Most effects add to the mean of a motion or of what the instrument sees, linearly in their sizes ([`Hypothesis::Terms`]); what is not linear, a hinge speed
 //! or a decay length, is one of a few shapes. Gross faults rewrite the records ([`Hypothesis::Records`]). What only scatters has no mean: the checks of a fit
@@ -10,23 +10,23 @@ use model_term::{Interval, ModelTerm};
 
 /// How data would show an effect.
 pub enum Hypothesis {
-    /// The three lengths of the drive, which every calibration fits.
+    /// The three geometry parameters of the drive, which every calibration fits.
     Geometry,
     /// A mean term; several where a shape parameter is to be tried at several values, which then pay for their trials.
-    Terms(Vec<Shape>),
+    Terms(Vec<Variant>),
     /// The records as they would be without the fault, one for each form that it takes; `None` where the fault is impossible in these records.
-    Records(fn(&Dataset) -> Vec<Rewriting>),
+    Records(fn(&Dataset) -> Vec<RecordCorrection>),
     /// It scatters: it shows in these checks of a fit and in no mean.
     Scatter(&'static [Sign]),
     /// Both: a mean, and what chance does beside it.
-    TermsAndScatter(Vec<Shape>, &'static [Sign]),
+    TermsAndScatter(Vec<Variant>, &'static [Sign]),
     /// Innocent, or not told from data alone.
     Silent,
 }
 
 /// A mean term with its shape parameters held.
-pub struct Shape {
-    /// What is held, by the name in the effect's forward face where that has it.
+pub struct Variant {
+    /// What is held, by the name in the effect's simulation model where that has it.
     pub held: Vec<(&'static str, f64)>,
     /// The term.
     pub term: Box<dyn ModelTerm>,
@@ -37,9 +37,9 @@ pub struct Shape {
 impl Hypothesis {
     /// Its mean terms, if it has any.
     #[must_use]
-    pub fn into_shapes(self) -> Option<Vec<Shape>> {
+    pub fn into_variants(self) -> Option<Vec<Variant>> {
         match self {
-            Self::Terms(shapes) | Self::TermsAndScatter(shapes, _) => Some(shapes),
+            Self::Terms(variants) | Self::TermsAndScatter(variants, _) => Some(variants),
             _ => None,
         }
     }
@@ -54,7 +54,7 @@ impl Hypothesis {
     }
 }
 
-impl Shape {
+impl Variant {
     /// A term without shape parameters.
     #[must_use]
     pub fn plain(term: impl ModelTerm + 'static) -> Vec<Self> {
@@ -75,13 +75,13 @@ impl Shape {
 }
 
 /// Records without a fault.
-pub struct Rewriting {
+pub struct RecordCorrection {
     /// The parameters of the fault that it undoes: names and values.
     pub sizes: Vec<(&'static str, f64)>,
     /// What the fault was, for people: "the left and the right counter are swapped".
     pub sentence: String,
     /// Whether the log itself shows the fault, whatever an instrument saw.
-    pub evident: bool,
+    pub visible_in_log: bool,
     /// The records as they would be without it.
     pub records: Dataset,
 }
@@ -155,17 +155,17 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
 /// What a scatter does to a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sign {
-    /// Single looks of the instrument that lie far off and come back in the next.
-    IsolatedLooks,
+    /// Single measurements of the instrument that lie far off and come back in the next.
+    IsolatedErrors,
     /// Jumps of the heading that stay.
     HeadingJumps,
     /// Jumps of the way travelled that stay.
-    WayJumps,
-    /// Looks whose errors resemble those of the looks before.
-    CorrelatedLooks,
+    DistanceJumps,
+    /// Measurements whose errors resemble those of the measurements before.
+    AutocorrelatedErrors,
     /// A heading that scatters in proportion to the turn, manoeuvre by manoeuvre.
     ScatterWithTurn,
-    /// Errors that grow with the speed at the instant of a look.
+    /// Errors that grow with the speed at the instant of a measurement.
     ScatterWithSpeed,
     /// Errors of looks at a robot that creeps, and of none at a fast one.
     TailsAtLowSpeed,

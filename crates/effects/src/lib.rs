@@ -10,7 +10,6 @@
 //! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the
 //! catalogue and the laws follow. What has no name there is simulated as a [`SparseTerm`].
 
-mod beat;
 mod benchmark;
 mod covariate;
 mod description;
@@ -18,7 +17,8 @@ mod effect;
 mod estimates;
 mod forward;
 mod hypothesis;
-mod memory;
+mod motion_history;
+mod sampling_period;
 mod stream;
 mod term;
 
@@ -27,8 +27,8 @@ pub use covariate::{Channel, Covariate};
 pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
-pub use forward::{Command, Forward, Hooks, Readout, RunStart, SampleClock, Sighting, Step};
-pub use hypothesis::{Hypothesis, Rewriting, Shape, Sign};
+pub use forward::{Command, Forward, Hooks, PoseReading, Readout, RunStart, SampleClock, Step};
+pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
 pub use stream::{Address, Stream, StreamName};
 pub use term::{Sparse, SparseTerm};
 
@@ -125,9 +125,9 @@ macro_rules! contents {
 
         /// The effect of an id with the sizes that a fit found; `None` when they do not make a physical one.
         #[must_use]
-        pub fn effect_of_sizes(id: &str, sizes: &[(&str, f64)]) -> Option<Effect> {
+        pub fn effect_from_estimates(id: &str, sizes: &[(&str, f64)]) -> Option<Effect> {
             match id {
-                $(stringify!($module) => <$Type as PhysicalEffect>::of_sizes(sizes).map(Effect::$Type),)*
+                $(stringify!($module) => <$Type as PhysicalEffect>::from_estimates(sizes).map(Effect::$Type),)*
                 _ => None,
             }
             .filter(|effect: &Effect| effect.physical().check().is_ok())

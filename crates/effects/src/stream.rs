@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn first_draws_of_neighbouring_addresses_are_independent_normals() {
         // Mean, variance and the correlation of neighbours over 40 000 trials: standard errors 1/√n, √(2/n), 1/√n; at 5 of each, three
-        // numbers raise a false alarm once in 6e5 seeds.
+        // numbers raise a false positive once in 6e5 seeds.
         let n = 40_000_u32;
         let draw = |trial| Address { trial: u64::from(trial), ..ADDRESS }.stream(StreamName::new("wheel")).normal();
         let (mut sum, mut squares, mut products, mut previous) = (0.0, 0.0, 0.0, draw(n));

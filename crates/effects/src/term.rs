@@ -2,7 +2,7 @@
 //!
 //! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the way of wheels, each by covariates of its own; seen_along, seen_across and
 //! seen_heading are off by coefficient · Π covariates, and seen_late is so long ago.
-//! [`Sparse`] is the hypothesis face, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the forward face, as
+//! [`Sparse`] is the estimation model, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the simulation model, as
 //! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes with.
 //!
 //! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised because a threshold on raw coefficients depends on
@@ -15,16 +15,16 @@ use model_term::ModelTerm;
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, Moment};
+use crate::covariate::{Channel, Covariate, KinematicSample};
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, RunStart, Sighting, Step};
-use crate::hypothesis::{Hypothesis, Shape};
-use crate::memory::{Memory, Remembered};
+use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
+use crate::hypothesis::{Hypothesis, Variant};
+use crate::motion_history::{MotionHistory, MotionHistoryTracker};
 use recorded::{OfRows, ROW_SHARE, Recorded};
 pub use sparse::Sparse;
 use sparse::{CONSTANT, on_channel, parameter, seen};
-use together::Together;
+use together::ProductBatch;
 
 mod recorded;
 mod sparse;
@@ -40,7 +40,7 @@ impl Sparse {
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
         if self.is_of_rows()
-            && let Some(shape) = IntervalError::hypothesis().into_shapes().and_then(|mut shapes| shapes.pop())
+            && let Some(shape) = IntervalError::hypothesis().into_variants().and_then(|mut variants| variants.pop())
         {
             return Box::new(OfRows { of: shape.term, own: [parameter(self)] });
         }
@@ -50,7 +50,7 @@ impl Sparse {
     /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of [`Self::shares_moments`].
     #[must_use]
     pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
-        all.iter().all(Self::shares_moments).then(|| Box::new(Together::new(all)) as Box<dyn ModelTerm>)
+        all.iter().all(Self::shares_moments).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
     }
 }
 
@@ -142,7 +142,7 @@ impl SparseTerm {
     #[must_use]
     pub(crate) fn shown(&self) -> Option<Hypothesis> {
         let term = self.sparse().ok()?.term();
-        Some(Hypothesis::Terms(vec![Shape { held: Vec::new(), term, at: None }]))
+        Some(Hypothesis::Terms(vec![Variant { held: Vec::new(), term, at: None }]))
     }
 }
 
@@ -170,7 +170,7 @@ impl PhysicalEffect for SparseTerm {
             of_run: BTreeMap::new(),
             session_s: 0.0,
             session_m: 0.0,
-            memory: Memory::NONE,
+            memory: MotionHistoryTracker::NONE,
             speeds: (0.0, 0.0),
         }))
     }
@@ -185,7 +185,7 @@ impl PhysicalEffect for SparseTerm {
     }
 }
 
-/// The forward face in a run.
+/// The simulation model in a run.
 struct State {
     size: SparseTerm,
     sparse: Sparse,
@@ -194,19 +194,19 @@ struct State {
     session_s: f64,
     /// Way of the drive's centre in the session, metres.
     session_m: f64,
-    memory: Memory,
+    memory: MotionHistoryTracker,
     /// v and ω of the last step, for what is seen after it.
     speeds: (f64, f64),
 }
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
+        Hooks { on_run_start: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         (self.session_s, self.session_m) = (run.session_s, run.session_m);
-        (self.memory, self.speeds) = (Memory::NONE, (0.0, 0.0));
+        (self.memory, self.speeds) = (MotionHistoryTracker::NONE, (0.0, 0.0));
         for (key, values) in &self.size.of_runs {
             let value = values[run.number as usize % values.len()];
             let said = *run.info.covariates.entry(key.clone()).or_insert(value);
@@ -228,9 +228,9 @@ impl Forward for State {
         let half_s = 0.5 * step.dt_s;
         let (distance_m, turn_rad) = (v_m_s * step.dt_s, omega_rad_s * step.dt_s);
         let travel_m = wheel_m_s.map(|wheel_m_s| wheel_m_s * step.dt_s);
-        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
+        let MotionHistory { since_reversal_m, wheel_since_reversal_m, last_turn } =
             self.memory.after(travel_m, distance_m, turn_rad);
-        let at = Moment {
+        let at = KinematicSample {
             v_m_s,
             omega_rad_s,
             acceleration_m_s2: mean(wheel_m_s2),
@@ -269,10 +269,10 @@ impl Forward for State {
         }
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
-        let at = seen(self.speeds, sighting.world_from_body, sighting.t_s);
+    fn instrument(&mut self, reading: &mut PoseReading) {
+        let at = seen(self.speeds, reading.world_from_body, reading.t_s);
         let size = self.size.coefficient * self.sparse.product(&at);
-        sighting.world_from_body = sighting.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
+        reading.world_from_body = reading.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {

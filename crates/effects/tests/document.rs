@@ -23,7 +23,7 @@ const INTRODUCTION: &str = "\
 
 What makes real wheel odometry deviate. Every effect has two faces, in one file under [crates/effects/src/catalogue/](../crates/effects/src/catalogue). The *forward* face is how the
 world does it, inside a step of the simulator; its sizes are keys of a scenario ([scenario.md](scenario.md#effects)). The *hypothesis* face is how recorded data show it, and sees
-recorded quantities only. They share names and no code. `tests/effect_laws.rs` holds what all promise; `tests/effect_hypotheses/` drives every forward face that has a mean and asks
+recorded quantities only. They share names and no code. `tests/effect_laws.rs` holds what all promise; `tests/effect_hypotheses/` drives every simulation model that has a mean and asks
 that its hypothesis, at the same sizes, predicts what was seen, and at half of them, one and a half, or with one sign turned does not.
 ";
 
@@ -45,7 +45,7 @@ type Holds = fn(&Hypothesis) -> bool;
 
 /// By what an effect is shown, what that is, and which hypotheses are so.
 const SHOWN_BY: [(&str, &str, Holds); 5] = [
-    ("geometry", "the three lengths of the drive, which every calibration fits", |of| {
+    ("geometry", "the three geometry parameters of the drive, which every calibration fits", |of| {
         matches!(of, Hypothesis::Geometry)
     }),
     (
@@ -137,20 +137,20 @@ fn words(name: &str) -> String {
 /// The fitted sizes of a hypothesis with what is large and its unit, and its shape parameter with the values
 /// that are tried.
 fn sizes(id: &str) -> (Vec<TermParameter>, Sizes) {
-    let shapes = hypothesis(id).and_then(Hypothesis::into_shapes).unwrap_or_default();
+    let variants = hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_default();
     let mut fitted: Vec<TermParameter> = Vec::new();
-    for parameter in shapes.iter().flat_map(|shape| shape.term.parameters()) {
+    for parameter in variants.iter().flat_map(|shape| shape.term.parameters()) {
         if fitted.iter().all(|known| known.name != parameter.name) {
             fitted.push(*parameter);
         }
     }
-    (fitted, shapes.iter().flat_map(|shape| shape.held.clone()).collect())
+    (fitted, variants.iter().flat_map(|shape| shape.held.clone()).collect())
 }
 
 /// The meaning with all sizes large, the phases of periodic ones at zero.
 fn meaning(id: &str, description: &Description) -> String {
     let (fitted, tried) = sizes(id);
-    let large = fitted.iter().map(|of| (of.name, if of.name.contains("cos") { 0.0 } else { of.plausible }));
+    let large = fitted.iter().map(|of| (of.name, if of.name.contains("cos") { 0.0 } else { of.prior_sigma }));
     let held = tried.get(tried.len() / 2).copied();
     let estimate = |(name, value)| (name, Estimate { value, sigma: None });
     let estimates: Estimates<'_> = large.chain(held).map(estimate).collect();
@@ -164,7 +164,9 @@ fn isolated_error(of: IsolatedError) -> &'static str {
             "wheels lose distance as they become faster and gain it as they become slower, in proportion to the change of speed"
         }
         IsolatedError::WoundUp { .. } => "wheels are behind where they start or stop, and catch up later",
-        IsolatedError::OfInstrument => "the instrument is wrong at one look alone, in any direction and by any amount",
+        IsolatedError::OfInstrument => {
+            "the instrument is wrong at one measurement alone, in any direction and by any amount"
+        }
     }
 }
 
@@ -208,7 +210,7 @@ fn section(id: &str, source: &str) -> Result<String, String> {
     }
     let (fitted, tried) = sizes(id);
     if !fitted.is_empty() {
-        let each = fitted.iter().map(|of| format!("`{}` ({})", of.name, with_unit(of.plausible, of.unit)));
+        let each = fitted.iter().map(|of| format!("`{}` ({})", of.name, with_unit(of.prior_sigma, of.unit)));
         let reason =
             source.lines().find_map(|line| line.trim_start().trim_start_matches('/').trim_start().strip_prefix(LARGE));
         let reason =

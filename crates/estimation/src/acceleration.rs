@@ -22,9 +22,9 @@ pub(super) struct Size {
 /// Steps that are smaller follow each other as those of a linear map do; larger ones do not. A variance that is far too large shrinks by one in its logarithm.
 const NEAR: Size = Size { mean: 1.0, noise: 0.3 };
 /// Where steps become larger than this, what the last ones showed has led astray.
-const ASTRAY: Size = Size { mean: 10.0, noise: 0.9 };
+const DIVERGED: Size = Size { mean: 10.0, noise: 0.9 };
 /// Led astray so often, the fit goes on without.
-const MOST_ASTRAY: u32 = 2;
+const MAX_DIVERGED: u32 = 2;
 /// Differences that hardly differ, as a share of the largest, tell nothing apart.
 const SINGULAR: f64 = 1e-10;
 
@@ -36,18 +36,18 @@ pub(super) struct Acceleration {
     /// How proposed steps differed from those before, and what had been moved by in between; the newest last.
     differences: VecDeque<(DVector<f64>, DVector<f64>)>,
     engaged: bool,
-    astray: u32,
+    diverged: u32,
 }
 
 impl Acceleration {
     /// Whether to go by the last steps at all, the next one being so large.
     pub(super) fn engages(&mut self, step: Size) -> bool {
-        if self.engaged && (step.mean > ASTRAY.mean || step.noise > ASTRAY.noise) {
+        if self.engaged && (step.mean > DIVERGED.mean || step.noise > DIVERGED.noise) {
             (self.engaged, self.last) = (false, None);
             self.differences.clear();
-            self.astray += 1;
+            self.diverged += 1;
         }
-        self.engaged |= step.mean < NEAR.mean && step.noise < NEAR.noise && self.astray < MOST_ASTRAY;
+        self.engaged |= step.mean < NEAR.mean && step.noise < NEAR.noise && self.diverged < MAX_DIVERGED;
         self.engaged
     }
 
@@ -64,9 +64,10 @@ impl Acceleration {
             return step.clone();
         }
         let n = self.differences.len();
-        let weighed: Vec<DVector<f64>> = self.differences.iter().map(|(difference, _)| metric * difference).collect();
-        let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&weighed[j]));
-        let along = DVector::from_fn(n, |i, _| weighed[i].dot(step));
+        let part_equations: Vec<DVector<f64>> =
+            self.differences.iter().map(|(difference, _)| metric * difference).collect();
+        let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&part_equations[j]));
+        let along = DVector::from_fn(n, |i, _| part_equations[i].dot(step));
         let least = SINGULAR * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
         let mixed = self

@@ -1,22 +1,22 @@
-//! What whoever extends `joint`'s model needs beside the fit: evidence in blocks, and dead reckoning with terms.
+//! What whoever extends `joint`'s model needs beside the fit: normal equation in blocks, and dead reckoning with terms.
 
 use std::sync::Arc;
 
 use kinematics::{Pose, Twist, wrap_to_pi};
 use model_term::ModelTerm;
 
-use crate::decimation::Coarse;
+use crate::decimation::Decimated;
 use crate::error::EstimationError;
-use crate::filter::{Gate, Want};
+use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Instrument, Model};
-use crate::model_fit::JointFit;
-use crate::noise::{LEAST_SIGMA, NoiseComponent};
-use crate::normal_equations::Evidence;
+use crate::model_fit::ModelFit;
+use crate::noise::{MIN_SIGMA, NoiseComponent};
+use crate::normal_equations::NormalEquations;
 use crate::optimizer::Fit;
 use crate::pass::pass;
-use crate::propagation::{Propagator, Trail};
-use crate::records::{Chain, Seen};
-use crate::wheel_angles::Piece;
+use crate::propagation::{CarriedState, Propagator};
+use crate::records::{MeasuredPose, Segment};
+use crate::wheel_angles::WheelInterval;
 
 /// How far off dead reckoning ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,33 +33,38 @@ pub struct EndError {
     pub off: Pose,
 }
 
-impl JointFit<'_> {
-    /// The evidence at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
+impl ModelFit<'_> {
+    /// The normal equation at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
     #[must_use]
-    pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<Evidence> {
+    pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<NormalEquations> {
         self.blocks(terms, blocks, self.gate())
     }
 
-    pub(crate) fn blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize, gate: Gate) -> Vec<Evidence> {
-        let want = Want { gate, ..Want::default() };
+    pub(crate) fn blocks(
+        &self,
+        terms: &mut [Box<dyn ModelTerm>],
+        blocks: usize,
+        gate: OutlierGate,
+    ) -> Vec<NormalEquations> {
+        let pass_options = PassOptions { gate, ..PassOptions::default() };
         (0..blocks)
             .flat_map(|block| {
                 let part: Vec<_> =
                     self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
                 let Fit { model, noise, free_headings, .. } = &self.fit;
-                let found = pass(&self.records, &part, model, noise, free_headings, terms, want);
+                let found = pass(&self.records, &part, model, noise, free_headings, terms, pass_options);
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
     }
 
-    /// The same fit on counts put together in steps of up to so long, for scans: what they ask goes over fewer pieces. `terms` are those of the fit. `None` where that
-    /// would leave more than half of the pieces, or by longer steps the fit is another one: looks then lie elsewhere, or a term goes with single rows.
+    /// The same fit on counts put together in steps of up to so long, for scans: what they ask goes over fewer intervals. `terms` are those of the fit. `None` where that
+    /// would leave more than half of the intervals, or by longer steps the fit is another one: measurements then lie elsewhere, or a term goes with single rows.
     #[must_use]
-    pub fn in_longer_steps(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
-        /// Looks that lie elsewhere by δ of their standard deviations make Σδ² at the most of what is not there: less than chance does.
+    pub fn decimated(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
+        /// Measurements that lie elsewhere by δ of their standard deviations make Σδ² at the most of what is not there: less than chance does.
         const SAME: f64 = 1.0;
-        let Coarse { records, selections } = Coarse::of(&self.records, &self.selections, longest_s)?;
+        let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
         let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
         let runs = coarse.scan_parts(terms, &[]);
         let both = runs.iter().zip(&self.fit.pass.runs);
@@ -69,20 +74,21 @@ impl JointFit<'_> {
         (same_looks && squares < SAME).then_some(coarse)
     }
 
-    /// How far displacements that follow each other, taken together, lie from dead reckoning with the lengths found, in standard deviations of a look; `None` where
+    /// How far displacements that follow each other, taken together, lie from dead reckoning with the geometry parameters found, in standard deviations of a measurement; `None` where
     /// there is none.
     #[must_use]
-    pub fn displaced(&self, chains: std::ops::Range<usize>) -> Option<f64> {
-        let (mut seen, mut reckoned) = (None, Pose::IDENTITY);
-        for chain in self.records.chains.get(chains)?.iter().filter(|chain| chain.is_displacement()) {
-            let (_, _, (_, end)) = chain.ends()?;
-            let mounting = self.fit.model.instrument(chain.run).body_from_sensor;
-            let turned = |pose: Pose, piece: &Piece| pose * self.fit.model.increment(piece.wheel_rad).arc();
-            let moved = chain.pieces.iter().fold(Pose::IDENTITY, turned);
-            seen = Some(seen.unwrap_or(Pose::IDENTITY) * end);
-            reckoned = reckoned * (mounting.inverse() * moved * mounting);
+    pub fn mahalanobis_distance(&self, segments: std::ops::Range<usize>) -> Option<f64> {
+        let (mut measured, mut dead_reckoned) = (None, Pose::IDENTITY);
+        for segment in self.records.segments.get(segments)?.iter().filter(|segment| segment.is_displacement()) {
+            let (_, _, (_, end)) = segment.ends()?;
+            let extrinsics = self.fit.model.instrument(segment.run).body_from_sensor;
+            let turned =
+                |pose: Pose, interval: &WheelInterval| pose * self.fit.model.increment(interval.wheel_rad).arc();
+            let moved = segment.intervals.iter().fold(Pose::IDENTITY, turned);
+            measured = Some(measured.unwrap_or(Pose::IDENTITY) * end);
+            dead_reckoned = dead_reckoned * (extrinsics.inverse() * moved * extrinsics);
         }
-        let off = reckoned.to(seen?);
+        let off = dead_reckoned.to(measured?);
         let [_, _, xy, theta] = self.fit.noise.variance;
         let off_rad = wrap_to_pi(off.theta_rad);
         Some(((off.x_m * off.x_m + off.y_m * off.y_m) / xy + off_rad * off_rad / theta).sqrt())
@@ -100,84 +106,90 @@ impl JointFit<'_> {
         let mut without = Self { prior: self.prior.without(component), ..self.clone() };
         let mut from = self.here();
         from.noise = from.noise.map(|mut noise| {
-            noise.variance[component as usize] = LEAST_SIGMA * LEAST_SIGMA;
+            noise.variance[component as usize] = MIN_SIGMA * MIN_SIGMA;
             noise
         });
         without.refit_with(Some(from), terms)?;
         Ok(without)
     }
 
-    /// Dead reckoning of every chain from its first look to its last under a model with terms; chains that are seen without headings are left out.
+    /// Dead reckoning of every segment from its first measurement to its last under a model with terms; segments that are seen without headings are left out.
     #[must_use]
-    pub fn reckoned(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
-        self.reckoned_of(model, terms, |_| true)
+    pub fn dead_reckoned(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+        self.dead_reckoned_of(model, terms, |_| true)
     }
 
     /// The same of some runs: session and run in the order given.
     #[must_use]
-    pub fn reckoned_of(
+    pub fn dead_reckoned_of(
         &self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
         asked: impl Fn((usize, usize)) -> bool,
     ) -> Vec<EndError> {
-        self.reckoned_to(model, terms, asked, |chain| &chain.looks[chain.looks.len() - 1..])
+        self.dead_reckoned_to(model, terms, asked, |segment| &segment.measurements[segment.measurements.len() - 1..])
     }
 
-    /// Dead reckoning of every chain from its first look to each one after it.
+    /// Dead reckoning of every segment from its first measurement to each one after it.
     #[must_use]
-    pub fn reckoned_looks(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
-        self.reckoned_to(model, terms, |_| true, |chain| &chain.looks[usize::from(!chain.is_displacement())..])
+    pub fn dead_reckoned_measurements(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
+        self.dead_reckoned_to(
+            model,
+            terms,
+            |_| true,
+            |segment| &segment.measurements[usize::from(!segment.is_displacement())..],
+        )
     }
 
-    fn reckoned_to<'b>(
+    fn dead_reckoned_to<'b>(
         &'b self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
         asked: impl Fn((usize, usize)) -> bool,
-        looks: impl Fn(&'b Chain<'b>) -> &'b [Seen],
+        measurements: impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose],
     ) -> Vec<EndError> {
         let mut found = Vec::new();
         // Where the displacements of a run have led.
-        let mut trail: Option<Trail> = None;
-        for chain in self.records.chains.iter().filter(|chain| asked(chain.run)) {
-            let Some((start, first, _)) = chain.ends() else { continue };
-            let Instrument { body_from_sensor, latency_s } = model.instrument(chain.run);
-            let mut propagator = Propagator::new(chain, model, terms);
-            if let Some(trail) = trail.take().filter(|_| chain.goes_on) {
-                propagator.go_on(trail);
+        let mut carried: Option<CarriedState> = None;
+        for segment in self.records.segments.iter().filter(|segment| asked(segment.run)) {
+            let Some((start, first, _)) = segment.ends() else { continue };
+            let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
+            let mut propagator = Propagator::new(segment, model, terms);
+            if let Some(carried) = carried.take().filter(|_| segment.continues) {
+                propagator.carry_on(carried);
             }
             propagator.restart();
             // What the terms and the latency add to a measurement, in the frame of the body.
-            let seen_from = |propagator: &mut Propagator<'_, '_>, t_s: f64, body: Pose, piece: Option<&Piece>| {
-                let Twist { v_m_s, omega_rad_s } =
-                    piece.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| propagator.twist(piece));
-                propagator.sight(body, 0, t_s, Twist { v_m_s, omega_rad_s });
-                let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
-                add(propagator.from_terms(), late)
-            };
-            // Where the drive's centre stands at the first look, to first order in what the terms add to it.
+            let expected_offset =
+                |propagator: &mut Propagator<'_, '_>, t_s: f64, body: Pose, interval: Option<&WheelInterval>| {
+                    let Twist { v_m_s, omega_rad_s } =
+                        interval.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |interval| propagator.twist(interval));
+                    propagator.measurement(body, 0, t_s, Twist { v_m_s, omega_rad_s });
+                    let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
+                    add(propagator.from_terms(), late)
+                };
+            // Where the drive's centre stands at the first measurement, to first order in what the terms add to it.
             let mounted = start * body_from_sensor.inverse();
-            let off = seen_from(&mut propagator, first.0, mounted, chain.pieces.get(first.1));
+            let off = expected_offset(&mut propagator, first.0, mounted, segment.intervals.get(first.1));
             let mut pose = mounted * off.inverse();
             let (start_m, mut at) = (propagator.session_m(), first.1);
-            for look in looks(chain) {
-                pose = propagator.dead_reckon(pose, at..look.after);
-                at = look.after;
-                let Some(theta_rad) = look.theta_rad else { continue };
-                let off = seen_from(&mut propagator, look.t_s, pose, chain.pieces[..at].last());
-                let seen = pose * off * body_from_sensor;
-                let there = Pose::new(look.x_m, look.y_m, theta_rad);
-                let off_rad = wrap_to_pi(seen.theta_rad - theta_rad);
+            for measurement in measurements(segment) {
+                pose = propagator.dead_reckon(pose, at..measurement.after);
+                at = measurement.after;
+                let Some(theta_rad) = measurement.theta_rad else { continue };
+                let off = expected_offset(&mut propagator, measurement.t_s, pose, segment.intervals[..at].last());
+                let measured = pose * off * body_from_sensor;
+                let there = Pose::new(measurement.x_m, measurement.y_m, theta_rad);
+                let off_rad = wrap_to_pi(measured.theta_rad - theta_rad);
                 found.push(EndError {
-                    run: chain.run,
-                    position_m: seen.position().distance_m(there.position()),
+                    run: segment.run,
+                    position_m: measured.position().distance_m(there.position()),
                     heading_rad: off_rad.abs(),
                     length_m: propagator.session_m() - start_m,
-                    off: Pose { theta_rad: off_rad, ..there.to(seen) },
+                    off: Pose { theta_rad: off_rad, ..there.to(measured) },
                 });
             }
-            trail = Some(propagator.trail(pose * body_from_sensor));
+            carried = Some(propagator.carried(pose * body_from_sensor));
         }
         found
     }

@@ -1,6 +1,6 @@
-//! The filter of one chain: innovations, their derivatives by the mean parameters, and the score of the noise.
+//! The filter of one segment: innovations, their derivatives by the mean parameters, and the score of the noise.
 //!
-//! Scalar updates, one component of a look after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
+//! Scalar updates, one component of a measurement after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
 //! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
 use kinematics::{InstructionSet, Kernel, Pose, Twist, sin_cos, wrap_to_pi};
@@ -12,24 +12,24 @@ use crate::derivatives::Derivatives;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
-use crate::propagation::{Kept, KeptLegs, Legs, Moved, Propagator, Trail};
-use crate::records::{Chain, Start};
-use crate::thinning::Leg;
-use crate::wheel_angles::Piece;
+use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
+use crate::records::{Segment, Start};
+use crate::thinning::PropagationInterval;
+use crate::wheel_angles::WheelInterval;
 
-/// A look whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
+/// A measurement whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
 pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
-/// After so many looks in a row that do not fit, it is the filter that is wrong: it starts again.
-const LOST_AFTER: u32 = 2;
+/// After so many measurements in a row that do not fit, it is the filter that is wrong: it starts again.
+const RESTART_AFTER: u32 = 2;
 const NOISES: usize = 4;
 
-/// One whitened component of a look's innovation.
+/// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// Which chain.
-    pub chain: usize,
-    /// Which look of the chain.
-    pub look: usize,
+    /// Which segment.
+    pub segment: usize,
+    /// Which look of the segment.
+    pub measurement: usize,
     /// 0 along the robot, 1 across, 2 heading.
     pub component: usize,
     /// Over its standard deviation.
@@ -40,31 +40,31 @@ pub struct Innovation {
 
 /// Whether measurements whose innovation is improbable are rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Gate {
+pub enum OutlierGate {
     /// They are.
     #[default]
-    Shut,
+    On,
     /// Every measurement is taken, however far off.
-    Open,
+    Off,
 }
 
-impl Gate {
-    /// Open for every look.
-    pub(crate) const fn of(every_look: bool) -> Self {
-        if every_look { Self::Open } else { Self::Shut }
+impl OutlierGate {
+    /// Open for every measurement.
+    pub(crate) const fn of(ungated: bool) -> Self {
+        if ungated { Self::Off } else { Self::On }
     }
 }
 
 /// What to carry along in a pass.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Want<'p> {
+pub(crate) struct PassOptions<'p> {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
-    pub(crate) gate: Gate,
+    pub(crate) gate: OutlierGate,
     /// Legs are kept, for passes at models near this one.
     pub(crate) keep: bool,
     /// Legs are taken as they were kept by a pass at another model.
-    pub(crate) by: Option<&'p Kept>,
+    pub(crate) by: Option<&'p CachedPropagation>,
     /// The last columns come in parts of so many, each tested for itself: columns of two parts have no products with each other.
     pub(crate) parts: &'p [usize],
 }
@@ -87,15 +87,15 @@ impl NoiseScore {
     }
 }
 
-/// The filter of one chain.
+/// The filter of one segment.
 pub(super) struct Filter<'f, 'a> {
-    chain: &'f Chain<'a>,
+    segment: &'f Segment<'a>,
     number: usize,
     model: &'f Model,
     instrument: Instrument,
     noise: &'f Noise,
     propagator: Propagator<'f, 'a>,
-    want: Want<'f>,
+    pass_options: PassOptions<'f>,
     pose: Pose,
     covariance: Covariance,
     /// ∂pose/∂column.
@@ -103,21 +103,21 @@ pub(super) struct Filter<'f, 'a> {
     /// Derivatives of the covariance and of the pose by the logarithm of each variance.
     covariance_by: Covariances<NOISES>,
     pose_by_noise: [[f64; NOISES]; 3],
-    /// Derivatives of the look by the terms' parameters, in the room.
-    sights: Derivatives,
+    /// Derivatives of the measurement by the terms' parameters, in the room.
+    by_measurement: Derivatives,
     pub(super) sums: Sums<'f>,
     pub(super) innovations: Vec<Innovation>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
-    /// What a component of a look sees of each column directly, and in all.
+    /// What a component of a measurement sees of each column directly, and in all.
     direct: Vec<f64>,
     j: Vec<f64>,
 }
 
-/// The filter of a chain over its legs, from a start heading that nobody saw.
+/// The filter of a segment over its propagation intervals, from a start heading that nobody saw.
 struct Run<'r, 'f, 'a> {
     filter: &'r mut Filter<'f, 'a>,
-    legs: &'r [Leg],
+    propagations: &'r [PropagationInterval],
     free_heading_rad: f64,
 }
 
@@ -126,37 +126,37 @@ impl Kernel for Run<'_, '_, '_> {
 
     #[inline(always)]
     fn run(self) {
-        self.filter.run_over(self.legs, self.free_heading_rad);
+        self.filter.run_over(self.propagations, self.free_heading_rad);
     }
 }
 
 impl<'f, 'a> Filter<'f, 'a> {
     pub(super) fn new(
-        chain: &'f Chain<'a>,
+        segment: &'f Segment<'a>,
         number: usize,
         model: &'f Model,
         noise: &'f Noise,
         products: &'f Products,
         terms: &'f mut [Box<dyn ModelTerm>],
-        want: Want<'f>,
+        pass_options: PassOptions<'f>,
     ) -> Self {
         let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
         // One more for a free heading.
         let all = columns + 1;
         Self {
-            chain,
+            segment,
             number,
             model,
-            instrument: model.instrument(chain.run),
+            instrument: model.instrument(segment.run),
             noise,
-            propagator: Propagator::new(chain, model, terms),
-            want,
+            propagator: Propagator::new(segment, model, terms),
+            pass_options,
             pose: Pose::IDENTITY,
             covariance: Covariance::ZERO,
             by: Derivatives::zeros(all),
             covariance_by: Covariances::ZERO,
             pose_by_noise: [[0.0; NOISES]; 3],
-            sights: Derivatives::zeros(columns - Column::BASE.len()),
+            by_measurement: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
             innovations: Vec::new(),
             outliers: Vec::new(),
@@ -166,114 +166,123 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
-    /// Goes on where the chain before ended.
-    pub(super) fn go_on(&mut self, trail: Trail) {
-        self.propagator.go_on(trail);
+    /// Goes on where the segment before ended.
+    pub(super) fn carry_on(&mut self, carried: CarriedState) {
+        self.propagator.carry_on(carried);
     }
 
-    /// Where this chain ended.
-    pub(super) fn trail(&self) -> Trail {
-        self.propagator.trail(self.pose * self.instrument.body_from_sensor)
+    /// Where this segment ended.
+    pub(super) fn carried(&self) -> CarriedState {
+        self.propagator.carried(self.pose * self.instrument.body_from_sensor)
     }
 
     /// Legs come from here, not from the counts.
-    pub(super) fn take_legs(&mut self, legs: Legs<'f>) {
-        self.propagator.legs = legs;
+    pub(super) fn take_propagations(&mut self, propagations: PropagationSource<'f>) {
+        self.propagator.propagations = propagations;
     }
 
-    /// What the chain said, and its legs where they were to be kept.
-    pub(super) fn into_parts(self) -> (Sums<'f>, Vec<usize>, Vec<Innovation>, NoiseScore, Option<KeptLegs>) {
-        (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.legs.into_kept())
+    /// What the segment said, and its propagation intervals where they were to be kept.
+    pub(super) fn into_parts(self) -> (Sums<'f>, Vec<usize>, Vec<Innovation>, NoiseScore, Option<SegmentCache>) {
+        (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.propagations.into_cached())
     }
 
-    /// Filters the looks at the ends of some legs.
-    pub(super) fn run(&mut self, legs: &[Leg], free_heading_rad: f64) {
+    /// Filters the looks at the ends of some propagation intervals.
+    pub(super) fn run(&mut self, propagations: &[PropagationInterval], free_heading_rad: f64) {
         // Loops over a dozen columns: eight at a time leave more over than they save.
-        InstructionSet::Avx2.run(Run { filter: self, legs, free_heading_rad });
+        InstructionSet::Avx2.run(Run { filter: self, propagations, free_heading_rad });
     }
 
     #[inline(always)]
-    fn run_over(&mut self, legs: &[Leg], free_heading_rad: f64) {
+    fn run_over(&mut self, propagations: &[PropagationInterval], free_heading_rad: f64) {
         self.propagator.restart();
-        let Some(first) = legs.first() else {
-            let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
-            self.start(Pose::IDENTITY, (0.0, 0.0), self.chain.pieces.first().copied(), (0, start_s));
-            let pieces = 0..self.chain.pieces.len();
-            self.predict(0, &Leg { pieces, from: 0, look: 0, noise: Covariances::ZERO });
+        let Some(first) = propagations.first() else {
+            let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
+            self.start(Pose::IDENTITY, (0.0, 0.0), self.segment.intervals.first().copied(), (0, start_s));
+            let intervals = 0..self.segment.intervals.len();
+            self.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
             return;
         };
-        match self.chain.start {
-            Start::Seen => self.start_at((0, first.from), first.pieces.start, free_heading_rad),
+        match self.segment.start {
+            Start::MeasuredPose => self.start_at((0, first.from), first.intervals.start, free_heading_rad),
             Start::Origin => {
-                let start_s = self.chain.pieces.first().map_or(0.0, |piece| piece.t_s);
-                self.start(Pose::IDENTITY, (0.0, 0.0), self.chain.pieces.first().copied(), (0, start_s));
+                let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
+                self.start(Pose::IDENTITY, (0.0, 0.0), self.segment.intervals.first().copied(), (0, start_s));
             }
         }
-        let mut lost = 0;
-        for (number, leg) in legs.iter().enumerate() {
-            self.predict(number, leg);
-            if self.update(number, leg) {
-                lost = 0;
+        let mut rejected_in_a_row = 0;
+        for (number, propagation) in propagations.iter().enumerate() {
+            self.predict(number, propagation);
+            if self.update(number, propagation) {
+                rejected_in_a_row = 0;
                 continue;
             }
-            self.outliers.push(leg.look);
-            lost += 1;
-            // Without a heading the filter cannot start in the middle of a chain.
-            if lost >= LOST_AFTER && self.chain.looks[leg.look].theta_rad.is_some() && self.chain.start == Start::Seen {
-                self.start_at((number + 1, leg.look), leg.pieces.end, self.pose.theta_rad);
-                lost = 0;
+            self.outliers.push(propagation.measurement);
+            rejected_in_a_row += 1;
+            // Without a heading the filter cannot start in the middle of a segment.
+            if rejected_in_a_row >= RESTART_AFTER
+                && self.segment.measurements[propagation.measurement].theta_rad.is_some()
+                && self.segment.start == Start::MeasuredPose
+            {
+                self.start_at((number + 1, propagation.measurement), propagation.intervals.end, self.pose.theta_rad);
+                rejected_in_a_row = 0;
             }
         }
     }
 
-    /// Stands where a look saw the robot, after so many legs.
+    /// Stands where a measurement saw the robot, after so many propagation intervals.
     #[inline(always)]
-    fn start_at(&mut self, (legs, look): (usize, usize), next_piece: usize, free_heading_rad: f64) {
-        let seen = self.chain.looks[look];
+    fn start_at(&mut self, (propagations, measurement): (usize, usize), next_piece: usize, free_heading_rad: f64) {
+        let measured = self.segment.measurements[measurement];
         let [_, _, xy, theta] = self.noise.variance;
-        let pose = Pose::new(seen.x_m, seen.y_m, seen.theta_rad.unwrap_or(free_heading_rad));
-        let free = seen.theta_rad.is_none();
-        let piece = self.chain.pieces.get(next_piece).or(self.chain.pieces.last()).copied();
-        self.start(pose, (xy, if free { 0.0 } else { theta }), piece, (legs, seen.t_s));
+        let pose = Pose::new(measured.x_m, measured.y_m, measured.theta_rad.unwrap_or(free_heading_rad));
+        let free = measured.theta_rad.is_none();
+        let interval = self.segment.intervals.get(next_piece).or(self.segment.intervals.last()).copied();
+        self.start(pose, (xy, if free { 0.0 } else { theta }), interval, (propagations, measured.t_s));
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
             let last = self.j.len() - 1;
-            self.by.set(last, Vector3::new(-(self.pose.y_m - seen.y_m), self.pose.x_m - seen.x_m, 1.0));
+            self.by.set(last, Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0));
         }
     }
 
     #[inline(always)]
-    fn start(&mut self, seen: Pose, (var_xy, var_theta): (f64, f64), next: Option<Piece>, (legs, t_s): (usize, f64)) {
-        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |piece| self.propagator.twist(&piece));
+    fn start(
+        &mut self,
+        measured: Pose,
+        (var_xy, var_theta): (f64, f64),
+        next: Option<WheelInterval>,
+        (propagations, t_s): (usize, f64),
+    ) {
+        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |interval| self.propagator.twist(&interval));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
-        let theta_rad = seen.theta_rad - ltheta;
+        let theta_rad = measured.theta_rad - ltheta;
         let (sin, cos) = sin_cos(theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         let moved = Vector3::new(cos * twist.v_m_s, sin * twist.v_m_s, twist.omega_rad_s);
         self.pose = Pose::new(
-            seen.x_m - mounted.x + late * moved.x,
-            seen.y_m - mounted.y + late * moved.y,
+            measured.x_m - mounted.x + late * moved.x,
+            measured.y_m - mounted.y + late * moved.y,
             theta_rad + late * moved.z,
         );
         self.by.clear();
-        self.by.set(Column::MountX.index(), Vector3::new(-cos, -sin, 0.0));
-        self.by.set(Column::MountY.index(), Vector3::new(sin, -cos, 0.0));
-        self.by.set(Column::MountTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
+        self.by.set(Column::SensorX.index(), Vector3::new(-cos, -sin, 0.0));
+        self.by.set(Column::SensorY.index(), Vector3::new(sin, -cos, 0.0));
+        self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
         self.by.set(Column::Latency.index(), moved);
-        self.sight(legs, t_s, twist);
-        for (number, size) in self.model.sizes.iter().enumerate() {
-            let sight = self.sights.get(number);
-            self.by.set(Column::Term(number).index(), -sight);
+        self.measurement(propagations, t_s, twist);
+        for (number, size) in self.model.term_values.iter().enumerate() {
+            let measurement = self.by_measurement.get(number);
+            self.by.set(Column::Term(number).index(), -measurement);
             self.pose = Pose::new(
-                self.pose.x_m - size * sight.x,
-                self.pose.y_m - size * sight.y,
-                self.pose.theta_rad - size * sight.z,
+                self.pose.x_m - size * measurement.x,
+                self.pose.y_m - size * measurement.y,
+                self.pose.theta_rad - size * measurement.z,
             );
         }
         // The instrument's heading error moves the drive's centre round the instrument.
-        let lever = Vector3::new(-(self.pose.y_m - seen.y_m), self.pose.x_m - seen.x_m, 1.0);
+        let lever = Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0);
         let position = Matrix3::from_diagonal(&Vector3::new(var_xy, var_xy, 0.0));
         let heading = lever * lever.transpose() * var_theta;
         self.covariance = Covariance::of([&(position + heading)]);
@@ -281,13 +290,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.pose_by_noise = [[0.0; NOISES]; 3];
     }
 
-    /// Finds what the terms add to the look after so many legs at the pose in force, in the room, for each parameter.
+    /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force, in the room, for each parameter.
     #[inline(always)]
-    fn sight(&mut self, legs: usize, t_s: f64, twist: Twist) {
-        self.propagator.sight(self.pose, legs, t_s, twist);
+    fn measurement(&mut self, propagations: usize, t_s: f64, twist: Twist) {
+        self.propagator.measurement(self.pose, propagations, t_s, twist);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
-        let sights = self.sights.x.iter_mut().zip(&mut self.sights.y).zip(&mut self.sights.theta);
-        for (((x, y), theta), gradient) in sights.zip(&self.propagator.gradients) {
+        let by_measurement =
+            self.by_measurement.x.iter_mut().zip(&mut self.by_measurement.y).zip(&mut self.by_measurement.theta);
+        for (((x, y), theta), gradient) in by_measurement.zip(&self.propagator.gradients) {
             *x = cos * gradient.x_m - sin * gradient.y_m;
             *y = sin * gradient.x_m + cos * gradient.y_m;
             *theta = gradient.theta_rad;
@@ -295,25 +305,25 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     #[inline(always)]
-    fn predict(&mut self, number: usize, leg: &Leg) {
-        let Moved { motion, by_lengths } = self.propagator.moved(self.pose, number, leg);
+    fn predict(&mut self, number: usize, propagation: &PropagationInterval) {
+        let Moved { motion, by_geometry } = self.propagator.moved(self.pose, number, propagation);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
         self.by.turn(step);
-        for (column, of_leg) in by_lengths.into_iter().enumerate() {
-            self.by.set(column, self.by.get(column) + room(of_leg));
+        for (column, of_propagation) in by_geometry.into_iter().enumerate() {
+            self.by.set(column, self.by.get(column) + room(of_propagation));
         }
-        self.by.add_turned(Column::BASE.len(), (sin, cos), &self.propagator.leg_by_terms);
+        self.by.add_turned(Column::BASE.len(), (sin, cos), &self.propagator.propagation_by_terms);
         self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
-        let noise = leg.noise.turned((sin, cos)).times([
+        let noise = propagation.noise.turned((sin, cos)).times([
             self.noise.variance[NoiseComponent::Wheel as usize],
             self.noise.variance[NoiseComponent::Turn as usize],
         ]);
         self.covariance.carry(-step.y, step.x);
         self.covariance.add(0, &noise, 0);
         self.covariance.add(0, &noise, 1);
-        if self.want.noise_score {
+        if self.pass_options.noise_score {
             self.covariance_by.carry(-step.y, step.x);
             self.covariance_by.add(NoiseComponent::Wheel as usize, &noise, 0);
             self.covariance_by.add(NoiseComponent::Turn as usize, &noise, 1);
@@ -325,41 +335,41 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
-    /// Takes a look; false, and nothing changes, when it lies too far off.
+    /// Takes a measurement; false, and nothing changes, when it lies too far off.
     #[inline(always)]
-    fn update(&mut self, number: usize, leg: &Leg) -> bool {
-        let seen = self.chain.looks[leg.look];
-        let Some(piece) = self.chain.pieces[leg.pieces.clone()].last().copied() else { return true };
-        let twist = self.propagator.twist(&piece);
-        self.sight(number + 1, seen.t_s, twist);
+    fn update(&mut self, number: usize, propagation: &PropagationInterval) -> bool {
+        let measured = self.segment.measurements[propagation.measurement];
+        let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
+        let twist = self.propagator.twist(&interval);
+        self.measurement(number + 1, measured.t_s, twist);
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
-        // A look is late by the way that the instrument made in the meantime.
+        // A measurement is late by the way that the instrument made in the meantime.
         let moved = Vector3::new(
             cos * twist.v_m_s - twist.omega_rad_s * mounted.y,
             sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
             twist.omega_rad_s,
         );
         let mut from_terms = Vector3::zeros();
-        for (number, size) in self.model.sizes.iter().enumerate().filter(|(_, size)| **size != 0.0) {
-            from_terms += *size * self.sights.get(number);
+        for (number, size) in self.model.term_values.iter().enumerate().filter(|(_, size)| **size != 0.0) {
+            from_terms += *size * self.by_measurement.get(number);
         }
         let ahead = mounted - late * moved + from_terms;
         let error = Vector3::new(
-            seen.x_m - self.pose.x_m - ahead.x,
-            seen.y_m - self.pose.y_m - ahead.y,
-            seen.theta_rad.map_or(0.0, |theta_rad| wrap_to_pi(theta_rad - self.pose.theta_rad - ltheta - ahead.z)),
+            measured.x_m - self.pose.x_m - ahead.x,
+            measured.y_m - self.pose.y_m - ahead.y,
+            measured.theta_rad.map_or(0.0, |theta_rad| wrap_to_pi(theta_rad - self.pose.theta_rad - ltheta - ahead.z)),
         );
-        // What a component c of the look sees of the pose, and of the parameters directly: rows along, across, heading.
+        // What a component c of the measurement sees of the pose, and of the parameters directly: rows along, across, heading.
         let by_heading = Vector3::new(-ahead.y, ahead.x, 1.0);
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
-        let components = if seen.theta_rad.is_some() { 3 } else { 2 };
+        let components = if measured.theta_rad.is_some() { 3 } else { 2 };
         let r = [self.noise.variance[2], self.noise.variance[2], self.noise.variance[3]];
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
-        let seen = [0, 1, 2].map(|component| {
+        let measured = [0, 1, 2].map(|component| {
             if component >= components {
                 return Update { row: Vector3::zeros(), gain: Vector3::zeros(), v: 0.0, s: 1.0 };
             }
@@ -373,33 +383,35 @@ impl<'f, 'a> Filter<'f, 'a> {
             covariance.lower(&gain, &ph);
             Update { row, gain, v, s }
         });
-        if self.want.gate == Gate::Shut && distance > OUTLIER_CHI_SQUARE {
+        if self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE {
             return false;
         }
         self.covariance = covariance;
         // The lengths, and a free heading, the last column, are seen in the pose alone.
         let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -moved];
-        for (component, update) in seen.iter().enumerate().take(components) {
+        for (component, update) in measured.iter().enumerate().take(components) {
             let axis = axes[component];
             let Update { row, gain, v, s } = *update;
-            if self.want.noise_score {
+            if self.pass_options.noise_score {
                 self.score_noise(component, update, r[component]);
             }
-            for (direct, by) in self.direct[Column::MountX.index()..].iter_mut().zip(&mounted_by) {
+            for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {
                 *direct = axis.dot(by);
             }
-            for (direct, sight) in self.direct[Column::BASE.len()..].iter_mut().zip(self.sights.along(axis)) {
-                *direct = sight;
+            for (direct, measurement) in
+                self.direct[Column::BASE.len()..].iter_mut().zip(self.by_measurement.along(axis))
+            {
+                *direct = measurement;
             }
             for ((j, by), direct) in self.j.iter_mut().zip(self.by.along(row)).zip(&self.direct) {
                 *j = -by - direct;
             }
             self.sums.add(&self.j, v, s);
-            if self.want.innovations {
+            if self.pass_options.innovations {
                 let sigma = s.sqrt();
                 self.innovations.push(Innovation {
-                    chain: self.number,
-                    look: leg.look,
+                    segment: self.number,
+                    measurement: propagation.measurement,
                     component,
                     z: v / sigma,
                     sigma,
@@ -425,7 +437,8 @@ impl<'f, 'a> Filter<'f, 'a> {
             s_by[a] = row.x * ph_by[0][a] + row.y * ph_by[1][a] + row.z * ph_by[2][a];
             v_by[a] = -(row.x * x[a] + row.y * y[a] + row.z * theta[a]);
         }
-        s_by[if component < 2 { NoiseComponent::LookPosition } else { NoiseComponent::LookHeading } as usize] += r;
+        s_by[if component < 2 { NoiseComponent::MeasurementPosition } else { NoiseComponent::MeasurementHeading }
+            as usize] += r;
         for a in 0..NOISES {
             let of_v = v * per_s;
             x[a] += (ph_by[0][a] - gain.x * s_by[a]) * of_v + gain.x * v_by[a];
@@ -439,7 +452,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 }
 
-/// What one component of a look changes.
+/// What one component of a measurement changes.
 #[derive(Clone, Copy)]
 struct Update {
     /// What it sees of the pose.

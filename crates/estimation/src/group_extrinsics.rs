@@ -1,25 +1,25 @@
-//! Instruments of their own: a mounting or a latency that each session, or each run, has for itself.
+//! Instruments of their own: the extrinsics or a latency that each session, or each run, has for itself.
 //!
-//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on n). A run's evidence with that put in is
-//! I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹ of its group: whoever reads evidences need not know that o exists.
+//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on n). A run's normal equation with that put in is
+//! I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹ of its group: whoever reads normal equations need not know that o exists.
 //! A weak prior keeps a group that shows nothing of o at what is common to all.
 //! Reference: Schur complement; Neyman & Scott 1948 for what many nuisances of few data do to a variance, and why they must gain on what was held out.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{Column, Model, Own};
-use crate::normal_equations::Evidence;
+use crate::model::{Column, GroupExtrinsics, Model};
+use crate::normal_equations::NormalEquations;
 
-/// How a group's own columns follow a step of the others: at rest, and by each column of the evidence.
+/// How a group's own columns follow a step of the others: at rest, and by each column of the normal equation.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Follow {
+pub(crate) struct GroupResponse {
     pub(crate) group: (usize, usize),
     rest: DVector<f64>,
     by: DMatrix<f64>,
     information: DMatrix<f64>,
 }
 
-impl Follow {
+impl GroupResponse {
     /// The step of the own columns that goes with a step of some others.
     pub(crate) fn step(&self, columns: &[Column], step: &DVector<f64>) -> DVector<f64> {
         columns
@@ -34,19 +34,20 @@ impl Follow {
     }
 }
 
-impl Own {
-    /// Takes the own columns out of the evidences of runs or parts of runs; the model is the one in force.
-    pub(crate) fn take_out(&self, evidences: &mut [Evidence], model: &Model) -> Vec<Follow> {
+impl GroupExtrinsics {
+    /// Takes the own columns out of the normal equations of runs or parts of runs; the model is the one in force.
+    pub(crate) fn eliminate(&self, equations: &mut [NormalEquations], model: &Model) -> Vec<GroupResponse> {
         let at: Vec<usize> = self.columns.iter().map(|column| column.index()).collect();
-        let mut groups: Vec<(usize, usize)> = evidences.iter().map(|evidence| self.apart.group(evidence.run)).collect();
+        let mut groups: Vec<(usize, usize)> =
+            equations.iter().map(|equations| self.grouping.group(equations.run)).collect();
         groups.sort_unstable();
         groups.dedup();
         groups
             .into_iter()
             .filter_map(|group| {
-                let in_group = |evidence: &Evidence| self.apart.group(evidence.run) == group;
-                let mut sum = Evidence::new(group, evidences.first()?.gradient.len());
-                evidences.iter().filter(|evidence| in_group(evidence)).for_each(|evidence| sum.add(evidence, 1.0));
+                let in_group = |equations: &NormalEquations| self.grouping.group(equations.run) == group;
+                let mut sum = NormalEquations::new(group, equations.first()?.gradient.len());
+                equations.iter().filter(|equations| in_group(equations)).for_each(|equations| sum.add(equations, 1.0));
                 let pull = self.pull(model, group);
                 let own = sum.of(&self.columns).with_precision(pull.iter().map(|pull| pull.1)).matrix;
                 let inverse = own.clone().cholesky()?.inverse();
@@ -54,14 +55,17 @@ impl Own {
                 at.iter().for_each(|&column| cross.column_mut(column).fill(0.0));
                 let by = -(&inverse * cross);
                 let rest = -(&inverse * DVector::from_fn(at.len(), |i, _| sum.gradient[at[i]] + pull[i].0));
-                evidences.iter_mut().filter(|evidence| in_group(evidence)).for_each(|part| put_in(part, &at, &by));
-                Some(Follow { group, rest, by, information: own })
+                equations
+                    .iter_mut()
+                    .filter(|equations| in_group(equations))
+                    .for_each(|part| substitute(part, &at, &by));
+                Some(GroupResponse { group, rest, by, information: own })
             })
             .collect()
     }
 
     /// Is a column of a group known better than before any data?
-    pub(crate) fn is_shown(&self, follow: &Follow, column: Column) -> bool {
+    pub(crate) fn is_shown(&self, follow: &GroupResponse, column: Column) -> bool {
         let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
         let Some(inverse) = follow.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return false;
@@ -78,9 +82,9 @@ impl Own {
             .map(|column| {
                 let sd = plausible_sd(*column);
                 let off = match column {
-                    Column::MountX => own.body_from_sensor.x_m - common.body_from_sensor.x_m,
-                    Column::MountY => own.body_from_sensor.y_m - common.body_from_sensor.y_m,
-                    Column::MountTheta => own.body_from_sensor.theta_rad - common.body_from_sensor.theta_rad,
+                    Column::SensorX => own.body_from_sensor.x_m - common.body_from_sensor.x_m,
+                    Column::SensorY => own.body_from_sensor.y_m - common.body_from_sensor.y_m,
+                    Column::SensorTheta => own.body_from_sensor.theta_rad - common.body_from_sensor.theta_rad,
                     _ => own.latency_s - common.latency_s,
                 };
                 (off / (sd * sd), 1.0 / (sd * sd))
@@ -96,24 +100,24 @@ const LATENCY_SD_S: f64 = 0.1;
 
 const fn plausible_sd(column: Column) -> f64 {
     match column {
-        Column::MountX | Column::MountY => MOUNT_SD_M,
-        Column::MountTheta => MOUNT_SD_RAD,
+        Column::SensorX | Column::SensorY => MOUNT_SD_M,
+        Column::SensorTheta => MOUNT_SD_RAD,
         _ => LATENCY_SD_S,
     }
 }
 
-/// Puts own columns that follow the others by `by` into an evidence; their own rows and columns are empty afterwards.
-fn put_in(evidence: &mut Evidence, at: &[usize], by: &DMatrix<f64>) {
-    let n = evidence.gradient.len();
-    let own = DMatrix::from_fn(at.len(), at.len(), |i, j| evidence.information[(at[i], at[j])]);
-    let cross = DMatrix::from_fn(at.len(), n, |i, j| evidence.information[(at[i], j)]);
-    let gradient = DVector::from_fn(at.len(), |i, _| evidence.gradient[at[i]]);
+/// Puts own columns that follow the others by `by` into an normal equation; their own rows and columns are empty afterwards.
+fn substitute(equations: &mut NormalEquations, at: &[usize], by: &DMatrix<f64>) {
+    let n = equations.gradient.len();
+    let own = DMatrix::from_fn(at.len(), at.len(), |i, j| equations.information[(at[i], at[j])]);
+    let cross = DMatrix::from_fn(at.len(), n, |i, j| equations.information[(at[i], j)]);
+    let gradient = DVector::from_fn(at.len(), |i, _| equations.gradient[at[i]]);
     let mixed = by.transpose() * &cross;
-    evidence.information += &mixed + mixed.transpose() + by.transpose() * own * by;
-    evidence.gradient += by.transpose() * gradient;
+    equations.information += &mixed + mixed.transpose() + by.transpose() * own * by;
+    equations.gradient += by.transpose() * gradient;
     for &column in at {
-        evidence.information.column_mut(column).fill(0.0);
-        evidence.information.row_mut(column).fill(0.0);
-        evidence.gradient[column] = 0.0;
+        equations.information.column_mut(column).fill(0.0);
+        equations.information.row_mut(column).fill(0.0);
+        equations.gradient[column] = 0.0;
     }
 }

@@ -38,18 +38,18 @@ mod wheel_angles;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, refuse_wrapped_counters};
-pub use filter::{Gate, Innovation};
+pub use filter::{Innovation, OutlierGate};
 pub use maximum_likelihood::FitSettings;
-pub use model::{Apart, Column, Instrument, Model, Own};
-pub use model_fit::{JointFit, WHITE_BELOW};
+pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
+pub use model_fit::{ModelFit, WHITE_BELOW};
 pub use noise::{Noise, NoiseComponent};
 pub use normal_equations::{
-    ClusterRobust, Evidence, Information, Projected, RIDGE, SchurComplement, free_basis, inverse, total,
+    ClusterRobust, Information, NormalEquations, Projected, RIDGE, SchurComplement, free_basis, inverse, total,
 };
 pub use one_step::{LARGE_ROWS, LargeFit, OneStep, OneStepError, fit_large, is_large};
-pub use optimizer::{Ends, Fit, FitOptions, fit, pass_with_innovations};
+pub use optimizer::{ConvergenceCriterion, Fit, FitOptions, fit, pass_with_innovations};
 pub use pass::Pass;
 pub use profile::RISE_95;
-pub use records::{Chain, Records};
+pub use records::{Records, Segment};
 pub use thinning::{Selection, Thinning};
-pub use wheel_angles::WheelTrack;
+pub use wheel_angles::WheelAngleInterpolator;

@@ -4,11 +4,11 @@
 use dataset::Session;
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
-use crate::filter::Gate;
+use crate::filter::OutlierGate;
 use crate::model::Model;
-use crate::model_fit::JointFit;
+use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
-use crate::optimizer::{Ends, NOISE_SETTLED};
+use crate::optimizer::{ConvergenceCriterion, NOISE_SETTLED};
 
 /// What a fit may do beside the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,19 +32,23 @@ impl FitSettings {
     ///
     /// # Errors
     /// [`EstimationError`] when the sessions hold no measurements, or the fit diverges.
-    pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<JointFit<'a>, EstimationError> {
-        self.fit_until(Ends::NoiseShare(NOISE_SETTLED), sessions)
+    pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<ModelFit<'a>, EstimationError> {
+        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_SETTLED), sessions)
     }
 
     /// The fit, its steps followed so far.
-    pub(crate) fn fit_until<'a>(&self, ends: Ends, sessions: &[Session<'a>]) -> Result<JointFit<'a>, EstimationError> {
+    pub(crate) fn fit_until<'a>(
+        &self,
+        ends: ConvergenceCriterion,
+        sessions: &[Session<'a>],
+    ) -> Result<ModelFit<'a>, EstimationError> {
         refuse_wrapped_counters(sessions)?;
         let first = sessions.first().ok_or(EstimationError::NoSession)?;
         let nominal = Model::of(&first.robot.geometry()?, 0);
-        let mut found = JointFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
-        found.look_at_the_mounting();
+        let mut found = ModelFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
+        found.free_extrinsics_if_rotated();
         found.refit(None)?;
-        found.hold_what_is_unseen()?;
+        found.fix_unobservable()?;
         let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };
         let is_explained = matches!(explained, Explained::Yes(_));
         match explained {
@@ -53,9 +57,9 @@ impl FitSettings {
             Explained::NotTried => {}
         }
         if self.nuisances && !is_explained {
-            add_nuisances(&mut found, Gate::Shut)?;
+            add_nuisances(&mut found, OutlierGate::On)?;
         }
-        found.hold_what_is_unseen()?;
+        found.fix_unobservable()?;
         Ok(found)
     }
 }

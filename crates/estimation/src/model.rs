@@ -1,4 +1,4 @@
-//! The mean parameters: the drive's three lengths, where and how late the instrument looks, and the sizes of further terms.
+//! The mean parameters: the drive's three geometry parameters, where and how late the instrument looks, and the sizes of further terms.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,12 @@ pub enum Column {
     /// Relative change of the wheel separation.
     Separation,
     /// Place of the instrument ahead of the drive's centre, metres.
-    MountX,
+    SensorX,
     /// Its place to the left, metres.
-    MountY,
+    SensorY,
     /// Its heading on the robot, radians.
-    MountTheta,
-    /// How late a look bears its time, seconds.
+    SensorTheta,
+    /// How late a measurement bears its time, seconds.
     Latency,
     /// A parameter of a further term, by its place among all of them.
     Term(usize),
@@ -32,17 +32,17 @@ impl Column {
         Self::LeftWheel,
         Self::RightWheel,
         Self::Separation,
-        Self::MountX,
-        Self::MountY,
-        Self::MountTheta,
+        Self::SensorX,
+        Self::SensorY,
+        Self::SensorTheta,
         Self::Latency,
     ];
 
-    /// The drive's lengths.
+    /// The drive's geometry parameters.
     pub const GEOMETRY: [Self; 3] = [Self::LeftWheel, Self::RightWheel, Self::Separation];
 
-    /// The instrument's mounting.
-    pub const MOUNTING: [Self; 3] = [Self::MountX, Self::MountY, Self::MountTheta];
+    /// The instrument's extrinsics.
+    pub const EXTRINSICS: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
 
     /// Its place in a normal equation.
     #[must_use]
@@ -51,9 +51,9 @@ impl Column {
             Self::LeftWheel => 0,
             Self::RightWheel => 1,
             Self::Separation => 2,
-            Self::MountX => 3,
-            Self::MountY => 4,
-            Self::MountTheta => 5,
+            Self::SensorX => 3,
+            Self::SensorY => 4,
+            Self::SensorTheta => 5,
             Self::Latency => 6,
             Self::Term(number) => Self::BASE.len() + number,
         }
@@ -65,20 +65,20 @@ impl Column {
 pub struct Instrument {
     /// Its frame on the robot.
     pub body_from_sensor: Pose,
-    /// How late its looks bear their time, seconds.
+    /// How late its measurements bear their time, seconds.
     pub latency_s: f64,
 }
 
 /// Who has an instrument of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Apart {
+pub enum Grouping {
     /// Each session.
     Session,
     /// Each run.
     Run,
 }
 
-impl Apart {
+impl Grouping {
     /// The group of a run: its session, and the run itself where runs stand apart.
     #[must_use]
     pub const fn group(self, run: (usize, usize)) -> (usize, usize) {
@@ -91,20 +91,20 @@ impl Apart {
 
 /// What stands apart, and its values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Own {
+pub struct GroupExtrinsics {
     /// For whom.
-    pub apart: Apart,
+    pub grouping: Grouping,
     /// The columns that do, of mounting and latency.
     pub columns: Vec<Column>,
     /// The instruments found, by group.
     pub of: BTreeMap<(usize, usize), Instrument>,
 }
 
-impl Own {
+impl GroupExtrinsics {
     /// Values common to all, to start from.
     #[must_use]
-    pub fn new(apart: Apart, columns: Vec<Column>) -> Self {
-        Self { apart, columns, of: BTreeMap::new() }
+    pub fn new(grouping: Grouping, columns: Vec<Column>) -> Self {
+        Self { grouping, columns, of: BTreeMap::new() }
     }
 }
 
@@ -117,12 +117,12 @@ pub struct Model {
     pub separation_m: f64,
     /// The instrument's frame on the robot, where it is common to all.
     pub body_from_sensor: Pose,
-    /// How late looks bear their time, seconds, where it is common to all.
+    /// How late measurements bear their time, seconds, where it is common to all.
     pub latency_s: f64,
     /// Instruments that sessions or runs have for themselves.
-    pub own: Option<Own>,
+    pub own: Option<GroupExtrinsics>,
     /// Sizes of the further terms' parameters.
-    pub sizes: Vec<f64>,
+    pub term_values: Vec<f64>,
 }
 
 impl Model {
@@ -135,7 +135,7 @@ impl Model {
             body_from_sensor: Pose::IDENTITY,
             latency_s: 0.0,
             own: None,
-            sizes: vec![0.0; term_parameters],
+            term_values: vec![0.0; term_parameters],
         }
     }
 
@@ -154,7 +154,7 @@ impl Model {
     /// Where and how late the instrument looks in a run.
     #[must_use]
     pub fn instrument(&self, run: (usize, usize)) -> Instrument {
-        let own = self.own.as_ref().and_then(|own| own.of.get(&own.apart.group(run)));
+        let own = self.own.as_ref().and_then(|own| own.of.get(&own.grouping.group(run)));
         own.copied().unwrap_or(self.common_instrument())
     }
 
@@ -165,9 +165,9 @@ impl Model {
         let Instrument { body_from_sensor, latency_s } = own.of.entry(group).or_insert(common);
         for (column, by) in own.columns.iter().zip(by.iter()) {
             match column {
-                Column::MountX => body_from_sensor.x_m += by,
-                Column::MountY => body_from_sensor.y_m += by,
-                Column::MountTheta => body_from_sensor.theta_rad += by,
+                Column::SensorX => body_from_sensor.x_m += by,
+                Column::SensorY => body_from_sensor.y_m += by,
+                Column::SensorTheta => body_from_sensor.theta_rad += by,
                 _ => *latency_s += by,
             }
         }
@@ -179,11 +179,11 @@ impl Model {
             Column::LeftWheel => self.m_per_rad.left *= by.exp(),
             Column::RightWheel => self.m_per_rad.right *= by.exp(),
             Column::Separation => self.separation_m *= by.exp(),
-            Column::MountX => self.body_from_sensor.x_m += by,
-            Column::MountY => self.body_from_sensor.y_m += by,
-            Column::MountTheta => self.body_from_sensor.theta_rad += by,
+            Column::SensorX => self.body_from_sensor.x_m += by,
+            Column::SensorY => self.body_from_sensor.y_m += by,
+            Column::SensorTheta => self.body_from_sensor.theta_rad += by,
             Column::Latency => self.latency_s += by,
-            Column::Term(number) => self.sizes[number] += by,
+            Column::Term(number) => self.term_values[number] += by,
         }
     }
 }

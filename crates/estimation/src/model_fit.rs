@@ -7,41 +7,41 @@ use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use crate::error::EstimationError;
-use crate::filter::{Gate, Want};
+use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
-use crate::normal_equations::{ClusterRobust, Evidence, SchurComplement, free_basis};
-use crate::optimizer::{Ends, Fit, FitOptions, From, fit_from};
+use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
+use crate::optimizer::{ConvergenceCriterion, Fit, FitOptions, From, fit_from};
 use crate::pass::{Pass, pass};
-use crate::records::{Chain, Records};
+use crate::records::{Records, Segment};
 use crate::thinning::{Selection, Thinning};
 
-/// Innovations are taken for white while no component's correlation with the look before reaches this many standard errors: three components at 1 % together.
+/// Innovations are taken for white while no component's correlation with the measurement before reaches this many standard errors: three components at 1 % together.
 pub const WHITE_BELOW: f64 = 2.935;
 /// How many before an innovation it may resemble.
 const LAGS: i32 = 5;
-/// In how many phases thinned looks are taken.
+/// In how many phases thinned measurements are taken.
 const PHASES: usize = 4;
 /// Thinned further, a run would be little more than its ends.
-const LEAST_LOOKS_A_RUN: f64 = 1.0;
-/// A direction of the lengths is seen when its relative standard deviation is below this: nominal values are better known than worse.
+const MIN_MEASUREMENTS_PER_RUN: f64 = 1.0;
+/// A direction of the geometry parameters is seen when its relative standard deviation is below this: nominal values are better known than worse.
 const LARGEST_SIGMA: f64 = 0.03;
 /// An instrument whose heading on the robot seems to be more than this is mounted so on purpose; less may be the lie of a short log.
-const TURNED_ASIDE_RAD: f64 = 0.2;
+const ROTATED_SENSOR_RAD: f64 = 0.2;
 /// With fewer runs, they are cut into blocks to be held out.
-pub(crate) const LEAST_RUNS: usize = 6;
+pub(crate) const MIN_RUNS: usize = 6;
 pub(crate) const FOLDS: usize = 6;
 /// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
-const SCATTER_OF_RUNS: usize = 20;
+const MIN_RUNS_FOR_ROBUST: usize = 20;
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
 #[derive(Debug, Clone)]
-pub struct JointFit<'a> {
+pub struct ModelFit<'a> {
     /// The runs.
     pub records: Arc<Records<'a>>,
-    /// How their looks are thinned.
+    /// How their measurements are thinned.
     pub thinning: Thinning,
-    /// The looks taken.
+    /// The measurements taken.
     pub selections: Arc<Vec<Selection>>,
     /// The nominal drive.
     pub nominal: Model,
@@ -51,25 +51,25 @@ pub struct JointFit<'a> {
     pub fit: Fit,
     /// The free columns.
     pub columns: Vec<Column>,
-    /// Directions of the three lengths that the data do not determine, and that stay nominal: rows left, right, separation.
-    pub unseen: Vec<DVector<f64>>,
+    /// Directions of the three geometry parameters that the data do not determine, and that stay nominal: rows left, right, separation.
+    pub unobservable: Vec<DVector<f64>>,
     pub(crate) prior: NoisePrior,
     /// Where steps of its fits end.
-    pub(crate) ends: Ends,
-    /// The evidence of parts, where there are no records to make it of.
-    pub(crate) parts: Vec<Evidence>,
-    /// Displacements count as neighbours when it is asked whether looks are white.
+    pub(crate) ends: ConvergenceCriterion,
+    /// The normal equation of parts, where there are no records to make it of.
+    pub(crate) parts: Vec<NormalEquations>,
+    /// Displacements count as neighbours when it is asked whether measurements are white.
     pub(crate) displacements_follow: bool,
-    /// Looks that lie far off are taken like the others.
-    pub(crate) every_look: bool,
+    /// Measurements that lie far off are taken like the others.
+    pub(crate) ungated: bool,
 }
 
-impl<'a> JointFit<'a> {
+impl<'a> ModelFit<'a> {
     /// Records of sessions and a nominal model; nothing is fitted.
     pub(crate) fn before_any_step(
         sessions: &[Session<'a>],
         nominal: Model,
-        ends: Ends,
+        ends: ConvergenceCriterion,
         displacements_follow: bool,
     ) -> Self {
         let records = Records::of(sessions);
@@ -79,7 +79,7 @@ impl<'a> JointFit<'a> {
             thinning: Thinning::NONE,
             fit: Fit::nothing(&nominal, &prior),
             columns: Column::GEOMETRY.to_vec(),
-            unseen: Vec::new(),
+            unobservable: Vec::new(),
             records: Arc::new(records),
             start: nominal.clone(),
             nominal,
@@ -87,18 +87,18 @@ impl<'a> JointFit<'a> {
             ends,
             parts: Vec::new(),
             displacements_follow,
-            every_look: false,
+            ungated: false,
         }
     }
 }
 
-impl JointFit<'_> {
+impl ModelFit<'_> {
     /// The values found, with records that hold no measurements.
-    pub(crate) fn with_records<'b>(self, records: Records<'b>) -> JointFit<'b> {
-        let Self { thinning, nominal, start, fit, columns, unseen, prior, ends, parts, .. } = self;
+    pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
+        let Self { thinning, nominal, start, fit, columns, unobservable, prior, ends, parts, .. } = self;
         let fit = Fit { pass: Pass { innovations: Vec::new(), outliers: Vec::new(), ..fit.pass }, ..fit };
-        let (displacements_follow, every_look) = (self.displacements_follow, self.every_look);
-        JointFit {
+        let (displacements_follow, ungated) = (self.displacements_follow, self.ungated);
+        ModelFit {
             records: Arc::new(records),
             selections: Arc::default(),
             thinning,
@@ -106,21 +106,21 @@ impl JointFit<'_> {
             start,
             fit,
             columns,
-            unseen,
+            unobservable,
             prior,
             ends,
             parts,
             displacements_follow,
-            every_look,
+            ungated,
         }
     }
 
     /// An instrument that looks to the side cannot be left out of the first fit.
-    pub(crate) fn look_at_the_mounting(&mut self) {
+    pub(crate) fn free_extrinsics_if_rotated(&mut self) {
         let heading_rad = self.records.sensor_heading_rad(&self.nominal);
-        if heading_rad.abs() > TURNED_ASIDE_RAD {
+        if heading_rad.abs() > ROTATED_SENSOR_RAD {
             self.start.body_from_sensor.theta_rad = heading_rad;
-            self.columns.extend(Column::MOUNTING);
+            self.columns.extend(Column::EXTRINSICS);
         }
     }
 
@@ -134,14 +134,14 @@ impl JointFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
-        let Self { ends, every_look, .. } = *self;
-        let options = FitOptions { held: self.held(), ends, every_look, ..FitOptions::of(&self.columns) };
+        let Self { ends, ungated, .. } = *self;
+        let options = FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) };
         self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
         Ok(())
     }
 
     /// The directions of the free columns that stay nominal.
-    pub(crate) fn held(&self) -> Vec<DVector<f64>> {
+    pub(crate) fn fixed(&self) -> Vec<DVector<f64>> {
         self.fixed_along(&self.columns)
     }
 
@@ -150,7 +150,7 @@ impl JointFit<'_> {
         let along = |direction: &DVector<f64>, column: &Column| direction.get(column.index()).copied().unwrap_or(0.0);
         let of =
             |direction| DVector::from_iterator(columns.len(), columns.iter().map(|column| along(direction, column)));
-        self.unseen.iter().map(of).collect()
+        self.unobservable.iter().map(of).collect()
     }
 
     pub(crate) fn here(&self) -> From {
@@ -158,7 +158,7 @@ impl JointFit<'_> {
         From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }
 
-    /// Takes looks farther apart until their innovations are white, or a run has too few left.
+    /// Takes measurements farther apart until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
@@ -171,14 +171,14 @@ impl JointFit<'_> {
         Ok(())
     }
 
-    /// Looks so far apart; `None` when a run has too few left.
+    /// Measurements so far apart; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
         let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
         let selections = Selection::of(&self.records, thinning, &self.nominal);
-        (selections[0].mean_looks(&self.records) >= LEAST_LOOKS_A_RUN).then_some((thinning, selections))
+        (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
     }
 
-    /// Does [`Self::thin`] take looks farther apart than all of them?
+    /// Does [`Self::thin`] take measurements farther apart than all of them?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
         let between_s = median_between(&self.records).filter(|_| !self.is_white());
         between_s.is_some_and(|between_s| self.thinned(2.0 * between_s, between_s).is_some())
@@ -201,8 +201,8 @@ impl JointFit<'_> {
                         squares += innovation.z * innovation.z;
                         count += 1.0;
                         for (lag, before) in (1..=LAGS).zip(series[..number].iter().rev()) {
-                            let weight = self.records.weight_of_pair(before.chain, innovation.chain, lag);
-                            let counts = self.displacements_follow || before.chain == innovation.chain;
+                            let weight = self.records.weight_of_pair(before.segment, innovation.segment, lag);
+                            let counts = self.displacements_follow || before.segment == innovation.segment;
                             if counts && weight > 0.0 {
                                 products += weight * before.z * innovation.z;
                                 pairs += weight * weight;
@@ -215,12 +215,13 @@ impl JointFit<'_> {
             .fold(0.0, |largest: f64, z| largest.max(z.abs()))
     }
 
-    /// In how many phases the errors of a look are, on average: those of poses in all, as the legs between them overlap; those of a displacement where it is taken.
+    /// In how many phases the errors of a measurement are, on average: those of poses in all, as the propagation intervals between them overlap; those of a displacement where it is taken.
     fn times_taken(&self) -> f64 {
-        let taken = |chain: usize| self.selections.iter().filter(|phase| !phase.legs[chain].is_empty()).count();
+        let taken =
+            |segment: usize| self.selections.iter().filter(|phase| !phase.propagations[segment].is_empty()).count();
         #[allow(clippy::cast_precision_loss)]
-        if self.records.chains.iter().all(Chain::is_displacement) {
-            let times = (0..self.records.chains.len()).map(taken).filter(|times| *times > 0);
+        if self.records.segments.iter().all(Segment::is_displacement) {
+            let times = (0..self.records.segments.len()).map(taken).filter(|times| *times > 0);
             let (sum, count) = times.fold((0, 0), |(sum, count), times| (sum + times, count + 1));
             sum as f64 / f64::max(f64::from(count), 1.0)
         } else {
@@ -228,23 +229,23 @@ impl JointFit<'_> {
         }
     }
 
-    /// The evidence in units that can be held out: runs, or blocks where runs are few.
-    pub(crate) fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<Evidence> {
-        if self.fit.pass.runs.len() >= LEAST_RUNS {
+    /// The normal equation in units that can be held out: runs, or blocks where runs are few.
+    pub(crate) fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
+        if self.fit.pass.runs.len() >= MIN_RUNS {
             return self.fit.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(terms, LEAST_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(terms, MIN_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
     }
 
-    /// Names the directions of the lengths that the looks do not determine, and keeps them nominal.
-    pub(crate) fn hold_what_is_unseen(&mut self) -> Result<(), EstimationError> {
+    /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
+    pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
-        let held_before = !self.unseen.is_empty();
-        self.unseen = unseen(&information.matrix);
-        if self.unseen.is_empty() {
+        let held_before = !self.unobservable.is_empty();
+        self.unobservable = unobservable(&information.matrix);
+        if self.unobservable.is_empty() {
             // What has come to be seen since is free again.
             return if held_before { self.refit(Some(self.here())) } else { Ok(()) };
         }
@@ -253,7 +254,7 @@ impl JointFit<'_> {
         let mut model = self.fit.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
         let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));
-        for direction in &self.unseen {
+        for direction in &self.unobservable {
             let along = direction.dot(&moved);
             for (column, share) in Column::GEOMETRY.into_iter().zip(direction.iter()) {
                 model.advance(column, -along * share);
@@ -270,56 +271,56 @@ impl JointFit<'_> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         // Terms that are in the fit come first and keep their sizes.
         let mut model = self.fit.model.clone();
-        model.sizes.resize(parameters, 0.0);
+        model.term_values.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        let want = Want { innovations: true, gate: self.gate(), ..Want::default() };
-        pass(&self.records, &self.selections, &model, noise, free_headings, terms, want)
+        let pass_options = PassOptions { innovations: true, gate: self.gate(), ..PassOptions::default() };
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
     }
 
-    pub(crate) fn gate(&self) -> Gate {
-        Gate::of(self.every_look)
+    pub(crate) fn gate(&self) -> OutlierGate {
+        OutlierGate::of(self.ungated)
     }
 
-    /// The fit to every look, those that lie far off too: a large effect that shows in few looks makes them lie far off, and without them it is not seen. Where some
+    /// The fit to every measurement, those that lie far off too: a large effect that shows in few measurements makes them lie far off, and without them it is not seen. Where some
     /// err by themselves, it is a worse fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
-    pub fn with_every_look(&self) -> Result<Self, EstimationError> {
-        let mut open = Self { every_look: true, ..self.clone() };
+    pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
+        let mut open = Self { ungated: true, ..self.clone() };
         open.refit(None)?;
         Ok(open)
     }
 
-    /// The values found, on every look of the first phase, those that lie far off too; nothing is fitted again.
+    /// The values found, on every measurement of the first phase, those that lie far off too; nothing is fitted again.
     #[must_use]
-    pub fn at_every_look(&self) -> Self {
+    pub fn evaluated_ungated(&self) -> Self {
         let first = self.selections.iter().take(1).cloned().collect();
-        Self { every_look: true, selections: Arc::new(first), ..self.clone() }
+        Self { ungated: true, selections: Arc::new(first), ..self.clone() }
     }
 
-    /// The same fit, looks that lie far off by it left out. `terms` are those of the fit.
+    /// The same fit, measurements that lie far off by it left out. `terms` are those of the fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
-    pub fn without_outliers(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
-        let mut shut = Self { every_look: false, ..self.clone() };
+    pub fn refit_gated(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
+        let mut shut = Self { ungated: false, ..self.clone() };
         shut.refit_with(Some(self.here()), terms)?;
         Ok(shut)
     }
 
-    /// The evidence of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
+    /// The normal equation of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
     #[must_use]
-    pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<Evidence> {
+    pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         let mut model = self.fit.model.clone();
-        model.sizes.resize(parameters, 0.0);
+        model.term_values.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        let want = Want { parts, gate: self.gate(), ..Want::default() };
-        pass(&self.records, &self.selections, &model, noise, free_headings, terms, want).runs
+        let pass_options = PassOptions { parts, gate: self.gate(), ..PassOptions::default() };
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
 
-    /// The fit with further terms, their sizes free beside what is free already, on the same looks.
+    /// The fit with further terms, their sizes free beside what is free already, on the same measurements.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -332,14 +333,18 @@ impl JointFit<'_> {
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
-    pub fn extended_from(&self, sizes: Vec<f64>, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
+    pub fn extended_from(
+        &self,
+        term_values: Vec<f64>,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<Self, EstimationError> {
         let mut columns = self.columns.clone();
         columns.retain(|column| !matches!(column, Column::Term(_)));
-        columns.extend((0..sizes.len()).map(Column::Term));
+        columns.extend((0..term_values.len()).map(Column::Term));
         let mut from = self.here();
-        from.model.sizes = sizes;
+        from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
-        let mut extended = Self { columns, ends: Ends::Likelihood, ..self.clone() };
+        let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
         extended.refit_with(Some(from), terms)?;
         Ok(extended)
     }
@@ -351,7 +356,7 @@ impl JointFit<'_> {
         let free = self.free_basis();
         let (_, inverse) = self.fit.information(&self.columns)?.along(&free).solve()?;
         let units = self.units(terms);
-        let enough = if self.thinning == Thinning::NONE { SCATTER_OF_RUNS } else { free.ncols() + 2 };
+        let enough = if self.thinning == Thinning::NONE { MIN_RUNS_FOR_ROBUST } else { free.ncols() + 2 };
         if units.len() < enough {
             return Some(&free * inverse * free.transpose());
         }
@@ -362,20 +367,20 @@ impl JointFit<'_> {
     /// An orthonormal basis of the directions of the free columns that are observable.
     #[must_use]
     pub fn free_basis(&self) -> DMatrix<f64> {
-        free_basis(self.columns.len(), &self.held())
+        free_basis(self.columns.len(), &self.fixed())
     }
 
     /// The Schur complement of the free columns, but for some that are asked for.
     #[must_use]
-    pub fn eliminated(&self, equations: &Evidence, asked: &[usize]) -> Option<SchurComplement> {
+    pub fn eliminated(&self, equations: &NormalEquations, asked: &[usize]) -> Option<SchurComplement> {
         let columns: Vec<Column> =
             self.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
         let basis = free_basis(columns.len(), &self.fixed_along(&columns));
         SchurComplement::of(equations, &columns, basis)
     }
 }
-/// The directions of the three lengths that a normal equation, which begins with them, does not determine.
-pub(crate) fn unseen(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
+/// The directions of the three geometry parameters that a normal equation, which begins with them, does not determine.
+pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
     (0..3)
         .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
@@ -383,7 +388,7 @@ pub(crate) fn unseen(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// Information on the three lengths with the other columns at their best.
+/// Information on the three geometry parameters with the other columns at their best.
 fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
     let n = matrix.nrows();
     let own = matrix.view((0, 0), (3, 3)).into_owned();
@@ -396,7 +401,7 @@ fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
     Matrix3::from_iterator((own - rest).iter().copied())
 }
 
-/// Median time between looks.
+/// Median time between measurements.
 fn median_between(records: &Records<'_>) -> Option<f64> {
     let mut between: Vec<f64> = records.times_between().collect();
     if between.is_empty() {

@@ -9,15 +9,15 @@ pub enum NoiseComponent {
     Wheel,
     /// Of the heading, rad² per radian turned: the wheelbase that scatters.
     Turn,
-    /// Of each of a look's two coordinates, m².
-    LookPosition,
-    /// Of a look's heading, rad².
-    LookHeading,
+    /// Of each of a measurement's two coordinates, m².
+    MeasurementPosition,
+    /// Of a measurement's heading, rad².
+    MeasurementHeading,
 }
 
 impl NoiseComponent {
     /// All, in the order of [`Noise::variance`].
-    pub const ALL: [Self; 4] = [Self::Wheel, Self::Turn, Self::LookPosition, Self::LookHeading];
+    pub const ALL: [Self; 4] = [Self::Wheel, Self::Turn, Self::MeasurementPosition, Self::MeasurementHeading];
 }
 
 /// Sizes of the four variances.
@@ -38,30 +38,35 @@ pub(crate) struct NoisePrior {
 /// worth less than one run of data, and keeps apart what endpoints alone cannot.
 const WHEEL_SIGMA: f64 = 7e-4;
 const TURN_SIGMA: f64 = 1e-3;
-const LOOK_SIGMA_M: f64 = 1e-3;
-const LOOK_SIGMA_RAD: f64 = 3e-3;
+const MEASUREMENT_SIGMA_M: f64 = 1e-3;
+const MEASUREMENT_SIGMA_RAD: f64 = 3e-3;
 const VAGUE: f64 = 2.0;
 /// A precision that the dataset states is believed to a factor of two: instruments are sold by their best.
 const STATED: f64 = 0.7;
 /// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
-pub(crate) const LEAST_SIGMA: f64 = 1e-6;
+pub(crate) const MIN_SIGMA: f64 = 1e-6;
 /// A standard deviation that is not to move stays within e^±0.01 of where it is.
 const HELD: f64 = 0.01;
 
 impl NoisePrior {
     pub(crate) fn of(stated: TruthNoise) -> Self {
-        let known = |sigma: Option<f64>| sigma.filter(|sigma| *sigma > 0.0);
-        let (xy, theta) = (known(stated.sigma_xy_m), known(stated.sigma_theta_rad));
+        let reused = |sigma: Option<f64>| sigma.filter(|sigma| *sigma > 0.0);
+        let (xy, theta) = (reused(stated.sigma_xy_m), reused(stated.sigma_theta_rad));
         let log_sd = |stated: Option<f64>| if stated.is_some() { STATED } else { VAGUE };
         Self {
-            centre: [WHEEL_SIGMA, TURN_SIGMA, xy.unwrap_or(LOOK_SIGMA_M), theta.unwrap_or(LOOK_SIGMA_RAD)],
+            centre: [
+                WHEEL_SIGMA,
+                TURN_SIGMA,
+                xy.unwrap_or(MEASUREMENT_SIGMA_M),
+                theta.unwrap_or(MEASUREMENT_SIGMA_RAD),
+            ],
             log_sd: [VAGUE, VAGUE, log_sd(xy), log_sd(theta)],
         }
     }
 
     /// The same with one standard deviation held at next to nothing.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
-        (self.centre[component as usize], self.log_sd[component as usize]) = (LEAST_SIGMA, HELD);
+        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_SIGMA, HELD);
         self
     }
 

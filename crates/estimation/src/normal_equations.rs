@@ -10,7 +10,7 @@ use crate::model::Column;
 
 /// Sums of a run's whitened innovations v/√s and their derivatives j/√s by the mean parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
+pub struct NormalEquations {
     /// Which run: session and run in the order given.
     pub run: (usize, usize),
     /// Σ j jᵀ/s.
@@ -25,7 +25,7 @@ pub struct Evidence {
     pub count: f64,
 }
 
-impl Evidence {
+impl NormalEquations {
     pub(crate) fn new(run: (usize, usize), columns: usize) -> Self {
         Self {
             run,
@@ -166,7 +166,7 @@ pub struct SchurComplement {
 impl SchurComplement {
     /// Of free columns along a basis of theirs; `None` where they are not determined.
     #[must_use]
-    pub fn of(equations: &Evidence, columns: &[Column], basis: DMatrix<f64>) -> Option<Self> {
+    pub fn of(equations: &NormalEquations, columns: &[Column], basis: DMatrix<f64>) -> Option<Self> {
         let own = equations.of(columns).along(&basis);
         let inverse = inverse(&own.matrix, RIDGE)?;
         let columns = columns.iter().map(|column| column.index()).collect();
@@ -175,7 +175,7 @@ impl SchurComplement {
 
     /// The score of one run by some columns, with what the free columns' estimate takes of it, which all runs share, taken out.
     #[must_use]
-    pub fn score_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DVector<f64> {
+    pub fn score_of(&self, run: &NormalEquations, all: &NormalEquations, columns: &[usize]) -> DVector<f64> {
         let cross = all.block(columns, &self.columns) * &self.free;
         let free = self.free.transpose() * run.gradient_of(&self.columns);
         run.gradient_of(columns) - cross * &self.inverse * free
@@ -183,7 +183,7 @@ impl SchurComplement {
 
     /// The variance of that score.
     #[must_use]
-    pub fn variance_of(&self, run: &Evidence, all: &Evidence, columns: &[usize]) -> DMatrix<f64> {
+    pub fn variance_of(&self, run: &NormalEquations, all: &NormalEquations, columns: &[usize]) -> DMatrix<f64> {
         let weights = all.block(columns, &self.columns) * &self.free * &self.inverse * self.free.transpose();
         let cross = run.block(columns, &self.columns) * weights.transpose();
         run.block(columns, columns) - &cross - cross.transpose()
@@ -192,7 +192,7 @@ impl SchurComplement {
 
     /// What is left of some columns.
     #[must_use]
-    pub fn of_columns(&self, equations: &Evidence, columns: &[usize]) -> Projected {
+    pub fn of_columns(&self, equations: &NormalEquations, columns: &[usize]) -> Projected {
         let cross = equations.block(columns, &self.columns) * &self.free;
         let own = equations.block(columns, columns);
         let information = &own - &cross * &self.inverse * cross.transpose();
@@ -232,7 +232,7 @@ impl ClusterRobust {
 
 /// The sum over runs, in their order.
 #[must_use]
-pub fn total(runs: &[Evidence]) -> Option<Evidence> {
+pub fn total(runs: &[NormalEquations]) -> Option<NormalEquations> {
     let (first, others) = runs.split_first()?;
     let mut sum = first.clone();
     others.iter().for_each(|run| sum.add(run, 1.0));
@@ -244,8 +244,8 @@ mod tests {
     use super::*;
 
     /// Three columns, the first free: I = [[2, 1, 0], [1, 3, 1], [0, 1, 4]], g = (2, 0, 1).
-    fn equations() -> Evidence {
-        let mut all = Evidence::new((0, 0), 3);
+    fn equations() -> NormalEquations {
+        let mut all = NormalEquations::new((0, 0), 3);
         all.information = DMatrix::from_row_slice(3, 3, &[2.0, 1.0, 0.0, 1.0, 3.0, 1.0, 0.0, 1.0, 4.0]);
         all.gradient = DVector::from_column_slice(&[2.0, 0.0, 1.0]);
         all

@@ -1,13 +1,13 @@
-//! The instrument's mounting and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
+//! The instrument's extrinsics and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
 
 use kinematics::Pose;
 use nalgebra::DVector;
 
 use crate::error::EstimationError;
-use crate::filter::Gate;
-use crate::model::{Apart, Column, Instrument, Own};
-use crate::model_fit::{FOLDS, JointFit, LEAST_RUNS};
-use crate::normal_equations::{Evidence, total};
+use crate::filter::OutlierGate;
+use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
+use crate::model_fit::{FOLDS, MIN_RUNS, ModelFit};
+use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Fit;
 use crate::thinning::Thinning;
 
@@ -19,7 +19,7 @@ const PARTS_OF_A_RUN: usize = 3;
 /// A run, or a part of one, with the fold that holds it out.
 struct Unit {
     fold: usize,
-    evidence: Evidence,
+    equations: NormalEquations,
 }
 
 /// What was predicted of runs by fits to other runs.
@@ -38,7 +38,7 @@ struct Earned {
     /// Over none of them, on what was held out.
     gain: f64,
     columns: Vec<Column>,
-    own: Option<Own>,
+    own: Option<GroupExtrinsics>,
     held_out: HeldOut,
 }
 
@@ -63,44 +63,47 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
     Some((mean, (variance / n).sqrt()))
 }
 
-/// Lets the mounting and the latency of the instrument in, common to all or for each session or run, where they predict runs that they were not fitted to: the
-/// looks by their likelihood, and the ends of the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a
+/// Lets the extrinsics and the latency of the instrument in, common to all or for each session or run, where they predict runs that they were not fitted to: the
+/// measurements by their likelihood, and the ends of the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a
 /// calibration is for. What a run has for itself is fitted to one part of it and judged by another.
-pub(crate) fn add_nuisances(fit: &mut JointFit<'_>, gate: Gate) -> Result<(), EstimationError> {
-    let sets: [&[Column]; 3] =
-        [&Column::MOUNTING, &[Column::Latency], &[Column::MountX, Column::MountY, Column::MountTheta, Column::Latency]];
+pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
+    let sets: [&[Column]; 3] = [
+        &Column::EXTRINSICS,
+        &[Column::Latency],
+        &[Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency],
+    ];
     let several = fit.fit.pass.runs.iter().any(|run| run.run.0 != fit.fit.pass.runs[0].run.0);
-    let mut ways = vec![None];
+    let mut groupings = vec![None];
     // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
-    if gate == Gate::Open || (fit.thinning == Thinning::NONE && fit.is_white()) {
-        ways.push(Some(Apart::Run));
+    if gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white()) {
+        groupings.push(Some(Grouping::Run));
     }
     if several {
-        ways.push(Some(Apart::Session));
+        groupings.push(Some(Grouping::Session));
     }
     let mut best: Option<Earned> = None;
-    for apart in ways {
-        let units = units_of(fit, apart, gate);
+    for grouping in groupings {
+        let units = units_of(fit, grouping, gate);
         let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
         // What a larger set gains over a smaller one, it must gain by as much as that over nothing.
-        let mut of_way: Option<Earned> = None;
+        let mut of_grouping: Option<Earned> = None;
         for set in sets {
             let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
-            let (columns, own): (Vec<Column>, _) = match apart {
+            let (columns, own): (Vec<Column>, _) = match grouping {
                 None => (others().chain(set.iter().copied()).collect(), None),
-                Some(apart) => (others().collect(), Some(Own::new(apart, set.to_vec()))),
+                Some(grouping) => (others().collect(), Some(GroupExtrinsics::new(grouping, set.to_vec()))),
             };
             let Some(found) = held_out(fit, &units, &columns, own.as_ref()) else { continue };
-            let before = of_way.as_ref().map_or(&base, |earned| &earned.held_out);
+            let before = of_grouping.as_ref().map_or(&base, |earned| &earned.held_out);
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
             if mean > GAIN_IN_SIGMAS * error && !drifts {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
-                of_way = Some(Earned { gain, columns, own, held_out: found });
+                of_grouping = Some(Earned { gain, columns, own, held_out: found });
             }
         }
-        if let Some(earned) = of_way
+        if let Some(earned) = of_grouping
             && best.as_ref().is_none_or(|best| earned.gain > best.gain)
         {
             best = Some(earned);
@@ -108,13 +111,13 @@ pub(crate) fn add_nuisances(fit: &mut JointFit<'_>, gate: Gate) -> Result<(), Es
     }
     if let Some(Earned { columns, own, .. }) = best {
         let mut from = fit.here();
-        // From where these looks put them, and with every look until they fit: from nothing, a gate may hide what they would explain.
-        if gate == Gate::Open {
+        // From where these measurements put them, and with every measurement until they fit: from nothing, a gate may hide what they would explain.
+        if gate == OutlierGate::Off {
             from.noise = None;
         }
-        let mut all: Vec<Evidence> =
-            units_of(fit, own.as_ref().map(|own| own.apart), gate).into_iter().map(|unit| unit.evidence).collect();
-        let follows = own.as_ref().map_or_else(Vec::new, |own| own.take_out(&mut all, &from.model));
+        let mut all: Vec<NormalEquations> =
+            units_of(fit, own.as_ref().map(|own| own.grouping), gate).into_iter().map(|unit| unit.equations).collect();
+        let follows = own.as_ref().map_or_else(Vec::new, |own| own.eliminate(&mut all, &from.model));
         from.model.own = own;
         if let Some((step, _)) = total(&all).and_then(|sum| sum.of(&columns).solve()) {
             columns.iter().zip(step.iter()).for_each(|(column, by)| from.model.advance(*column, *by));
@@ -126,17 +129,17 @@ pub(crate) fn add_nuisances(fit: &mut JointFit<'_>, gate: Gate) -> Result<(), Es
     Ok(())
 }
 
-/// Looks that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all looks, if
+/// Measurements that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all measurements, if
 /// they are then white, and were not before or less than half as many lie far off. If they are not, their number says little for what they seem to show.
 pub(crate) fn explained_by_nuisances<'a>(
-    fit: &JointFit<'a>,
+    fit: &ModelFit<'a>,
     thin: bool,
-) -> Result<Explained<JointFit<'a>>, EstimationError> {
+) -> Result<Explained<ModelFit<'a>>, EstimationError> {
     if (fit.is_white() || !thin) && fit.fit.pass.outliers.is_empty() {
         return Ok(Explained::NotTried);
     }
     let mut explained = fit.clone();
-    add_nuisances(&mut explained, Gate::Open)?;
+    add_nuisances(&mut explained, OutlierGate::Off)?;
     if explained.columns == fit.columns && explained.fit.model.own.is_none() {
         return Ok(Explained::NotTried);
     }
@@ -144,7 +147,7 @@ pub(crate) fn explained_by_nuisances<'a>(
     if thin {
         plain.thin()?;
     }
-    let far = |found: &JointFit<'_>| found.fit.pass.outliers.len();
+    let far = |found: &ModelFit<'_>| found.fit.pass.outliers.len();
     let uses_more = plain.thinning != Thinning::NONE || 2 * far(&explained) < far(&plain);
     let is_better = uses_more && !(thin && explained.is_to_be_thinned());
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
@@ -152,28 +155,28 @@ pub(crate) fn explained_by_nuisances<'a>(
 
 /// Fits some columns, and what is own to groups, to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not
 /// determine the columns.
-fn held_out(fit: &JointFit<'_>, units: &[Unit], columns: &[Column], own: Option<&Own>) -> Option<HeldOut> {
+fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<&GroupExtrinsics>) -> Option<HeldOut> {
     let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
     for fold in 0..FOLDS.min(units.len()) {
-        let mut others: Vec<Evidence> =
-            units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.evidence.clone()).collect();
-        let follows = own.map_or_else(Vec::new, |own| own.take_out(&mut others, &fit.fit.model));
+        let mut others: Vec<NormalEquations> =
+            units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.equations.clone()).collect();
+        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.fit.model));
         let (step, _) = total(&others)?.of(columns).solve()?;
         let mut common = fit.fit.model.clone();
         columns.iter().zip(step.iter()).for_each(|(column, by)| common.advance(*column, *by));
         for (k, unit) in units.iter().enumerate().filter(|(_, unit)| unit.fold == fold) {
-            let Evidence { run, .. } = unit.evidence;
+            let NormalEquations { run, .. } = unit.equations;
             let (mut columns, mut step, mut model) = (columns.to_vec(), step.clone(), common.clone());
             // A group of which nothing else is known has what is common.
             if let Some(own) = own
-                && let Some(follow) = follows.iter().find(|follow| follow.group == own.apart.group(run))
+                && let Some(follow) = follows.iter().find(|follow| follow.group == own.grouping.group(run))
             {
                 let by = follow.step(&columns, &step);
                 own.columns.iter().zip(by.iter()).for_each(|(column, by)| model.advance(*column, *by));
                 columns.extend(&own.columns);
                 step = DVector::from_iterator(columns.len(), step.iter().chain(by.iter()).copied());
             }
-            found.costs[k] = unit.evidence.cost_after(&columns, &step);
+            found.costs[k] = unit.equations.cost_after(&columns, &step);
             for (end_m, end_rad) in fit.records.end_errors(run, &model) {
                 found.end_m += end_m;
                 found.end_rad += end_rad;
@@ -184,35 +187,35 @@ fn held_out(fit: &JointFit<'_>, units: &[Unit], columns: &[Column], own: Option<
 }
 
 /// Evidence to be held out, so that a group is not held out as a whole.
-fn units_of(fit: &JointFit<'_>, apart: Option<Apart>, gate: Gate) -> Vec<Unit> {
+fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
     let runs = fit.fit.pass.runs.len().max(1);
-    let parts = match (apart, gate) {
-        (Some(Apart::Run), gate) => fit.blocks(&mut [], PARTS_OF_A_RUN, gate),
-        (_, Gate::Shut) => fit.units(&mut []),
-        (_, Gate::Open) => fit.blocks(&mut [], LEAST_RUNS.div_ceil(runs), gate),
+    let parts = match (grouping, gate) {
+        (Some(Grouping::Run), gate) => fit.blocks(&mut [], PARTS_OF_A_RUN, gate),
+        (_, OutlierGate::On) => fit.units(&mut []),
+        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS.div_ceil(runs), gate),
     };
     // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
-    let mut seen: Vec<((usize, usize), usize)> = Vec::new();
+    let mut measured: Vec<((usize, usize), usize)> = Vec::new();
     parts
         .into_iter()
         .enumerate()
-        .map(|(number, evidence)| {
-            let fold = match seen.iter_mut().find(|(run, _)| *run == evidence.run) {
+        .map(|(number, equations)| {
+            let fold = match measured.iter_mut().find(|(run, _)| *run == equations.run) {
                 Some((_, fold)) => {
                     *fold += 1;
                     *fold % FOLDS
                 }
                 None => {
-                    seen.push((evidence.run, number % FOLDS));
+                    measured.push((equations.run, number % FOLDS));
                     number % FOLDS
                 }
             };
-            Unit { fold, evidence }
+            Unit { fold, equations }
         })
         .collect()
 }
 
-impl JointFit<'_> {
+impl ModelFit<'_> {
     /// Is a column of the instrument in the model, for all or for groups?
     pub fn has(&self, column: Column) -> bool {
         self.columns.contains(&column) || self.fit.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
@@ -235,9 +238,9 @@ impl JointFit<'_> {
         let Pose { x_m, y_m, theta_rad } = common.body_from_sensor;
         Instrument {
             body_from_sensor: Pose::new(
-                mean(Column::MountX, x_m, |own| own.body_from_sensor.x_m),
-                mean(Column::MountY, y_m, |own| own.body_from_sensor.y_m),
-                mean(Column::MountTheta, theta_rad, |own| own.body_from_sensor.theta_rad),
+                mean(Column::SensorX, x_m, |own| own.body_from_sensor.x_m),
+                mean(Column::SensorY, y_m, |own| own.body_from_sensor.y_m),
+                mean(Column::SensorTheta, theta_rad, |own| own.body_from_sensor.theta_rad),
             ),
             latency_s: mean(Column::Latency, common.latency_s, |own| own.latency_s),
         }

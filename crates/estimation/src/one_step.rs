@@ -2,7 +2,7 @@
 //!
 //! With the normal equation Σ I, Σ g of everything at the pieces' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is asymptotically as good as the fit of everything, as θ₀ is
 //! within O(1/√n): what it misses is of the order of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
-//! whether the instrument has a mounting or a latency are those of the pieces.
+//! whether the instrument has the extrinsics or a latency are those of the pieces.
 
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, channel, sync_channel};
@@ -14,43 +14,45 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
 use crate::maximum_likelihood::FitSettings;
-use crate::model::{Apart, Column, Instrument, Model};
-use crate::model_fit::{JointFit, unseen};
-use crate::normal_equations::{Evidence, total};
-use crate::optimizer::{Ends, pass_settled};
+use crate::model::{Column, Grouping, Instrument, Model};
+use crate::model_fit::{ModelFit, unobservable};
+use crate::normal_equations::{NormalEquations, total};
+use crate::optimizer::{ConvergenceCriterion, pass_settled};
 use crate::records::Records;
 use crate::thinning::Selection;
 
-/// With more rows of odometry and looks together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
+/// With more rows of odometry and measurements together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
 pub const LARGE_ROWS: usize = 500_000;
-/// With more rows a look, pieces would show too few looks: such datasets are fitted as a whole.
-const MOST_ROWS_A_LOOK: usize = 500;
-/// Looks of the pieces together. They show a variance to 0.3 %, and a correlation of innovations to 0.4 %.
-const FIRST_LOOKS: usize = 1 << 16;
-/// Rows of the pieces together at most, where looks are few.
+/// With more rows a measurement, pieces would show too few measurements: such datasets are fitted as a whole.
+const MAX_ROWS_PER_MEASUREMENT: usize = 500;
+/// Measurements of the pieces together. They show a variance to 0.3 %, and a correlation of innovations to 0.4 %.
+const FIRST_MEASUREMENTS: usize = 1 << 16;
+/// Rows of the pieces together at most, where measurements are few.
 const FIRST_ROWS: usize = 1 << 19;
-/// As many as can be held out, and no more: looks may have to be thinned to some of hundreds of rows, and only a long way shows by its end what lengths are worth.
+/// As many as can be held out, and no more: measurements may have to be thinned to some of hundreds of rows, and only a long way shows by its end what lengths are worth.
 const PIECES: usize = 8;
-/// How far the noise of the pieces is followed before looks are told to be white or not, and at last: nearer than the pieces know it.
+/// How far the noise of the pieces is followed before measurements are told to be white or not, and at last: nearer than the pieces know it.
 const FIRST_NOISE_SETTLED: f64 = 5e-2;
 const LAST_NOISE_SETTLED: f64 = 1e-3;
-/// A part that is held at a time has so many blocks at least, and so many looks and thinned looks: at its cut one of them has no other to begin at.
+/// A part that is held at a time has so many blocks at least, and so many measurements and thinned measurements: at its cut one of them has no other to begin at.
 const PART_BLOCKS: usize = 32;
-const PART_LOOKS: usize = 1000;
-const PART_LEGS: usize = 50;
+const PART_MEASUREMENTS: usize = 1000;
+const PART_PROPAGATIONS: usize = 50;
 /// Parts wait for no more cores than these, as each holds its memory.
-const MOST_WORKERS: usize = 4;
+const MAX_WORKERS: usize = 4;
 /// A step whose square, of lengths by ratio and of headings in radians, is below this share of a standard deviation is right to about that share.
 const NEAR: f64 = 0.05;
-const MOST_PASSES: usize = 5;
+const MAX_PASSES: usize = 5;
 
 /// How a calibration of large datasets was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OneStep {
-    /// Looks of all runs.
-    pub looks: usize,
-    /// Looks of the pieces that were fitted as a whole first.
-    pub first_looks: usize,
+    /// Measurements of all runs.
+    #[serde(rename = "looks")]
+    pub measurements: usize,
+    /// Measurements of the pieces that were fitted as a whole first.
+    #[serde(rename = "first_looks")]
+    pub first_measurements: usize,
     /// Passes over everything: one, unless the first fit was far off.
     pub passes: usize,
 }
@@ -66,44 +68,44 @@ pub enum OneStepError {
     Estimation(#[from] EstimationError),
 }
 
-/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a look in 500 rows at least.
+/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500 rows at least.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
-    let (rows, looks) = rows_and_looks(datasets);
-    rows + looks > LARGE_ROWS && looks.saturating_mul(MOST_ROWS_A_LOOK) >= rows
+    let (rows, measurements) = rows_and_looks(datasets);
+    rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
 }
 
 fn rows_and_looks(datasets: &[Blocks]) -> (usize, usize) {
     let of = |blocks: &Blocks, count: fn(&Blocks, usize) -> usize| -> usize {
         (0..blocks.infos().len()).map(|run| count(blocks, run)).sum()
     };
-    datasets
-        .iter()
-        .fold((0, 0), |(rows, looks), blocks| (rows + of(blocks, Blocks::rows), looks + of(blocks, Blocks::seen_rows)))
+    datasets.iter().fold((0, 0), |(rows, measurements), blocks| {
+        (rows + of(blocks, Blocks::rows), measurements + of(blocks, Blocks::seen_rows))
+    })
 }
 
 /// Blocks of one run: dataset, run, blocks.
 type Part = (usize, usize, Range<usize>);
 
 /// One part's evidence, and what else it said.
-struct Weighed {
+struct PartEquations {
     number: usize,
-    evidence: Option<Evidence>,
+    equations: Option<NormalEquations>,
     own: Option<Instrument>,
-    looks: usize,
+    measurements: usize,
 }
 
 /// Everything at the values of a fit.
-struct Gathered {
-    parts: Vec<Evidence>,
-    looks: usize,
+struct GatheredParts {
+    parts: Vec<NormalEquations>,
+    measurements: usize,
 }
 
 /// The fit of datasets of any size; its records hold no measurements, only the runs' ids.
 #[derive(Debug, Clone)]
 pub struct LargeFit {
     /// The fit.
-    pub fit: JointFit<'static>,
+    pub fit: ModelFit<'static>,
     /// How it was made.
     pub one_step: OneStep,
     /// The robot of the first dataset.
@@ -124,32 +126,37 @@ pub fn fit_large(
 ) -> Result<LargeFit, OneStepError> {
     let pieces = pieces(datasets)?;
     let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
-    let mut first = settings.fit_until(Ends::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
-    first.ends = Ends::NoiseShare(LAST_NOISE_SETTLED);
+    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
+    first.ends = ConvergenceCriterion::NoiseShare(LAST_NOISE_SETTLED);
     first.refit(Some(first.here()))?;
-    let first_looks = first.records.looks();
+    let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
     let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
     // What the pieces hold is needed no more.
-    let mut found = first.with_records(Records { chains: Vec::new(), unused: Vec::new(), ids });
+    let mut found = first.with_records(Records { segments: Vec::new(), unused: Vec::new(), ids });
     let mut passes = 0;
     loop {
         passes += 1;
-        let Gathered { parts, looks } = found.gather(datasets, part_blocks, &mut notice)?;
+        let GatheredParts { parts, measurements } = found.gather(datasets, part_blocks, &mut notice)?;
         let is_near = found.step_over(parts)?;
-        if is_near || passes == MOST_PASSES {
+        if is_near || passes == MAX_PASSES {
             found.fit.converged &= is_near;
-            return Ok(LargeFit { fit: found, one_step: OneStep { looks, first_looks, passes }, robot, names });
+            return Ok(LargeFit {
+                fit: found,
+                one_step: OneStep { measurements, first_measurements, passes },
+                robot,
+                names,
+            });
         }
     }
 }
 
 /// The pieces, a dataset of them from each dataset.
 fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
-    let (rows, looks) = rows_and_looks(datasets);
-    let wanted = (FIRST_LOOKS.saturating_mul(rows) / looks.max(1)).min(FIRST_ROWS);
+    let (rows, measurements) = rows_and_looks(datasets);
+    let wanted = (FIRST_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(FIRST_ROWS);
     // Every so many rows a piece, in the middle of these.
     let stride = (rows / PIECES).max(1);
     let within = stride.saturating_sub(wanted / PIECES) / 2..(stride + wanted / PIECES) / 2;
@@ -177,24 +184,24 @@ fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
 }
 
 /// How many blocks of a run are held at a time.
-fn part_blocks(first: &JointFit<'_>, datasets: &[Blocks]) -> usize {
-    let (rows, looks) = rows_and_looks(datasets);
-    let legs: usize =
-        first.selections.first().map_or(0, |selection| selection.legs.iter().map(Vec::len).sum::<usize>());
-    let looks_a_leg = first.records.looks().div_ceil(legs.max(1));
-    let wanted_looks = PART_LOOKS.max(PART_LEGS * looks_a_leg);
-    PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(looks.max(1))).div_ceil(Blocks::ROWS))
+fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
+    let (rows, measurements) = rows_and_looks(datasets);
+    let propagations: usize =
+        first.selections.first().map_or(0, |selection| selection.propagations.iter().map(Vec::len).sum::<usize>());
+    let looks_a_leg = first.records.measurements().div_ceil(propagations.max(1));
+    let wanted_looks = PART_MEASUREMENTS.max(PART_PROPAGATIONS * looks_a_leg);
+    PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
 }
 
-impl JointFit<'_> {
+impl ModelFit<'_> {
     /// The evidence of everything at the values in force, part by part. This thread reads, others compute; sums are taken in the order of the parts.
     fn gather(
         &mut self,
         datasets: &mut [Blocks],
         part_blocks: usize,
         notice: &mut impl FnMut(usize, &Warning),
-    ) -> Result<Gathered, OneStepError> {
-        let runs_stand_apart = self.fit.model.own.as_ref().is_some_and(|own| own.apart == Apart::Run);
+    ) -> Result<GatheredParts, OneStepError> {
+        let runs_stand_apart = self.fit.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
@@ -205,8 +212,8 @@ impl JointFit<'_> {
                 (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
             })
             .collect();
-        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MOST_WORKERS);
-        let mut weighed = std::thread::scope(|scope| -> Result<Vec<Weighed>, OneStepError> {
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_WORKERS);
+        let mut part_equations = std::thread::scope(|scope| -> Result<Vec<PartEquations>, OneStepError> {
             // No part waits: the thread that reads waits for one that has time.
             let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
             let take = Arc::new(Mutex::new(take));
@@ -215,7 +222,7 @@ impl JointFit<'_> {
                 let (take, hand_in, this) = (Arc::clone(&take), hand_in.clone(), &*self);
                 scope.spawn(move || {
                     while let Some((number, run, part)) = next(&take) {
-                        if hand_in.send(this.weighed(number, run, &part)).is_err() {
+                        if hand_in.send(this.part_equations(number, run, &part)).is_err() {
                             break;
                         }
                     }
@@ -233,34 +240,43 @@ impl JointFit<'_> {
             drop(give);
             Ok(collect.into_iter().collect::<Result<Vec<_>, EstimationError>>()?)
         })?;
-        weighed.sort_unstable_by_key(|part| part.number);
-        let looks = weighed.iter().map(|part| part.looks).sum();
+        part_equations.sort_unstable_by_key(|part| part.number);
+        let measurements = part_equations.iter().map(|part| part.measurements).sum();
         let mut unused = Vec::new();
-        for of_run in weighed.chunk_by(|a, b| run_of(&parts[a.number]) == run_of(&parts[b.number])) {
-            if of_run.iter().all(|part| part.evidence.is_none()) {
+        for of_run in part_equations.chunk_by(|a, b| run_of(&parts[a.number]) == run_of(&parts[b.number])) {
+            if of_run.iter().all(|part| part.equations.is_none()) {
                 unused.push(run_of(&parts[of_run[0].number]));
             }
         }
         Arc::make_mut(&mut self.records).unused = unused;
         if let Some(own) = &mut self.fit.model.own {
-            let found =
-                weighed.iter().filter_map(|part| Some((own.apart.group(run_of(&parts[part.number])), part.own?)));
+            let found = part_equations
+                .iter()
+                .filter_map(|part| Some((own.grouping.group(run_of(&parts[part.number])), part.own?)));
             own.of.extend(found);
         }
-        Ok(Gathered { parts: weighed.into_iter().filter_map(|part| part.evidence).collect(), looks })
+        Ok(GatheredParts {
+            parts: part_equations.into_iter().filter_map(|part| part.equations).collect(),
+            measurements,
+        })
     }
 
     /// What a part says at the values in force.
-    fn weighed(&self, number: usize, run: (usize, usize), part: &Dataset) -> Result<Weighed, EstimationError> {
+    fn part_equations(
+        &self,
+        number: usize,
+        run: (usize, usize),
+        part: &Dataset,
+    ) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
         let records = Records::of(&sessions).belonging_to(run);
-        if records.chains.is_empty() {
-            return Ok(Weighed { number, evidence: None, own: None, looks: 0 });
+        if records.segments.is_empty() {
+            return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);
         let (mut model, noise) = (self.fit.model.clone(), &self.fit.noise);
-        let stands_apart = model.own.as_ref().is_some_and(|own| own.apart == Apart::Run);
+        let stands_apart = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         if stands_apart {
             model = pass_settled(&records, &selections, model, noise)?.0;
         }
@@ -270,16 +286,16 @@ impl JointFit<'_> {
         let model = Model { body_from_sensor, latency_s, own: None, ..model };
         let (_, pass) = pass_settled(&records, &selections, model, noise)?;
         let own = stands_apart.then_some(instrument);
-        Ok(Weighed { number, evidence: total(&pass.runs), own, looks: records.looks() })
+        Ok(PartEquations { number, equations: total(&pass.runs), own, measurements: records.measurements() })
     }
 
     /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
-    fn step_over(&mut self, mut parts: Vec<Evidence>) -> Result<bool, EstimationError> {
+    fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
         let own = self.fit.model.own.clone();
-        let follows = own.map_or_else(Vec::new, |own| own.take_out(&mut parts, &self.fit.model));
+        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.fit.model));
         let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };
         let information = sum.of(&self.columns);
-        self.unseen = unseen(&information.matrix);
+        self.unobservable = unobservable(&information.matrix);
         let free = self.free_basis();
         let (step, covariance) = information.along(&free).solve().ok_or(EstimationError::Diverges)?;
         let (step, covariance) = (&free * step, &free * covariance * free.transpose());
@@ -288,7 +304,7 @@ impl JointFit<'_> {
         for (row, column) in self.columns.iter().enumerate() {
             moved[column.index()] = step[row];
             self.fit.model.advance(*column, step[row]);
-            let bends = Column::GEOMETRY.contains(column) || *column == Column::MountTheta;
+            let bends = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
             is_near &= !bends || step[row].powi(2) <= NEAR * covariance[(row, row)].sqrt();
         }
         follows.iter().for_each(|follow| self.fit.model.advance_own(follow.group, &follow.step(&self.columns, &step)));

@@ -6,13 +6,13 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use crate::acceleration::{Acceleration, Size};
 use crate::error::EstimationError;
-use crate::filter::{Gate, Want};
+use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
-use crate::noise::{LEAST_SIGMA, Noise, NoisePrior};
+use crate::noise::{MIN_SIGMA, Noise, NoisePrior};
 use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
-use crate::propagation::Kept;
-use crate::records::{Chain, Records, Start};
+use crate::propagation::CachedPropagation;
+use crate::records::{Records, Segment, Start};
 use crate::thinning::Selection;
 
 /// Median of χ² with one degree of freedom.
@@ -26,24 +26,24 @@ pub(crate) const NOISE_SETTLED: f64 = 1e-4;
 const MEAN_COST: f64 = 1e-4;
 const NOISE_COST: f64 = 1e-2;
 const LARGEST_NOISE_STEP: f64 = 1.5;
-/// After a step of less than a standard deviation, legs need not be driven again for the next: they follow it to first order.
+/// After a step of less than a standard deviation, propagation intervals need not be driven again for the next: they follow it to first order.
 const NEAR: f64 = 1.0;
-/// Where steps by kept legs have settled, one by driven legs that is this small, squared and over its variance, is the last: the next would be less by orders.
+/// Where steps by kept propagation intervals have settled, one by driven propagation intervals that is this small, squared and over its variance, is the last: the next would be less by orders.
 const CONFIRMED: f64 = 1e-4;
-/// So near to where they were driven, squared and over the variance, legs are what they would be if they were driven again: at 0.02, driven legs made a step of 5e-8.
-const STILL: f64 = 0.1;
+/// So near to where they were driven, squared and over the variance, propagation intervals are what they would be if they were driven again: at 0.02, driven propagation intervals made a step of 5e-8.
+const REUSE_TOLERANCE: f64 = 0.1;
 /// Steps before outliers are told: at least, and at most.
-const LEAST_STARTS: usize = 3;
-const MOST_STARTS: usize = 20;
+const MIN_STARTS: usize = 3;
+const MAX_STARTS: usize = 20;
 /// A step of ten standard deviations, squared, is a long way.
 const FAR: f64 = 100.0;
 /// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
 const DAMPING: f64 = 1e-7;
-const LEAST_INFORMATION: f64 = 1e-9;
+const MIN_INFORMATION: f64 = 1e-9;
 
 /// Where the steps of a fit end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ends {
+pub enum ConvergenceCriterion {
     /// Where they are less than 1e-4 of a standard deviation of the mean, and this share of each variance.
     NoiseShare(f64),
     /// Where they change the log of the likelihood by less than 0.005: a variance that hardly matters may be anything.
@@ -56,15 +56,15 @@ pub struct FitOptions {
     /// The free columns.
     pub columns: Vec<Column>,
     /// Directions of the free columns along which nothing moves: rows over the columns.
-    pub held: Vec<DVector<f64>>,
+    pub fixed: Vec<DVector<f64>>,
     /// The noise stays as it is.
-    pub noise_held: bool,
+    pub noise_fixed: bool,
     /// Where steps end.
-    pub ends: Ends,
+    pub ends: ConvergenceCriterion,
     /// Most steps.
     pub max_steps: usize,
-    /// Looks that lie far off are taken like the others.
-    pub every_look: bool,
+    /// Measurements that lie far off are taken like the others.
+    pub ungated: bool,
 }
 
 impl FitOptions {
@@ -73,11 +73,11 @@ impl FitOptions {
     pub fn of(columns: &[Column]) -> Self {
         Self {
             columns: columns.to_vec(),
-            held: Vec::new(),
-            noise_held: false,
-            ends: Ends::NoiseShare(NOISE_SETTLED),
+            fixed: Vec::new(),
+            noise_fixed: false,
+            ends: ConvergenceCriterion::NoiseShare(NOISE_SETTLED),
             max_steps: 60,
-            every_look: false,
+            ungated: false,
         }
     }
 }
@@ -89,14 +89,14 @@ pub struct Fit {
     pub model: Model,
     /// The noise.
     pub noise: Noise,
-    /// Start headings of chains whose instrument sees none, radians; 0 for others.
+    /// Start headings of segments whose instrument sees none, radians; 0 for others.
     pub(crate) free_headings: Vec<f64>,
     /// The last pass, at the values above.
     pub pass: Pass,
     /// Did the steps die out?
     pub converged: bool,
     /// Did a step go far, and farther than the first? What it ends at may be one of several minima.
-    pub strayed: bool,
+    pub left_basin: bool,
 }
 
 impl Fit {
@@ -109,7 +109,7 @@ impl Fit {
             free_headings: Vec::new(),
             pass,
             converged: false,
-            strayed: false,
+            left_basin: false,
         }
     }
 
@@ -152,19 +152,20 @@ pub(crate) fn fit_from(
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
 ) -> Result<Fit, EstimationError> {
-    if selections.iter().all(|selection| selection.legs.iter().all(Vec::is_empty)) {
+    if selections.iter().all(|selection| selection.propagations.iter().all(Vec::is_empty)) {
         return Err(EstimationError::NoMeasurements);
     }
     let mut model = from.model;
-    let mut headings =
-        from.free_headings.unwrap_or_else(|| records.chains.iter().map(|chain| start_heading(chain, &model)).collect());
-    let basis = free_basis(options.columns.len(), &options.held);
+    let mut headings = from
+        .free_headings
+        .unwrap_or_else(|| records.segments.iter().map(|segment| start_heading(segment, &model)).collect());
+    let basis = free_basis(options.columns.len(), &options.fixed);
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
-        for round in 1..=MOST_STARTS {
-            let want = Want { innovations: true, gate: Gate::Open, ..Want::default() };
-            let found = pass(records, selections, &model, &noise, &headings, terms, want);
+        for round in 1..=MAX_STARTS {
+            let pass_options = PassOptions { innovations: true, gate: OutlierGate::Off, ..PassOptions::default() };
+            let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &basis)?;
             let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
             let moved = mean.squared + own;
@@ -175,27 +176,31 @@ pub(crate) fn fit_from(
             }
             let middle = squares.len() / 2;
             let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), LEAST_SIGMA * LEAST_SIGMA);
-            // A long way with few looks bends the path: while steps are large, every look would be taken for an outlier.
-            if round >= LEAST_STARTS && moved < 1.0 {
+            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), MIN_SIGMA * MIN_SIGMA);
+            // A long way with few measurements bends the path: while steps are large, every measurement would be taken for an outlier.
+            if round >= MIN_STARTS && moved < 1.0 {
                 break;
             }
         }
     }
-    let want = Want { noise_score: !options.noise_held, gate: Gate::of(options.every_look), ..Want::default() };
-    let (mut converged, mut strayed, mut first) = (false, false, None);
-    let (mut pace, mut acceleration) = (Pace::default(), Acceleration::default());
+    let pass_options = PassOptions {
+        noise_score: !options.noise_fixed,
+        gate: OutlierGate::of(options.ungated),
+        ..PassOptions::default()
+    };
+    let (mut converged, mut left_basin, mut first) = (false, false, None);
+    let (mut damping, mut acceleration) = (StepDamping::default(), Acceleration::default());
     let keep = Selection::has_long_legs(selections);
-    let (mut kept, mut confirms): (Option<Kept>, bool) = (None, false);
-    // How far the model has come from where legs were kept: squares of its steps.
-    let mut strolled = 0.0;
+    let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
+    // How far the model has come from where propagation intervals were kept: squares of its steps.
+    let mut moved_since_cached = 0.0;
     for _ in 0..options.max_steps {
-        let by_kept = Want { keep: keep && kept.is_none(), by: kept.as_ref(), ..want };
-        let mut found = pass(records, selections, &model, &noise, &headings, terms, by_kept);
+        let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
+        let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
         let mean = MeanStep::of(&found, options, &basis)?;
-        let of_noise = if options.noise_held { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
+        let of_noise = if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
         let columns = options.columns.len();
-        let tamed = pace.tamed(of_noise.by);
+        let tamed = damping.tamed(of_noise.by);
         let own = if acceleration.engages(Size { mean: mean.squared, noise: of_noise.by.amax() }) {
             let proposed = stacked(&mean.by, &of_noise.by);
             let by = acceleration.instead_of(&proposed, &block_diagonal(&mean.information, &of_noise.information));
@@ -208,26 +213,27 @@ pub(crate) fn fit_from(
             take_step(&mut model, &mut headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
-        strayed |= moved > FAR.max(*first.get_or_insert(moved));
-        // By kept legs steps only seem to settle: driven ones have the last word, where the model has gone on since.
-        strolled = if kept.is_none() { moved } else { strolled + moved };
+        left_basin |= moved > FAR.max(*first.get_or_insert(moved));
+        // By kept propagation intervals steps only seem to settle: driven ones have the last word, where the model has gone on since.
+        moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
         let mean_settled = if confirms { CONFIRMED } else { SETTLED };
         let settles = match options.ends {
-            Ends::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
-            Ends::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
+            ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
+            ConvergenceCriterion::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
         };
-        if settles && (kept.is_none() || strolled < STILL) {
-            (converged, kept) = (true, kept.or(found.kept.take()));
+        if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
+            (converged, cached) = (true, cached.or(found.cached.take()));
             break;
         }
-        kept = if settles { None } else { kept.or(found.kept.take()).filter(|_| moved < NEAR) };
+        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < NEAR) };
         confirms = settles;
     }
-    // The last step was so small that legs follow it as if they were driven.
-    let by = kept.as_ref().filter(|_| converged);
-    let want = Want { innovations: true, gate: Gate::of(options.every_look), by, ..Want::default() };
-    let pass = pass(records, selections, &model, &noise, &headings, terms, want);
-    Ok(Fit { model, noise, free_headings: headings, pass, converged, strayed })
+    // The last step was so small that propagation intervals follow it as if they were driven.
+    let by = cached.as_ref().filter(|_| converged);
+    let pass_options =
+        PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
+    let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
+    Ok(Fit { model, noise, free_headings: headings, pass, converged, left_basin })
 }
 
 /// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
@@ -242,13 +248,13 @@ pub(crate) fn pass_settled(
     noise: &Noise,
 ) -> Result<(Model, Pass), EstimationError> {
     let options = FitOptions::of(&[]);
-    let mut headings: Vec<f64> = records.chains.iter().map(|chain| start_heading(chain, &model)).collect();
+    let mut headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
     for round in 1.. {
-        let found = pass(records, selections, &model, noise, &headings, &mut [], Want::default());
+        let found = pass(records, selections, &model, noise, &headings, &mut [], PassOptions::default());
         let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
         let mut next = model.clone();
         let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
-        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MOST_STARTS {
+        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MAX_STARTS {
             return Ok((model, found));
         }
         model = next;
@@ -256,7 +262,7 @@ pub(crate) fn pass_settled(
     Err(EstimationError::Diverges)
 }
 
-/// A pass at given values, with its innovations; free headings are those of chains whose instrument sees none, one for each chain.
+/// A pass at given values, with its innovations; free headings are those of segments whose instrument sees none, one for each segment.
 #[must_use]
 pub fn pass_with_innovations(
     records: &Records<'_>,
@@ -265,9 +271,17 @@ pub fn pass_with_innovations(
     noise: &Noise,
     free_headings: &[f64],
     terms: &mut [Box<dyn ModelTerm>],
-    gate: Gate,
+    gate: OutlierGate,
 ) -> Pass {
-    pass(records, selections, model, noise, free_headings, terms, Want { innovations: true, gate, ..Want::default() })
+    pass(
+        records,
+        selections,
+        model,
+        noise,
+        free_headings,
+        terms,
+        PassOptions { innovations: true, gate, ..PassOptions::default() },
+    )
 }
 
 /// A damped Gauss–Newton step of the mean.
@@ -288,7 +302,7 @@ impl MeanStep {
             return Ok(Self { by: DVector::zeros(options.columns.len()), information: system.matrix, squared: 0.0 });
         }
         let reduced = system.along(basis);
-        let damping = reduced.matrix.diagonal().map(|information| DAMPING * information + LEAST_INFORMATION);
+        let damping = reduced.matrix.diagonal().map(|information| DAMPING * information + MIN_INFORMATION);
         let damped = reduced.clone().with_precision(damping.iter().copied());
         let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
         let squared = (step.transpose() * &reduced.matrix * &step)[0];
@@ -316,10 +330,10 @@ fn take_step(
         moved[column.index()] = *by;
     }
     let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
-    for FreeHeading { chain, run, rest, by } in &found.headings {
+    for FreeHeading { segment, run, rest, by } in &found.headings {
         let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
         if let Some(own) = &model.own
-            && let Some(at) = found.own.iter().position(|follow| follow.group == own.apart.group(*run))
+            && let Some(at) = found.own.iter().position(|follow| follow.group == own.grouping.group(*run))
         {
             follows += own
                 .columns
@@ -328,7 +342,7 @@ fn take_step(
                 .map(|(column, step)| by[column.index()] * step)
                 .sum::<f64>();
         }
-        headings[*chain] += rest + follows;
+        headings[*segment] += rest + follows;
     }
     let mut size = 0.0;
     for (follow, by) in found.own.iter().zip(&own_steps) {
@@ -359,7 +373,7 @@ impl NoiseStep {
         };
         // What stands at its floor does not move.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
-            if variance <= LEAST_SIGMA * LEAST_SIGMA {
+            if variance <= MIN_SIGMA * MIN_SIGMA {
                 *by = by.max(0.0);
             }
         }
@@ -374,18 +388,18 @@ impl NoiseStep {
 
 /// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
 #[derive(Debug, Clone, Copy)]
-struct Pace {
+struct StepDamping {
     last: Vector4<f64>,
     share: Vector4<f64>,
 }
 
-impl Default for Pace {
+impl Default for StepDamping {
     fn default() -> Self {
         Self { last: Vector4::zeros(), share: Vector4::repeat(1.0) }
     }
 }
 
-impl Pace {
+impl StepDamping {
     /// The step to take instead of `step`.
     fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
@@ -402,7 +416,7 @@ fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
     let by = by * (LARGEST_NOISE_STEP / by.amax()).min(1.0);
     let before = *noise;
     for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
-        *variance = (*variance * by.exp()).max(LEAST_SIGMA * LEAST_SIGMA);
+        *variance = (*variance * by.exp()).max(MIN_SIGMA * MIN_SIGMA);
     }
     Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
 }
@@ -420,19 +434,23 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all
 }
 
-/// The heading with which a chain that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
-pub(crate) fn start_heading(chain: &Chain<'_>, model: &Model) -> f64 {
-    let Some(first) = chain.looks.first().filter(|look| chain.start == Start::Seen && look.theta_rad.is_none()) else {
+/// The heading with which a segment that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
+pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
+    let Some(first) = segment
+        .measurements
+        .first()
+        .filter(|measurement| segment.start == Start::MeasuredPose && measurement.theta_rad.is_none())
+    else {
         return 0.0;
     };
     let (mut pose, mut at) = (Pose::IDENTITY, first.after);
     let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
-    for look in &chain.looks[1..] {
-        for piece in &chain.pieces[at..look.after] {
-            pose = pose * model.increment(piece.wheel_rad).arc();
+    for measurement in &segment.measurements[1..] {
+        for interval in &segment.intervals[at..measurement.after] {
+            pose = pose * model.increment(interval.wheel_rad).arc();
         }
-        at = look.after;
-        let (x_m, y_m) = (look.x_m - first.x_m, look.y_m - first.y_m);
+        at = measurement.after;
+        let (x_m, y_m) = (measurement.x_m - first.x_m, measurement.y_m - first.y_m);
         dot += pose.x_m * x_m + pose.y_m * y_m;
         cross += pose.x_m * y_m - pose.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));

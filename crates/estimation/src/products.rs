@@ -1,8 +1,8 @@
-//! The sums of a chain's innovations, and the elimination of a start heading that nobody saw.
+//! The sums of a segment's innovations, and the elimination of a start heading that nobody saw.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::normal_equations::Evidence;
+use crate::normal_equations::NormalEquations;
 
 /// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
 /// each other.
@@ -27,9 +27,9 @@ impl Products {
 }
 
 /// A product of variances is kept within this and its inverse: the next factor, of 10⁻¹⁰⁰ at the least, leaves it a number.
-const LEAST_PRODUCT: f64 = 1e-200;
+const MIN_PRODUCT: f64 = 1e-200;
 
-/// Normal equation of one chain, its free heading last.
+/// Normal equation of one segment, its free heading last.
 pub(crate) struct Sums<'p> {
     products: &'p Products,
     columns: usize,
@@ -48,7 +48,7 @@ pub(crate) struct Sums<'p> {
 }
 
 impl<'p> Sums<'p> {
-    /// Of no innovation; the columns are those of the evidence.
+    /// Of no innovation; the columns are those of the normal equation.
     pub(crate) fn new(columns: usize, products: &'p Products) -> Self {
         // One more for a free heading.
         let columns = columns + 1;
@@ -100,7 +100,7 @@ impl<'p> Sums<'p> {
         }
         self.chi_square += v * v * per_s;
         self.det *= s;
-        if !(LEAST_PRODUCT..=LEAST_PRODUCT.recip()).contains(&self.det) {
+        if !(MIN_PRODUCT..=MIN_PRODUCT.recip()).contains(&self.det) {
             self.log_det += self.det.ln();
             self.det = 1.0;
         }
@@ -125,9 +125,9 @@ impl<'p> Sums<'p> {
         information
     }
 
-    /// The evidence with the free heading at its best, and how that follows the others: at rest, and by each column.
-    pub(crate) fn eliminated(&self, run: (usize, usize), columns: usize) -> (Evidence, Option<(f64, Vec<f64>)>) {
-        let mut evidence = Evidence {
+    /// The normal equation with the free heading at its best, and how that follows the others: at rest, and by each column.
+    pub(crate) fn eliminated(&self, run: (usize, usize), columns: usize) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
+        let mut equations = NormalEquations {
             run,
             information: self.information(columns),
             gradient: DVector::from_column_slice(&self.gradient[..columns]),
@@ -137,19 +137,19 @@ impl<'p> Sums<'p> {
         };
         let last = &self.common[self.products.common * self.columns..];
         if !self.free || last[columns] <= 0.0 {
-            return (evidence, None);
+            return (equations, None);
         }
         let (own, gradient) = (last[columns], self.gradient[columns]);
         let by: Vec<f64> = last[..columns].iter().map(|cross| -cross / own).collect();
         for (row, by) in by.iter().enumerate() {
-            evidence.gradient[row] += by * gradient;
+            equations.gradient[row] += by * gradient;
             for (column, cross) in last[..columns].iter().enumerate() {
-                evidence.information[(row, column)] += by * cross;
+                equations.information[(row, column)] += by * cross;
             }
         }
-        evidence.chi_square -= gradient * gradient / own;
-        evidence.log_det += own.ln();
-        evidence.count -= 1.0;
-        (evidence, Some((-gradient / own, by)))
+        equations.chi_square -= gradient * gradient / own;
+        equations.log_det += own.ln();
+        equations.count -= 1.0;
+        (equations, Some((-gradient / own, by)))
     }
 }

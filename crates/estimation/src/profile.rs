@@ -1,14 +1,14 @@
 //! Profile intervals: how far a parameter can be moved, with everything else at its best, before the likelihood falls by what chance explains.
 //!
-//! Where the cost is no parabola (few looks, an instrument whose place trades against the wheels) they lie lopsided about the estimate, as they should.
-//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an interval by less than a part in the number of looks.
+//! Where the cost is no parabola (few measurements, an instrument whose place trades against the wheels) they lie lopsided about the estimate, as they should.
+//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an interval by less than a part in the number of measurements.
 
 use nalgebra::DVector;
 
 use crate::error::EstimationError;
 use crate::model::Column;
-use crate::model_fit::JointFit;
-use crate::normal_equations::Evidence;
+use crate::model_fit::ModelFit;
+use crate::normal_equations::NormalEquations;
 use crate::optimizer::{FitOptions, fit_from};
 
 /// Half of χ² with one degree of freedom at 95 %: the rise of the cost at the ends of an interval.
@@ -16,9 +16,9 @@ pub const RISE_95: f64 = 1.920_729;
 
 /// An end is found when the cost is right to this share of its rise, which is a thousandth of a standard deviation.
 const RIGHT: f64 = 2e-3;
-const MOST_STEPS: u32 = 30;
+const MAX_STEPS: u32 = 30;
 
-impl JointFit<'_> {
+impl ModelFit<'_> {
     /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by `rise` ([`RISE_95`]).
     ///
     /// # Errors
@@ -40,14 +40,14 @@ impl JointFit<'_> {
     }
 
     fn cost(&self) -> f64 {
-        self.fit.pass.runs.iter().map(Evidence::cost).sum()
+        self.fit.pass.runs.iter().map(NormalEquations::cost).sum()
     }
 
     /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the parabola through the last step.
     fn end(&self, column: Column, position: usize, first: f64, level: f64) -> Result<f64, EstimationError> {
         let best = self.cost();
         let mut by = first;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let risen = self.cost_with(column, position, by)? - best;
             let wanted = level - best;
             if (risen - wanted).abs() < RIGHT * wanted {
@@ -63,10 +63,10 @@ impl JointFit<'_> {
     fn cost_with(&self, column: Column, position: usize, by: f64) -> Result<f64, EstimationError> {
         let mut from = self.here();
         from.model.advance(column, by);
-        let mut held = self.held();
-        held.push(DVector::from_fn(self.columns.len(), |row, _| f64::from(u8::from(row == position))));
-        let options = FitOptions { held, noise_held: true, ..FitOptions::of(&self.columns) };
+        let mut fixed = self.fixed();
+        fixed.push(DVector::from_fn(self.columns.len(), |row, _| f64::from(u8::from(row == position))));
+        let options = FitOptions { fixed, noise_fixed: true, ..FitOptions::of(&self.columns) };
         let moved = fit_from(&self.records, &self.selections, from, &self.prior, &mut [], &options)?;
-        Ok(moved.pass.runs.iter().map(Evidence::cost).sum())
+        Ok(moved.pass.runs.iter().map(NormalEquations::cost).sum())
     }
 }

@@ -1,159 +1,161 @@
-//! What a leg comes to by the counts and the terms, and what it depends on; kept from pass to pass where legs are long.
+//! What a propagation interval comes to by the counts and the terms, and what it depends on; kept from pass to pass where propagation intervals are long.
 //!
-//! A leg of many pieces takes many times as long to be driven as its look to be taken, and it depends on the model alone, not on the noise. Near the model
+//! A propagation interval of many intervals takes many times as long to be driven as its look to be taken, and it depends on the model alone, not on the noise. Near the model
 //! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
-//! kept legs; where they end is settled by legs that are driven.
+//! kept propagation intervals; where they end is settled by propagation intervals that are driven.
 
 use std::ops::Range;
 
 use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative};
-use model_term::{Interval, Look, ModelTerm};
+use model_term::{Interval, Measurement, ModelTerm};
 use nalgebra::Vector3;
 
 use crate::derivatives::Derivatives;
 use crate::model::Model;
-use crate::records::Chain;
-use crate::thinning::Leg;
-use crate::wheel_angles::Piece;
+use crate::records::Segment;
+use crate::thinning::PropagationInterval;
+use crate::wheel_angles::WheelInterval;
 
-/// A leg's motion in the frame of the body at its start, and what it depends on.
+/// A propagation interval's motion in the frame of the body at its start, and what it depends on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moved {
     pub(crate) motion: Pose,
-    pub(crate) by_lengths: [Vector3<f64>; 3],
+    pub(crate) by_geometry: [Vector3<f64>; 3],
 }
 
-/// Where a filter has its legs from.
-pub(crate) enum Legs<'f> {
+/// Where a filter has its propagation intervals from.
+pub(crate) enum PropagationSource<'f> {
     /// They are driven.
-    Driven,
+    Integrated,
     /// They are driven, and kept.
-    Kept(KeptLegs),
+    CachedPropagation(SegmentCache),
     /// They have been kept, by a model that differs from that in force by this.
-    Known(&'f KeptLegs, &'f Change),
+    Cached(&'f SegmentCache, &'f Change),
 }
 
-/// What the legs of a chain came to.
+/// What the propagation intervals of a segment came to.
 #[derive(Debug, Clone)]
-pub(crate) struct KeptLegs {
+pub(crate) struct SegmentCache {
     moved: Vec<Moved>,
     /// How many parameters the terms have.
     parameters: usize,
-    /// Derivatives of each leg by them.
+    /// Derivatives of each propagation interval by them.
     by_terms: Vec<Vector3<f64>>,
-    /// What they add to the look at the start, and to that after each leg, in the frame of the body.
-    sights: Vec<Pose>,
+    /// What they add to the look at the start, and to that after each propagation interval, in the frame of the body.
+    by_measurement: Vec<Pose>,
 }
 
-impl Legs<'_> {
+impl PropagationSource<'_> {
     /// So many, to be driven with terms of so many parameters, and kept.
-    pub(crate) fn kept(legs: usize, parameters: usize) -> Self {
-        Self::Kept(KeptLegs {
-            moved: Vec::with_capacity(legs),
+    pub(crate) fn cached(propagations: usize, parameters: usize) -> Self {
+        Self::CachedPropagation(SegmentCache {
+            moved: Vec::with_capacity(propagations),
             parameters,
-            by_terms: Vec::with_capacity(legs * parameters),
-            sights: vec![Pose::IDENTITY; (legs + 1) * parameters],
+            by_terms: Vec::with_capacity(propagations * parameters),
+            by_measurement: vec![Pose::IDENTITY; (propagations + 1) * parameters],
         })
     }
 
     /// Those that were kept.
-    pub(crate) fn into_kept(self) -> Option<KeptLegs> {
-        if let Self::Kept(kept) = self { Some(kept) } else { None }
+    pub(crate) fn into_cached(self) -> Option<SegmentCache> {
+        if let Self::CachedPropagation(cached) = self { Some(cached) } else { None }
     }
 }
 
-impl KeptLegs {
-    pub(crate) fn sight(&self, legs: usize) -> &[Pose] {
-        &self.sights[legs * self.parameters..][..self.parameters]
+impl SegmentCache {
+    pub(crate) fn measurement(&self, propagations: usize) -> &[Pose] {
+        &self.by_measurement[propagations * self.parameters..][..self.parameters]
     }
 
-    pub(crate) fn keep_sight(&mut self, legs: usize, gradients: &[Pose]) {
-        self.sights[legs * self.parameters..][..self.parameters].copy_from_slice(gradients);
+    pub(crate) fn keep_measurement(&mut self, propagations: usize, gradients: &[Pose]) {
+        self.by_measurement[propagations * self.parameters..][..self.parameters].copy_from_slice(gradients);
     }
 }
 
-/// The legs of all chains, phase by phase, and the model by which they were driven.
+/// The propagation intervals of all segments, phase by phase, and the model by which they were driven.
 #[derive(Debug, Clone)]
-pub(crate) struct Kept {
+pub(crate) struct CachedPropagation {
     pub(crate) model: Model,
-    pub(crate) phases: Vec<Vec<Option<KeptLegs>>>,
+    pub(crate) phases: Vec<Vec<Option<SegmentCache>>>,
 }
 
-/// How a model differs from that by which legs were driven.
+/// How a model differs from that by which propagation intervals were driven.
 #[derive(Debug, Clone)]
 pub(crate) struct Change {
-    /// Of the lengths, relative: left, right, separation.
+    /// Of the geometry parameters, relative: left, right, separation.
     lengths: [f64; 3],
-    sizes: Vec<f64>,
+    term_values: Vec<f64>,
 }
 
-impl Kept {
+impl CachedPropagation {
     /// How a model differs from theirs.
     pub(crate) fn change_to(&self, model: &Model) -> Change {
         let lengths = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
         let (from, to) = (lengths(&self.model), lengths(model));
         Change {
             lengths: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
-            sizes: model.sizes.iter().zip(&self.model.sizes).map(|(to, from)| to - from).collect(),
+            term_values: model.term_values.iter().zip(&self.model.term_values).map(|(to, from)| to - from).collect(),
         }
     }
 
-    /// Those of a chain in a phase, for a model that differs so much.
-    pub(crate) fn known<'k>(&'k self, phase: usize, chain: usize, change: &'k Change) -> Legs<'k> {
-        self.phases[phase][chain].as_ref().map_or(Legs::Driven, |legs| Legs::Known(legs, change))
+    /// Those of a segment in a phase, for a model that differs so much.
+    pub(crate) fn reused<'k>(&'k self, phase: usize, segment: usize, change: &'k Change) -> PropagationSource<'k> {
+        self.phases[phase][segment]
+            .as_ref()
+            .map_or(PropagationSource::Integrated, |propagations| PropagationSource::Cached(propagations, change))
     }
 }
 
 /// Where the displacements of a run have led: the next one's terms go on from there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Trail {
-    /// The next chain's frame in that of the first.
+pub(crate) struct CarriedState {
+    /// The next segment's frame in that of the first.
     pub(crate) run_from_chain: Pose,
     pub(crate) session_m: f64,
-    pub(crate) previous: Option<Piece>,
+    pub(crate) previous: Option<WheelInterval>,
 }
 
-/// The mean model along one chain: what counts and terms say of its motion, and what the terms add to its measurements. One for the filter and for dead reckoning.
+/// The mean model along one segment: what counts and terms say of its motion, and what the terms add to its measurements. One for the filter and for dead reckoning.
 pub(crate) struct Propagator<'f, 'a> {
-    chain: &'f Chain<'a>,
+    segment: &'f Segment<'a>,
     pub(crate) model: &'f Model,
     terms: &'f mut [Box<dyn ModelTerm>],
-    /// The chain's frame in that of the run's displacements; the identity for poses.
+    /// The segment's frame in that of the run's displacements; the identity for poses.
     run_from_chain: Pose,
     session_m: f64,
     wheel_rad: Wheels<f64>,
-    previous: Option<Piece>,
-    goes_on: bool,
+    previous: Option<WheelInterval>,
+    continues: bool,
     /// What the terms last said, by each of their parameters.
     pub(crate) gradients: Vec<Pose>,
-    /// Where legs come from.
-    pub(crate) legs: Legs<'f>,
-    /// Derivatives of the leg in force by the terms' parameters.
-    pub(crate) leg_by_terms: Derivatives,
+    /// Where propagation intervals come from.
+    pub(crate) propagations: PropagationSource<'f>,
+    /// Derivatives of the propagation interval in force by the terms' parameters.
+    pub(crate) propagation_by_terms: Derivatives,
 }
 
 impl<'f, 'a> Propagator<'f, 'a> {
-    pub(crate) fn new(chain: &'f Chain<'a>, model: &'f Model, terms: &'f mut [Box<dyn ModelTerm>]) -> Self {
+    pub(crate) fn new(segment: &'f Segment<'a>, model: &'f Model, terms: &'f mut [Box<dyn ModelTerm>]) -> Self {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         Self {
-            chain,
+            segment,
             model,
             terms,
             run_from_chain: Pose::IDENTITY,
-            session_m: chain.session_m,
-            wheel_rad: chain.wheel_rad,
+            session_m: segment.session_m,
+            wheel_rad: segment.wheel_rad,
             previous: None,
-            goes_on: false,
+            continues: false,
             gradients: vec![Pose::IDENTITY; parameters],
-            legs: Legs::Driven,
-            leg_by_terms: Derivatives::zeros(parameters),
+            propagations: PropagationSource::Integrated,
+            propagation_by_terms: Derivatives::zeros(parameters),
         }
     }
 
-    /// Goes on where the chain before ended.
-    pub(crate) fn go_on(&mut self, Trail { run_from_chain, session_m, previous }: Trail) {
+    /// Goes on where the segment before ended.
+    pub(crate) fn carry_on(&mut self, CarriedState { run_from_chain, session_m, previous }: CarriedState) {
         (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
-        self.goes_on = true;
+        self.continues = true;
     }
 
     /// How far the centre went in the runs before and in this one, metres.
@@ -161,75 +163,76 @@ impl<'f, 'a> Propagator<'f, 'a> {
         self.session_m
     }
 
-    /// Where this chain ended, the instrument standing at a pose of the chain's frame.
-    pub(crate) fn trail(&self, chain_from_sensor: Pose) -> Trail {
+    /// Where this segment ended, the instrument standing at a pose of the segment's frame.
+    pub(crate) fn carried(&self, chain_from_sensor: Pose) -> CarriedState {
         let run_from_chain = self.run_from_chain * chain_from_sensor;
-        Trail { run_from_chain, session_m: self.session_m, previous: self.previous }
+        CarriedState { run_from_chain, session_m: self.session_m, previous: self.previous }
     }
 
-    /// Forgets what terms remember of the run before, unless the chain goes on.
+    /// Forgets what terms remember of the run before, unless the segment goes on.
     #[inline(always)]
     pub(crate) fn restart(&mut self) {
-        if !self.goes_on {
+        if !self.continues {
             for term in self.terms.iter_mut() {
-                term.restart(self.chain.info);
+                term.restart(self.segment.info);
             }
         }
     }
 
-    /// Motion of the drive's centre in a piece, per second.
+    /// Motion of the drive's centre in an interval, per second.
     #[inline(always)]
-    pub(crate) fn twist(&self, piece: &Piece) -> Twist {
-        let Increment { distance_m, turn_rad } = self.model.increment(piece.wheel_rad);
-        Twist { v_m_s: distance_m / piece.dt_s, omega_rad_s: turn_rad / piece.dt_s }
+    pub(crate) fn twist(&self, interval: &WheelInterval) -> Twist {
+        let Increment { distance_m, turn_rad } = self.model.increment(interval.wheel_rad);
+        Twist { v_m_s: distance_m / interval.dt_s, omega_rad_s: turn_rad / interval.dt_s }
     }
 
-    /// What the terms add to the look after so many legs, at a pose of the drive's centre, in the frame of the body; it stands in [`Self::gradients`].
+    /// What the terms add to the measurement after so many propagation intervals, at a pose of the drive's centre, in the frame of the body; it stands in [`Self::gradients`].
     #[inline(always)]
-    pub(crate) fn sight(&mut self, pose: Pose, legs: usize, t_s: f64, twist: Twist) {
+    pub(crate) fn measurement(&mut self, pose: Pose, propagations: usize, t_s: f64, twist: Twist) {
         if self.gradients.is_empty() {
             return;
         }
-        if let Legs::Known(kept, _) = self.legs {
-            self.gradients.copy_from_slice(kept.sight(legs));
+        if let PropagationSource::Cached(cached, _) = self.propagations {
+            self.gradients.copy_from_slice(cached.measurement(propagations));
         } else {
-            let look = Look { t_s, world_from_body: self.run_from_chain * pose, twist, run: self.chain.info };
-            self.ask_terms(|term, own| term.sight(&look, own));
+            let measurement =
+                Measurement { t_s, world_from_body: self.run_from_chain * pose, twist, run: self.segment.info };
+            self.ask_terms(|term, own| term.measurement(&measurement, own));
         }
-        if let Legs::Kept(kept) = &mut self.legs {
-            kept.keep_sight(legs, &self.gradients);
+        if let PropagationSource::CachedPropagation(cached) = &mut self.propagations {
+            cached.keep_measurement(propagations, &self.gradients);
         }
     }
 
-    /// The motion of a leg from a pose of the drive's centre, and in [`Self::leg_by_terms`] how it depends on the terms' sizes.
+    /// The motion of a propagation interval from a pose of the drive's centre, and in [`Self::propagation_by_terms`] how it depends on the terms' sizes.
     #[inline(always)]
-    pub(crate) fn moved(&mut self, pose: Pose, number: usize, leg: &Leg) -> Moved {
-        if let Legs::Known(kept, change) = self.legs {
-            return self.known(kept, change, number);
+    pub(crate) fn moved(&mut self, pose: Pose, number: usize, propagation: &PropagationInterval) -> Moved {
+        if let PropagationSource::Cached(cached, change) = self.propagations {
+            return self.reused(cached, change, number);
         }
-        let moved = self.driven(pose, leg);
-        if let Legs::Kept(kept) = &mut self.legs {
-            kept.moved.push(moved);
-            kept.by_terms.extend((0..kept.parameters).map(|column| self.leg_by_terms.get(column)));
+        let moved = self.driven(pose, propagation);
+        if let PropagationSource::CachedPropagation(cached) = &mut self.propagations {
+            cached.moved.push(moved);
+            cached.by_terms.extend((0..cached.parameters).map(|column| self.propagation_by_terms.get(column)));
         }
         moved
     }
 
     #[inline(always)]
-    fn known(&mut self, kept: &KeptLegs, change: &Change, number: usize) -> Moved {
-        let Moved { mut motion, by_lengths } = kept.moved[number];
+    fn reused(&mut self, cached: &SegmentCache, change: &Change, number: usize) -> Moved {
+        let Moved { mut motion, by_geometry } = cached.moved[number];
         let mut add = |by: Vector3<f64>, change: f64| {
             motion.x_m += by.x * change;
             motion.y_m += by.y * change;
             motion.theta_rad += by.z * change;
         };
-        by_lengths.iter().zip(change.lengths).for_each(|(by, change)| add(*by, change));
-        let by_terms = &kept.by_terms[number * kept.parameters..][..kept.parameters];
-        for (column, (by, change)) in by_terms.iter().zip(&change.sizes).enumerate() {
+        by_geometry.iter().zip(change.lengths).for_each(|(by, change)| add(*by, change));
+        let by_terms = &cached.by_terms[number * cached.parameters..][..cached.parameters];
+        for (column, (by, change)) in by_terms.iter().zip(&change.term_values).enumerate() {
             add(*by, *change);
-            self.leg_by_terms.set(column, *by);
+            self.propagation_by_terms.set(column, *by);
         }
-        Moved { motion, by_lengths }
+        Moved { motion, by_geometry }
     }
 
     /// Asks each term for its gradients by its own parameters.
@@ -244,17 +247,17 @@ impl<'f, 'a> Propagator<'f, 'a> {
         }
     }
 
-    /// The motion of a leg by the counts and the terms.
+    /// The motion of a propagation interval by the counts and the terms.
     #[inline(always)]
-    fn driven(&mut self, pose: Pose, leg: &Leg) -> Moved {
+    fn driven(&mut self, pose: Pose, propagation: &PropagationInterval) -> Moved {
         let Model { m_per_rad, separation_m, .. } = *self.model;
-        let mut moved = Moved { motion: Pose::IDENTITY, by_lengths: [Vector3::zeros(); 3] };
-        self.leg_by_terms.clear();
+        let mut moved = Moved { motion: Pose::IDENTITY, by_geometry: [Vector3::zeros(); 3] };
+        self.propagation_by_terms.clear();
         let run_from_start = Frame::from(self.run_from_chain * pose);
         // Those of terms that are only tested have no size, and there are many.
-        let sized = self.model.sizes.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
-        for piece in &self.chain.pieces[leg.pieces.clone()] {
-            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        let sized = self.model.term_values.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
+        for interval in &self.segment.intervals[propagation.intervals.clone()] {
+            let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
             let before = moved.motion;
             let half_rad = 0.5 * turn_rad;
@@ -265,10 +268,10 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
             };
             let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
-            let bend = sinc_derivative(half_rad);
+            let curvature = sinc_derivative(half_rad);
             let by_turn = Vector3::new(
-                0.5 * distance_m * (bend * cos - chord * sin),
-                0.5 * distance_m * (bend * sin + chord * cos),
+                0.5 * distance_m * (curvature * cos - chord * sin),
+                0.5 * distance_m * (curvature * sin + chord * cos),
                 1.0,
             );
             let along = Vector3::new(chord * cos, chord * sin, 0.0);
@@ -279,52 +282,57 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 -by_turn * turn_rad,
             ];
             if !self.gradients.is_empty() {
-                self.term_gradients(piece, travel_m, run_from_start * before);
-                for (gradient, size) in self.gradients.iter().zip(&self.model.sizes[..sized]) {
+                self.term_gradients(interval, travel_m, run_from_start * before);
+                for (gradient, size) in self.gradients.iter().zip(&self.model.term_values[..sized]) {
                     step += *size * middle(gradient, &by_turn);
                 }
             }
-            for (by, of_step) in moved.by_lengths.iter_mut().zip(steps) {
+            for (by, of_step) in moved.by_geometry.iter_mut().zip(steps) {
                 *by = turned(*by, step) + of_step;
             }
             moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
-            // As if the rest of the leg led back to its start: one turn at the end of the leg then does for those of all pieces.
+            // As if the rest of the propagation interval led back to its start: one turn at the end of the propagation interval then does for those of all intervals.
             let by_turn = by_turn + Vector3::new(moved.motion.y_m, -moved.motion.x_m, 0.0);
-            let legs = self.leg_by_terms.x.iter_mut().zip(&mut self.leg_by_terms.y).zip(&mut self.leg_by_terms.theta);
-            for (((x, y), theta), gradient) in legs.zip(&self.gradients) {
+            let propagations = self
+                .propagation_by_terms
+                .x
+                .iter_mut()
+                .zip(&mut self.propagation_by_terms.y)
+                .zip(&mut self.propagation_by_terms.theta);
+            for (((x, y), theta), gradient) in propagations.zip(&self.gradients) {
                 *x += cos * gradient.x_m - sin * gradient.y_m + by_turn.x * gradient.theta_rad;
                 *y += sin * gradient.x_m + cos * gradient.y_m + by_turn.y * gradient.theta_rad;
                 *theta += gradient.theta_rad;
             }
             self.session_m += distance_m.abs();
-            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
-            self.previous = Some(*piece);
+            self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
+            self.previous = Some(*interval);
         }
         let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
-        self.leg_by_terms.turn(end);
+        self.propagation_by_terms.turn(end);
         moved
     }
 
-    /// The pose of the drive's centre after some pieces, by exact arcs of what counts and terms say together; without derivatives.
-    pub(crate) fn dead_reckon(&mut self, mut pose: Pose, pieces: Range<usize>) -> Pose {
+    /// The pose of the drive's centre after some intervals, by exact arcs of what counts and terms say together; without derivatives.
+    pub(crate) fn dead_reckon(&mut self, mut pose: Pose, intervals: Range<usize>) -> Pose {
         let Model { m_per_rad, separation_m, .. } = *self.model;
-        for piece in &self.chain.pieces[pieces] {
-            let travel_m = m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        for interval in &self.segment.intervals[intervals] {
+            let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
-            self.term_gradients(piece, travel_m, self.run_from_chain * pose);
+            self.term_gradients(interval, travel_m, self.run_from_chain * pose);
             let Pose { x_m, y_m, theta_rad } = self.from_terms();
             let arc = Increment { distance_m: distance_m + x_m, turn_rad: turn_rad + theta_rad }.arc();
             pose = pose * arc * Pose::new(0.0, y_m, 0.0);
             self.session_m += distance_m.abs();
-            self.wheel_rad = self.wheel_rad.zip_with(piece.wheel_rad, |angle, rad| angle + rad);
-            self.previous = Some(*piece);
+            self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
+            self.previous = Some(*interval);
         }
         pose
     }
 
     /// What the terms last said, at their parameters' values.
     pub(crate) fn from_terms(&self) -> Pose {
-        self.gradients.iter().zip(&self.model.sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
+        self.gradients.iter().zip(&self.model.term_values).fold(Pose::IDENTITY, |sum, (gradient, size)| {
             Pose::new(
                 sum.x_m + size * gradient.x_m,
                 sum.y_m + size * gradient.y_m,
@@ -334,22 +342,22 @@ impl<'f, 'a> Propagator<'f, 'a> {
     }
 
     #[inline(always)]
-    fn term_gradients(&mut self, piece: &Piece, travel_m: Wheels<f64>, world_from_body: Pose) {
+    fn term_gradients(&mut self, interval: &WheelInterval, travel_m: Wheels<f64>, world_from_body: Pose) {
         let m_per_rad = self.model.m_per_rad;
-        let previous = self.previous.unwrap_or(Piece { wheel_rad: Wheels::both(0.0), ..*piece });
+        let previous = self.previous.unwrap_or(WheelInterval { wheel_rad: Wheels::both(0.0), ..*interval });
         let interval = Interval {
-            t_s: piece.t_s,
-            dt_s: piece.dt_s,
-            row_s: piece.row_s,
+            t_s: interval.t_s,
+            dt_s: interval.dt_s,
+            row_s: interval.row_s,
             travel_m,
             previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
             previous_dt_s: previous.dt_s,
             wheel_separation_m: self.model.separation_m,
             wheel_rad: self.wheel_rad,
-            turned_rad: piece.wheel_rad,
+            turned_rad: interval.wheel_rad,
             world_from_body,
             session_m: self.session_m,
-            run: self.chain.info,
+            run: self.segment.info,
         };
         self.ask_terms(|term, own| term.motion(&interval, own));
     }

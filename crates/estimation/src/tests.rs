@@ -4,13 +4,13 @@ use dataset::{
     Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
 };
 use kinematics::{Increment, Pose, Wheels};
-use model_term::{Interval, Look, ModelTerm, TermParameter};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 
-use crate::decimation::Coarse;
-use crate::filter::{Gate, Want};
+use crate::decimation::Decimated;
+use crate::filter::{OutlierGate, PassOptions};
 use crate::normal_equations::total;
-use crate::pass::{LEGS_AT_ONCE, pass};
-use crate::{Column, FitSettings, JointFit, Model, Noise, Pass, Records, Selection, Thinning};
+use crate::pass::{PROPAGATIONS_AT_ONCE, pass};
+use crate::{Column, FitSettings, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
 const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];
@@ -30,8 +30,8 @@ fn dataset_of(runs: u32, with_headings: bool) -> Dataset {
             if row % 2 == 0 {
                 let off = |k: f64| 3e-3 * (12.9898 * f64::from(7 * row + number) + 78.233 * k).sin();
                 let theta = with_headings.then_some(pose.theta_rad + MOUNTED.theta_rad + off(3.0));
-                let seen = if with_headings { pose * MOUNTED } else { pose };
-                truth.push(TruthSample::new(f64::from(row), seen.x_m + off(1.0), seen.y_m + off(2.0), theta));
+                let measured = if with_headings { pose * MOUNTED } else { pose };
+                truth.push(TruthSample::new(f64::from(row), measured.x_m + off(1.0), measured.y_m + off(2.0), theta));
             }
             if row < 12 {
                 let k = row as usize;
@@ -71,8 +71,8 @@ struct Term;
 
 impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
-        const WAY: TermParameter = TermParameter { name: "way_per_m", unit: "1/m", plausible: 1.0 };
-        const LOOK: TermParameter = TermParameter { name: "ahead_s", unit: "s", plausible: 1.0 };
+        const WAY: TermParameter = TermParameter { name: "way_per_m", unit: "1/m", prior_sigma: 1.0 };
+        const LOOK: TermParameter = TermParameter { name: "ahead_s", unit: "s", prior_sigma: 1.0 };
         &[WAY, LOOK]
     }
 
@@ -82,54 +82,54 @@ impl ModelTerm for Term {
         gradient[0].y_m = 0.1 * travel_m.left;
     }
 
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        gradient[1] = Pose::new(look.twist.v_m_s, 0.1, 0.3);
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[1] = Pose::new(measurement.twist.v_m_s, 0.1, 0.3);
     }
 }
 
 /// Remembers the way of the run.
 #[derive(Clone)]
 struct Worn {
-    way_m: f64,
+    distance_m: f64,
 }
 
 impl ModelTerm for Worn {
     fn parameters(&self) -> &'static [TermParameter] {
-        const WAY: TermParameter = TermParameter { name: "way_per_m2", unit: "1/m²", plausible: 1.0 };
-        const LOOK: TermParameter = TermParameter { name: "ahead", unit: "1", plausible: 1.0 };
+        const WAY: TermParameter = TermParameter { name: "way_per_m2", unit: "1/m²", prior_sigma: 1.0 };
+        const LOOK: TermParameter = TermParameter { name: "ahead", unit: "1", prior_sigma: 1.0 };
         &[WAY, LOOK]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.way_m = 0.0;
+        self.distance_m = 0.0;
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        self.way_m += interval.increment().distance_m.abs();
-        gradient[0] = interval.change(interval.travel_m.map(|travel_m| self.way_m * travel_m));
+        self.distance_m += interval.increment().distance_m.abs();
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| self.distance_m * travel_m));
     }
 
-    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
-        gradient[1] = Pose::new(self.way_m, 0.0, 0.0);
+    fn measurement(&mut self, _look: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[1] = Pose::new(self.distance_m, 0.0, 0.0);
     }
 }
 
 #[test]
 fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
-    // Runs of at least four legs each: more than those from which on runs go at once.
-    let dataset = dataset_of(LEGS_AT_ONCE.div_ceil(4) as u32, true);
+    // Runs of at least four propagation intervals each: more than those from which on runs go at once.
+    let dataset = dataset_of(PROPAGATIONS_AT_ONCE.div_ceil(4) as u32, true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning { every_s: 1.0, phases: 2 }, &MODEL);
-    let headings = vec![0.0; records.chains.len()];
-    let want = Want { noise_score: true, innovations: true, ..Want::default() };
+    let headings = vec![0.0; records.segments.len()];
+    let pass_options = PassOptions { noise_score: true, innovations: true, ..PassOptions::default() };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
-        let found = pool.install(|| pass(&records, &selections, &model(), &NOISE, &headings, &mut terms, want));
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { distance_m: 7.0 })];
+        let found = pool.install(|| pass(&records, &selections, &model(), &NOISE, &headings, &mut terms, pass_options));
         (found.runs, found.innovations, found.outliers, found.noise)
     };
     let one_by_one = on(1);
-    assert!(one_by_one.1.iter().all(|phase| phase.len() > LEGS_AT_ONCE), "looks were left out");
+    assert!(one_by_one.1.iter().all(|phase| phase.len() > PROPAGATIONS_AT_ONCE), "measurements were left out");
     assert_eq!(on(2), one_by_one);
     assert_eq!(on(3), one_by_one);
 }
@@ -139,25 +139,25 @@ fn parts_have_all_products_but_those_with_each_other() {
     let dataset = dataset(true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
-    let model = Model { sizes: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
-    let headings = vec![0.0; records.chains.len()];
+    let model = Model { term_values: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
+    let headings = vec![0.0; records.segments.len()];
     let of = |parts| {
-        let worn = || Box::new(Worn { way_m: 0.0 });
+        let worn = || Box::new(Worn { distance_m: 0.0 });
         let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), worn(), worn()];
-        let want = Want { parts, ..Want::default() };
-        total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, want).runs).expect("runs")
+        let pass_options = PassOptions { parts, ..PassOptions::default() };
+        total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, pass_options).runs).expect("runs")
     };
-    let (all, apart) = (of(&[]), of(&[2, 2]));
+    let (all, grouping) = (of(&[]), of(&[2, 2]));
     let common = Column::BASE.len() + 2;
     for row in 0..common + 4 {
         for column in 0..common + 4 {
             let is_cross = row.min(column) >= common && (row - common) / 2 != (column - common) / 2;
             let expected = if is_cross { 0.0 } else { all.information[(row, column)] };
-            assert_eq!(apart.information[(row, column)], expected, "{row} {column}");
+            assert_eq!(grouping.information[(row, column)], expected, "{row} {column}");
             assert!(!is_cross || all.information[(row, column)] != 0.0, "{row} {column}: nothing to leave out");
         }
     }
-    assert_eq!(apart.gradient, all.gradient);
+    assert_eq!(grouping.gradient, all.gradient);
 }
 
 const MOUNTED: Pose = Pose::new(0.03, -0.02, 0.1);
@@ -169,25 +169,27 @@ const MODEL: Model = Model {
     body_from_sensor: Pose::new(0.032, -0.019, 0.103),
     own: None,
     latency_s: 0.003,
-    sizes: Vec::new(),
+    term_values: Vec::new(),
 };
 
 fn model() -> Model {
-    Model { sizes: vec![0.004, -0.003], ..MODEL }
+    Model { term_values: vec![0.004, -0.003], ..MODEL }
 }
 
 const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5] };
 
-fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], want: Want) -> Pass {
-    let model =
-        &Model { sizes: if model.sizes.is_empty() { vec![0.0; 2] } else { model.sizes.clone() }, ..model.clone() };
+fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], pass_options: PassOptions) -> Pass {
+    let model = &Model {
+        term_values: if model.term_values.is_empty() { vec![0.0; 2] } else { model.term_values.clone() },
+        ..model.clone()
+    };
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
-    pass(&records, &selections, model, noise, headings, &mut [Box::new(Term)], want)
+    pass(&records, &selections, model, noise, headings, &mut [Box::new(Term)], pass_options)
 }
 
 fn cost(pass: &Pass) -> f64 {
-    pass.runs.iter().map(crate::Evidence::cost).sum()
+    pass.runs.iter().map(crate::NormalEquations::cost).sum()
 }
 
 fn columns() -> Vec<Column> {
@@ -200,7 +202,8 @@ fn columns() -> Vec<Column> {
 fn the_gradient_is_that_of_the_cost() {
     let dataset = dataset(true);
     let headings = [0.0, 0.0];
-    let found = run(&dataset, &model(), &NOISE, &headings, Want { gate: Gate::Open, ..Want::default() });
+    let found =
+        run(&dataset, &model(), &NOISE, &headings, PassOptions { gate: OutlierGate::Off, ..PassOptions::default() });
     let gradient = found.runs.iter().fold(nalgebra::DVector::zeros(9), |sum, run| sum + &run.gradient);
     let information = found.runs.iter().fold(nalgebra::DMatrix::zeros(9, 9), |sum, run| sum + &run.information);
     for column in columns() {
@@ -209,7 +212,13 @@ fn the_gradient_is_that_of_the_cost() {
         let at = |by: f64| {
             let mut model = model();
             model.advance(column, by);
-            cost(&run(&dataset, &model, &NOISE, &headings, Want { gate: Gate::Open, ..Want::default() }))
+            cost(&run(
+                &dataset,
+                &model,
+                &NOISE,
+                &headings,
+                PassOptions { gate: OutlierGate::Off, ..PassOptions::default() },
+            ))
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
         let scale = f64::sqrt(information[(k, k)]);
@@ -224,14 +233,14 @@ fn the_gradient_is_that_of_the_cost() {
 #[test]
 fn the_noise_score_is_the_derivative_of_the_cost() {
     let dataset = dataset(true);
-    let want = Want { gate: Gate::Open, noise_score: true, ..Want::default() };
-    let score = run(&dataset, &model(), &NOISE, &[0.0, 0.0], want).noise.gradient;
+    let pass_options = PassOptions { gate: OutlierGate::Off, noise_score: true, ..PassOptions::default() };
+    let score = run(&dataset, &model(), &NOISE, &[0.0, 0.0], pass_options).noise.gradient;
     for k in 0..4 {
         let h = 1e-4_f64;
         let at = |by: f64| {
             let mut noise = NOISE;
             noise.variance[k] *= by.exp();
-            cost(&run(&dataset, &model(), &noise, &[0.0, 0.0], want))
+            cost(&run(&dataset, &model(), &noise, &[0.0, 0.0], pass_options))
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
         let tolerance = 2e-3 * (1.0 + difference.abs());
@@ -245,19 +254,19 @@ fn the_noise_score_is_the_derivative_of_the_cost() {
 #[test]
 fn a_free_heading_is_at_its_best() {
     let dataset = dataset(false);
-    let want = Want { gate: Gate::Open, ..Want::default() };
+    let pass_options = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };
     let mut headings = [0.6, 1.6];
     for _ in 0..8 {
-        let found = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
-        for crate::pass::FreeHeading { chain, rest, .. } in &found.headings {
-            headings[*chain] += rest;
+        let found = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, pass_options);
+        for crate::pass::FreeHeading { segment, rest, .. } in &found.headings {
+            headings[*segment] += rest;
         }
     }
-    let at_best = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, want);
+    let at_best = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &headings, pass_options);
     assert!(at_best.headings.iter().all(|heading| heading.rest.abs() < 1e-9), "{:?}", at_best.headings);
-    // Runs start at 0.5 and 1.5 rad; looks of 3 mm over half a metre see a heading to 0.01 rad.
+    // Runs start at 0.5 and 1.5 rad; measurements of 3 mm over half a metre see a heading to 0.01 rad.
     assert!((headings[0] - 0.5).abs() < 0.03 && (headings[1] - 1.5).abs() < 0.03, "{headings:?}");
-    let off = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &[headings[0] + 0.01, headings[1]], want);
+    let off = run(&dataset, &MODEL_SEEN_AT_THE_CENTRE, &NOISE, &[headings[0] + 0.01, headings[1]], pass_options);
     // To second order the elimination undoes the move.
     assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
     assert!(off.headings[0].rest < -0.009);
@@ -269,7 +278,7 @@ const MODEL_SEEN_AT_THE_CENTRE: Model = Model {
     body_from_sensor: Pose::IDENTITY,
     own: None,
     latency_s: 0.0,
-    sizes: Vec::new(),
+    term_values: Vec::new(),
 };
 
 #[test]
@@ -277,12 +286,14 @@ fn thinned_looks_are_far_enough_apart_and_end_with_the_last() {
     let dataset = dataset(true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning { every_s: 4.0, phases: 2 }, &MODEL);
-    let looks = |phase: usize| -> Vec<usize> { selections[phase].legs[0].iter().map(|leg| leg.look).collect() };
-    // Looks every 2 s up to 12 s: at 4, 8, 12 s, and from 6 s on.
-    assert_eq!(looks(0), [2, 4, 6]);
-    assert_eq!(looks(1), [3, 6]);
-    let first = &selections[1].legs[0][0];
-    assert_eq!((first.pieces.clone(), first.from), (0..6, 0));
+    let measurements = |phase: usize| -> Vec<usize> {
+        selections[phase].propagations[0].iter().map(|propagation| propagation.measurement).collect()
+    };
+    // Measurements every 2 s up to 12 s: at 4, 8, 12 s, and from 6 s on.
+    assert_eq!(measurements(0), [2, 4, 6]);
+    assert_eq!(measurements(1), [3, 6]);
+    let first = &selections[1].propagations[0][0];
+    assert_eq!((first.intervals.clone(), first.from), (0..6, 0));
 }
 
 /// Normal variables by the sum of twelve uniform ones of `SplitMix64` (Steele, Lea & Flood 2014).
@@ -307,13 +318,13 @@ const DISPLACEMENTS: [u32; 8] = [40; 8];
 
 /// Runs seen by displacements of a second, with errors of which a share `keeps` lasts from one to the next (a first-order autoregression of variance one, in
 /// millimetres and milliradians).
-fn displaced(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
+fn mahalanobis_distance(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
     let mut normals = Normals(seed);
     let mut dataset = dataset(true);
     let base = dataset.runs[0].clone();
     let run = |(number, displacements): (usize, &u32)| {
         let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
-        let (mut seen, mut errors) = (Vec::new(), [0.0; 3].map(|_: f64| normals.next()));
+        let (mut measured, mut errors) = (Vec::new(), [0.0; 3].map(|_: f64| normals.next()));
         for second in 0..*displacements {
             let k = (second as usize + number) % LEFT_RAD.len();
             let turned = Wheels { left: LEFT_RAD[k], right: RIGHT_RAD[k] };
@@ -325,7 +336,7 @@ fn displaced(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
             let slid_m = travel_m.map(|travel_m: f64| travel_m + 3e-4 * travel_m.abs().sqrt() * normals.next());
             let moved = Increment::from_travel(slid_m, 0.366).arc();
             errors = errors.map(|error| keeps * error + (1.0 - keeps * keeps).sqrt() * normals.next());
-            seen.push(Displacement {
+            measured.push(Displacement {
                 t0_s: f64::from(second),
                 t1_s: f64::from(second + 1),
                 dx_m: moved.x_m + 1e-3 * errors[0],
@@ -336,7 +347,7 @@ fn displaced(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
         let t_s = (0..=*displacements).map(f64::from).collect();
         let odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
         let info = RunInfo { id: format!("run-{number}"), ..base.info.clone() };
-        Run { info, odometry, displacements: seen, ..Run::default() }
+        Run { info, odometry, displacements: measured, ..Run::default() }
     };
     dataset.runs = runs.iter().enumerate().map(run).collect();
     dataset
@@ -344,21 +355,21 @@ fn displaced(runs: &[u32], keeps: f64, seed: u64) -> Dataset {
 
 #[test]
 fn thinned_displacements_are_far_enough_apart_and_every_run_has_one() {
-    let dataset = displaced(&[6, 1], 0.0, 0);
+    let dataset = mahalanobis_distance(&[6, 1], 0.0, 0);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning { every_s: 2.5, phases: 2 }, &MODEL);
     let taken = |phase: usize| -> Vec<usize> {
-        let legs = selections[phase].legs.iter().enumerate();
-        legs.filter(|(_, legs)| !legs.is_empty()).map(|(chain, _)| chain).collect()
+        let propagations = selections[phase].propagations.iter().enumerate();
+        propagations.filter(|(_, propagations)| !propagations.is_empty()).map(|(segment, _)| segment).collect()
     };
     // They end at 1 … 6 s: the first phase takes those at 1 and 4 s, the second, due from 1 + 1.25 s on, those at 3 and 6 s. The run of one gives it to both.
     assert_eq!(taken(0), [0, 3, 6]);
     assert_eq!(taken(1), [2, 5, 6]);
     assert!(records.times_between().all(|between_s| (between_s - 1.0).abs() < 1e-12));
-    // Of the runs, not of the displacements, each of which is a chain of its own.
-    assert!((selections[0].mean_looks(&records) - 1.5).abs() < 1e-12);
+    // Of the runs, not of the displacements, each of which is a segment of its own.
+    assert!((selections[0].mean_measurements(&records) - 1.5).abs() < 1e-12);
     let all = Selection::of(&records, Thinning::NONE, &MODEL);
-    assert!((all[0].mean_looks(&records) - 3.5).abs() < 1e-12);
+    assert!((all[0].mean_measurements(&records) - 3.5).abs() < 1e-12);
 }
 
 /// Of 20 datasets with white errors, four or more would be thinned by chance once in 20 000 times (1 % each). Were displacements not neighbours, none of those
@@ -367,7 +378,7 @@ fn thinned_displacements_are_far_enough_apart_and_every_run_has_one() {
 fn displacements_are_thinned_where_their_errors_last_and_only_there() {
     let thinned = |keeps: f64| {
         let of = |seed: &u64| {
-            let dataset = displaced(&DISPLACEMENTS, keeps, *seed);
+            let dataset = mahalanobis_distance(&DISPLACEMENTS, keeps, *seed);
             let joint = FitSettings { nuisances: false, thin: true, thin_displacements: true };
             joint.fit(&[dataset.session()]).expect("a fit").thinning != Thinning::NONE
         };
@@ -382,26 +393,26 @@ fn kept_legs_follow_the_model_to_first_order() {
     let dataset = dataset(true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning::NONE, &MODEL);
-    let headings = vec![0.0; records.chains.len()];
-    let model = Model { sizes: vec![0.0; 4], ..MODEL };
-    let of = |model: &Model, want: Want<'_>| {
-        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), Box::new(Worn { way_m: 0.0 })];
-        let want = Want { noise_score: true, innovations: true, gate: Gate::Open, ..want };
-        pass(&records, &selections, model, &NOISE, &headings, &mut terms, want)
+    let headings = vec![0.0; records.segments.len()];
+    let model = Model { term_values: vec![0.0; 4], ..MODEL };
+    let of = |model: &Model, pass_options: PassOptions<'_>| {
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Term), Box::new(Worn { distance_m: 0.0 })];
+        let pass_options = PassOptions { noise_score: true, innovations: true, gate: OutlierGate::Off, ..pass_options };
+        pass(&records, &selections, model, &NOISE, &headings, &mut terms, pass_options)
     };
-    let driven = of(&model, Want { keep: true, ..Want::default() });
-    let kept = driven.kept.as_ref().expect("they were to be kept");
-    let by = Want { by: Some(kept), ..Want::default() };
-    let known = of(&model, by);
-    assert_eq!((&known.runs, &known.innovations, known.noise), (&driven.runs, &driven.innovations, driven.noise));
+    let driven = of(&model, PassOptions { keep: true, ..PassOptions::default() });
+    let cached = driven.cached.as_ref().expect("they were to be kept");
+    let by = PassOptions { by: Some(cached), ..PassOptions::default() };
+    let reused = of(&model, by);
+    assert_eq!((&reused.runs, &reused.innovations, reused.noise), (&driven.runs, &driven.innovations, driven.noise));
     // Twice as far from where they were driven they are four times as far off, to a tenth: the next order is a hundredth of that here.
     let off = |size: f64| {
         let mut near = model.clone();
         let columns = Column::BASE.into_iter().chain((0..4).map(Column::Term));
         columns.enumerate().for_each(|(k, column)| near.advance(column, size * (1.0 - 0.3 * k as f64)));
-        let (known, driven) = (of(&near, by), of(&near, Want::default()));
-        let pairs = known.innovations[0].iter().zip(&driven.innovations[0]);
-        pairs.map(|(known, driven)| (known.sigma * (known.z - driven.z)).abs()).fold(0.0, f64::max)
+        let (reused, driven) = (of(&near, by), of(&near, PassOptions::default()));
+        let pairs = reused.innovations[0].iter().zip(&driven.innovations[0]);
+        pairs.map(|(reused, driven)| (reused.sigma * (reused.z - driven.z)).abs()).fold(0.0, f64::max)
     };
     let ratio = off(2e-3) / off(1e-3);
     assert!((ratio / 4.0 - 1.0).abs() < 0.1, "{ratio}");
@@ -412,19 +423,19 @@ fn kept_legs_follow_the_model_to_first_order() {
 fn dead_reckoning_to_every_look_ends_where_a_run_cut_there_ends() {
     let dataset = dataset_of(1, true);
     let fit = |dataset: &Dataset| -> Vec<(Pose, f64)> {
-        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
-        let fit = JointFit::unfitted(MODEL, NOISE, &[dataset.session()]);
-        fit.reckoned(&model(), &mut terms).iter().map(|end| (end.off, end.length_m)).collect()
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { distance_m: 7.0 })];
+        let fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+        fit.dead_reckoned(&model(), &mut terms).iter().map(|end| (end.off, end.length_m)).collect()
     };
-    let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { way_m: 7.0 })];
-    let whole = JointFit::unfitted(MODEL, NOISE, &[dataset.session()]);
-    let looks = whole.reckoned_looks(&model(), &mut terms);
-    assert_eq!(looks.len(), dataset.runs[0].truth.len() - 1);
-    for (k, look) in looks.iter().enumerate() {
+    let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(Worn { distance_m: 7.0 })];
+    let whole = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+    let measurements = whole.dead_reckoned_measurements(&model(), &mut terms);
+    assert_eq!(measurements.len(), dataset.runs[0].truth.len() - 1);
+    for (k, measurement) in measurements.iter().enumerate() {
         let mut cut = dataset.clone();
         cut.runs[0].truth.truncate(k + 2);
         // The same steps in the same order: to the last bit.
-        assert_eq!(fit(&cut), [(look.off, look.length_m)], "look {k}");
+        assert_eq!(fit(&cut), [(measurement.off, measurement.length_m)], "look {k}");
     }
 }
 
@@ -451,7 +462,7 @@ struct OfRows;
 
 impl ModelTerm for OfRows {
     fn parameters(&self) -> &'static [TermParameter] {
-        const WAY: TermParameter = TermParameter { name: "way_per_s2", unit: "m/s²", plausible: 1.0 };
+        const WAY: TermParameter = TermParameter { name: "way_per_s2", unit: "m/s²", prior_sigma: 1.0 };
         &[WAY]
     }
 
@@ -462,14 +473,15 @@ impl ModelTerm for OfRows {
 
 #[test]
 fn rows_of_one_speed_taken_together_say_what_they_say_one_by_one() {
-    // Ten rows a second, looks every two: five pieces make half a second.
+    // Ten rows a second, measurements every two: five intervals make half a second.
     let finer = logged_finer(&dataset(true), 10);
     let session = [finer.session()];
-    let mut fit = JointFit::unfitted(MODEL, NOISE, &session);
+    let mut fit = ModelFit::from_parameters(MODEL, NOISE, &session);
     fit.fit.pass = fit.scan(&mut []);
-    let coarse = fit.in_longer_steps(&mut [], 0.5).expect("a fifth of the pieces");
-    let pieces = |fit: &JointFit<'_>| fit.records.chains.iter().map(|chain| chain.pieces.len()).collect::<Vec<_>>();
-    assert_eq!((pieces(&fit), pieces(&coarse)), (vec![120; 2], vec![24; 2]));
+    let coarse = fit.decimated(&mut [], 0.5).expect("a fifth of the pieces");
+    let intervals =
+        |fit: &ModelFit<'_>| fit.records.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>();
+    assert_eq!((intervals(&fit), intervals(&coarse)), (vec![120; 2], vec![24; 2]));
     let close = |a: &Pass, b: &Pass| {
         let both = a.runs.iter().zip(&b.runs);
         // Arcs put together from five of a tenth, to rounding.
@@ -477,14 +489,14 @@ fn rows_of_one_speed_taken_together_say_what_they_say_one_by_one() {
     };
     assert!(close(&coarse.scan(&mut []), &fit.scan(&mut [])));
     // Rows of several speeds lead elsewhere.
-    assert!(fit.in_longer_steps(&mut [], 3.0).is_none());
-    // Wheels that turn back, stand or begin are no part of what went before, nor is what comes after a look: of twelve rows three go with the one before.
-    let longest = Coarse::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
-    assert_eq!(longest.chains.iter().map(|chain| chain.pieces.len()).collect::<Vec<_>>(), [9; 2]);
-    assert!(fit.in_longer_steps(&mut [], 0.15).is_none(), "nothing to put together");
+    assert!(fit.decimated(&mut [], 3.0).is_none());
+    // Wheels that turn back, stand or begin are no part of what went before, nor is what comes after a measurement: of twelve rows three go with the one before.
+    let longest = Decimated::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
+    assert_eq!(longest.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>(), [9; 2]);
+    assert!(fit.decimated(&mut [], 0.15).is_none(), "nothing to put together");
     // A fit with what goes by single rows is another one by longer ones.
     let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(OfRows)];
-    fit.fit.model.sizes = vec![0.01];
+    fit.fit.model.term_values = vec![0.01];
     fit.fit.pass = fit.scan(&mut by_rows);
-    assert!(fit.in_longer_steps(&mut by_rows, 0.5).is_none());
+    assert!(fit.decimated(&mut by_rows, 0.5).is_none());
 }

@@ -1,48 +1,48 @@
-//! Which looks the likelihood takes: all, or looks so far apart that their errors have nothing to do with each other.
+//! Which looks the likelihood takes: all, or measurements so far apart that their errors have nothing to do with each other.
 //!
 //! The errors of an instrument that tracks the robot often last for seconds: lens distortion, a marker's own frame, a filter inside. A likelihood that takes such
-//! looks one by one believes each, and fits the wheels to the instrument's errors. Thinned looks are honest. What the looks in between know is not thrown away:
+//! measurements one by one believes each, and fits the wheels to the instrument's errors. Thinned measurements are honest. What the measurements in between know is not thrown away:
 //! the same is done in several phases, each shifted by a share of the spacing, and the costs are averaged (a composite likelihood; Varin, Reid & Firth 2011).
 //!
-//! Of looks, those in between are passed over, and the way from one taken to the next is whole. A displacement cannot be lengthened, as its instrument would err twice:
+//! Of measurements, those in between are passed over, and the way from one taken to the next is whole. A displacement cannot be lengthened, as its instrument would err twice:
 //! displacements in between are left out, way and all. The other phases take those, all of them where each phase takes one in as many as there are phases, or more.
 
 use nalgebra::Vector3;
 
 use crate::covariances::Covariances;
 use crate::model::Model;
-use crate::records::{Chain, Records, Start};
+use crate::records::{Records, Segment, Start};
 
-/// How looks are thinned.
+/// How measurements are thinned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
-    /// Least time between two looks, seconds; 0 for all.
+    /// Least time between two measurements, seconds; 0 for all.
     pub every_s: f64,
     /// In how many phases.
     pub phases: usize,
 }
 
 impl Thinning {
-    /// Every look.
+    /// Every measurement.
     pub const NONE: Self = Self { every_s: 0.0, phases: 1 };
 }
 
-/// From one look to the next that is taken.
+/// From one measurement to the next that is taken.
 #[derive(Debug, Clone)]
-pub(crate) struct Leg {
-    pub(crate) pieces: std::ops::Range<usize>,
-    /// The look before; 0 for a displacement.
+pub(crate) struct PropagationInterval {
+    pub(crate) intervals: std::ops::Range<usize>,
+    /// The measurement before; 0 for a displacement.
     pub(crate) from: usize,
-    pub(crate) look: usize,
+    pub(crate) measurement: usize,
     /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a turn noise of 1 rad²/rad.
     pub(crate) noise: Covariances<2>,
 }
 
-/// The looks taken in one phase.
+/// The measurements taken in one phase.
 #[derive(Debug, Clone)]
 pub struct Selection {
-    /// For each chain its legs; without any, the chain has no part in the phase.
-    pub(crate) legs: Vec<Vec<Leg>>,
+    /// For each segment its propagation intervals; without any, the segment has no part in the phase.
+    pub(crate) propagations: Vec<Vec<PropagationInterval>>,
 }
 
 impl Selection {
@@ -53,86 +53,87 @@ impl Selection {
         let offset = |phase: usize| phase as f64 / thinning.phases as f64;
         (0..thinning.phases)
             .map(|phase| Self {
-                legs: records
-                    .chains
-                    .chunk_by(Chain::is_in_series_with)
+                propagations: records
+                    .segments
+                    .chunk_by(Segment::is_in_series_with)
                     .flat_map(|series| {
                         let taken = taken_of_series(series, thinning.every_s, offset(phase));
-                        series.iter().zip(taken).map(|(chain, taken)| legs(chain, &taken, nominal))
+                        series.iter().zip(taken).map(|(segment, taken)| propagations(segment, &taken, nominal))
                     })
                     .collect(),
             })
             .collect()
     }
 
-    /// One of several blocks of each run: by its chains where it has as many, else by the looks of each.
+    /// One of several blocks of each run: by its segments where it has as many, else by the measurements of each.
     pub(crate) fn block(&self, records: &Records<'_>, block: usize, blocks: usize) -> Self {
-        let mut legs = vec![Vec::new(); self.legs.len()];
+        let mut propagations = vec![Vec::new(); self.propagations.len()];
         let mut first = 0;
-        for run in records.chains.chunk_by(|a, b| a.run == b.run) {
+        for run in records.segments.chunk_by(|a, b| a.run == b.run) {
             let of = first..first + run.len();
             first = of.end;
             let share = |of: usize| block * of / blocks..(block + 1) * of / blocks;
             if run.len() >= blocks {
                 let part = of.start + share(run.len()).start..of.start + share(run.len()).end;
-                legs[part.clone()].clone_from_slice(&self.legs[part]);
+                propagations[part.clone()].clone_from_slice(&self.propagations[part]);
             } else {
-                for chain in of {
-                    legs[chain] = self.legs[chain][share(self.legs[chain].len())].to_vec();
+                for segment in of {
+                    propagations[segment] =
+                        self.propagations[segment][share(self.propagations[segment].len())].to_vec();
                 }
             }
         }
-        Self { legs }
+        Self { propagations }
     }
 
-    /// Whether driving the legs takes long, and longer than all else in a pass. So many pieces leave errors so small that legs follow a step of that size to first
-    /// order; where few looks are followed over a few pieces, they need not.
+    /// Whether driving the propagation intervals takes long, and longer than all else in a pass. So many intervals leave errors so small that propagation intervals follow a step of that size to first
+    /// order; where few measurements are followed over a few intervals, they need not.
     pub(crate) fn has_long_legs(all: &[Self]) -> bool {
-        /// Pieces of a leg, on average.
+        /// Pieces of a propagation interval, on average.
         const LONG: usize = 3;
         /// Pieces in all: some ten milliseconds.
         const MANY: usize = 100_000;
-        let legs = || all.iter().flat_map(|selection| &selection.legs).flatten();
-        let pieces: usize = legs().map(|leg| leg.pieces.len()).sum();
-        pieces >= MANY && pieces >= LONG * legs().count()
+        let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
+        let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
+        intervals >= MANY && intervals >= LONG * propagations().count()
     }
 
-    /// How many looks it takes of a series that has any, on average; starts left out. A series is a chain of looks, or the displacements of one run.
+    /// How many looks it takes of a series that has any, on average; starts left out. A series is a segment of measurements, or the displacements of one run.
     #[must_use]
-    pub fn mean_looks(&self, records: &Records<'_>) -> f64 {
-        let (mut series, mut looks) = (0.0, 0.0);
+    pub fn mean_measurements(&self, records: &Records<'_>) -> f64 {
+        let (mut series, mut measurements) = (0.0, 0.0);
         let mut first = 0;
-        for chains in records.chains.chunk_by(Chain::is_in_series_with) {
-            let of = first..first + chains.len();
+        for segments in records.segments.chunk_by(Segment::is_in_series_with) {
+            let of = first..first + segments.len();
             first = of.end;
-            let taken = self.legs[of].iter().map(Vec::len).sum::<usize>();
+            let taken = self.propagations[of].iter().map(Vec::len).sum::<usize>();
             if taken > 0 {
                 series += 1.0;
                 #[allow(clippy::cast_precision_loss)]
                 let taken = taken as f64;
-                looks += taken;
+                measurements += taken;
             }
         }
-        if series > 0.0 { looks / series } else { 0.0 }
+        if series > 0.0 { measurements / series } else { 0.0 }
     }
 }
 
-/// The looks taken of each chain of a series.
-fn taken_of_series(series: &[Chain<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
+/// The measurements taken of each segment of a series.
+fn taken_of_series(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
     match series {
         [first, ..] if first.is_displacement() => displacements_taken(series, every_s, offset),
-        _ => series.iter().map(|chain| taken(chain, every_s, offset)).collect(),
+        _ => series.iter().map(|segment| taken(segment, every_s, offset)).collect(),
     }
 }
 
 /// The displacements that are taken: none ends sooner than `every_s` after the end of the one before, the first later than that of the run by a share of
 /// that. A run so short that it has none left gives its last: it is as good as that of any other.
-fn displacements_taken(series: &[Chain<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
-    let end_s = |chain: &Chain<'_>| chain.looks.first().map(|look| look.t_s);
+fn displacements_taken(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
+    let end_s = |segment: &Segment<'_>| segment.measurements.first().map(|measurement| measurement.t_s);
     let mut due_s = series.first().and_then(end_s).map_or(0.0, |first_s| first_s + every_s * offset);
     let mut taken: Vec<Vec<usize>> = series
         .iter()
-        .map(|chain| match end_s(chain) {
+        .map(|segment| match end_s(segment) {
             Some(end_s) if every_s == 0.0 || end_s >= due_s - 1e-9 => {
                 due_s = end_s + every_s;
                 vec![0]
@@ -148,55 +149,66 @@ fn displacements_taken(series: &[Chain<'_>], every_s: f64, offset: f64) -> Vec<V
     taken
 }
 
-/// The looks of a chain after its first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
+/// The measurements of a segment after its first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
 /// place of one that is too near to it.
-fn taken(chain: &Chain<'_>, every_s: f64, offset: f64) -> Vec<usize> {
-    let (Some(start), Some(last)) = (chain.looks.first(), chain.looks.last()) else { return Vec::new() };
+fn taken(segment: &Segment<'_>, every_s: f64, offset: f64) -> Vec<usize> {
+    let (Some(start), Some(last)) = (segment.measurements.first(), segment.measurements.last()) else {
+        return Vec::new();
+    };
     if every_s == 0.0 {
-        return (1..chain.looks.len()).collect();
+        return (1..segment.measurements.len()).collect();
     }
     let mut due_s = start.t_s + every_s * (1.0 + offset);
     let mut taken = Vec::new();
-    for (number, look) in chain.looks.iter().enumerate().skip(1) {
-        if look.t_s >= due_s - 1e-9 {
+    for (number, measurement) in segment.measurements.iter().enumerate().skip(1) {
+        if measurement.t_s >= due_s - 1e-9 {
             taken.push(number);
-            due_s = look.t_s + every_s;
+            due_s = measurement.t_s + every_s;
         }
     }
-    while taken.last().is_some_and(|number| last.t_s - chain.looks[*number].t_s < every_s) {
+    while taken.last().is_some_and(|number| last.t_s - segment.measurements[*number].t_s < every_s) {
         taken.pop();
     }
-    taken.push(chain.looks.len() - 1);
+    taken.push(segment.measurements.len() - 1);
     taken
 }
 
-fn legs(chain: &Chain<'_>, taken: &[usize], nominal: &Model) -> Vec<Leg> {
+fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<PropagationInterval> {
     let mut before = 0;
-    let mut from = if chain.start == Start::Seen { chain.looks.first().map_or(0, |look| look.after) } else { 0 };
+    let mut from = if segment.start == Start::MeasuredPose {
+        segment.measurements.first().map_or(0, |measurement| measurement.after)
+    } else {
+        0
+    };
     taken
         .iter()
-        .map(|&look| {
-            let pieces = from..chain.looks[look].after;
-            from = pieces.end;
-            let leg = Leg { noise: noise(chain, pieces.clone(), nominal), pieces, from: before, look };
-            before = look;
-            leg
+        .map(|&measurement| {
+            let intervals = from..segment.measurements[measurement].after;
+            from = intervals.end;
+            let propagation = PropagationInterval {
+                noise: noise(segment, intervals.clone(), nominal),
+                intervals,
+                from: before,
+                measurement,
+            };
+            before = measurement;
+            propagation
         })
         .collect()
 }
 
-/// The covariance of a leg's motion for unit noises. It is that of the nominal drive: an estimate of the lengths must not gain by what it does to covariances.
-fn noise(chain: &Chain<'_>, pieces: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
+/// The covariance of a propagation interval's motion for unit noises. It is that of the nominal drive: an estimate of the geometry parameters must not gain by what it does to covariances.
+fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
     const WHEEL: usize = 0;
     const TURN: usize = 1;
     let mut noise = Covariances::ZERO;
     let mut theta_rad = 0.0;
-    for piece in &chain.pieces[pieces] {
-        let travel_m = nominal.m_per_rad.zip_with(piece.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-        let (way_m, turn_rad) =
+    for interval in &segment.intervals[intervals] {
+        let travel_m = nominal.m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
+        let (distance_m, turn_rad) =
             (0.5 * (travel_m.left + travel_m.right), (travel_m.right - travel_m.left) / nominal.separation_m);
         let (sin, cos) = (theta_rad + 0.5 * turn_rad).sin_cos();
-        let (dx_m, dy_m) = (way_m * cos, way_m * sin);
+        let (dx_m, dy_m) = (distance_m * cos, distance_m * sin);
         noise.carry(-dy_m, dx_m);
         // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on half of the way.
         for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {

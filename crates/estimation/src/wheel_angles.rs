@@ -1,7 +1,7 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
 //! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
-//! compares the wheels with such looks integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
+//! compares the wheels with such measurements integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
 //! the first row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
@@ -14,7 +14,7 @@ const OUTSIDE: f64 = 0.5;
 
 /// A stretch of constant wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Piece {
+pub(crate) struct WheelInterval {
     pub(crate) t_s: f64,
     pub(crate) dt_s: f64,
     /// Turn of each wheel, radians.
@@ -25,7 +25,7 @@ pub(crate) struct Piece {
 
 /// Turns of both wheels since a run's first row.
 #[derive(Debug, Clone)]
-pub struct WheelTrack<'a> {
+pub struct WheelAngleInterpolator<'a> {
     t_s: &'a [f64],
     turn_rad: Wheels<Vec<f64>>,
     /// The counters' angles at the first row: where each wheel's mark stands.
@@ -33,7 +33,7 @@ pub struct WheelTrack<'a> {
     continuous: bool,
 }
 
-impl<'a> WheelTrack<'a> {
+impl<'a> WheelAngleInterpolator<'a> {
     /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a turn.
     ///
     /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
@@ -160,7 +160,7 @@ impl<'a> WheelTrack<'a> {
 /// Reads a track in the order of time, in time that grows with its rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Cursor<'t, 'a> {
-    track: &'t WheelTrack<'a>,
+    track: &'t WheelAngleInterpolator<'a>,
     /// The row of the last instant asked for.
     row: usize,
 }
@@ -189,8 +189,8 @@ impl Cursor<'_, '_> {
 
     /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is appended, where the log does not reach from one to the
     /// other without a gap.
-    pub(crate) fn pieces(&mut self, from_s: f64, to_s: f64, pieces: &mut Vec<Piece>) -> bool {
-        let before = pieces.len();
+    pub(crate) fn intervals(&mut self, from_s: f64, to_s: f64, intervals: &mut Vec<WheelInterval>) -> bool {
+        let before = intervals.len();
         let Some(mut angle) = self.angle_rad(from_s) else { return false };
         let (mut at_s, mut row) = (from_s, self.row);
         let Some(end) = self.angle_rad(to_s).filter(|_| to_s > from_s) else { return false };
@@ -198,7 +198,7 @@ impl Cursor<'_, '_> {
         let mut push = |t_s: f64, next: Wheels<f64>, row: usize| {
             let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
             let row_s = [rows_s[row], rows_s.get(row + 1).copied().unwrap_or(t_s)];
-            pieces.push(Piece { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
+            intervals.push(WheelInterval { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
             (at_s, angle) = (t_s, next);
         };
         while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
@@ -206,10 +206,10 @@ impl Cursor<'_, '_> {
             push(rows_s[row], self.track.row_rad(row), row - 1);
         }
         push(to_s, end, row);
-        if self.track.continuous || pieces.len() - before == 1 {
+        if self.track.continuous || intervals.len() - before == 1 {
             return true;
         }
-        pieces.truncate(before);
+        intervals.truncate(before);
         false
     }
 }
@@ -240,7 +240,7 @@ mod tests {
     fn steps(wheels: WheelLog, continuous: bool, from_s: f64, to_s: f64) -> Option<Vec<(f64, f64)>> {
         let dataset = dataset(wheels, continuous);
         let session = dataset.session();
-        let track = WheelTrack::of(&session.runs[0], session.robot)?;
+        let track = WheelAngleInterpolator::of(&session.runs[0], session.robot)?;
         Some(track.steps(from_s, to_s)?.into_iter().map(|step| (step.left, step.right)).collect())
     }
 
@@ -276,14 +276,14 @@ mod tests {
         assert_eq!(steps(ticks(), true, 2.0, 4.5), Some(vec![(40.0, 0.0), (10.0, 0.0)]));
         let dataset = dataset(ticks(), true);
         let session = dataset.session();
-        let track = WheelTrack::of(&session.runs[0], session.robot).expect("a track");
-        let (mut cursor, mut pieces) = (track.cursor(), Vec::new());
-        assert!(cursor.pieces(-0.25, 2.0, &mut pieces) && cursor.pieces(2.0, 4.5, &mut pieces));
-        let sum = pieces.iter().map(|piece| piece.wheel_rad).reduce(|a, b| a.zip_with(b, |a, b| a + b));
+        let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
+        let (mut cursor, mut intervals) = (track.cursor(), Vec::new());
+        assert!(cursor.intervals(-0.25, 2.0, &mut intervals) && cursor.intervals(2.0, 4.5, &mut intervals));
+        let sum = intervals.iter().map(|interval| interval.wheel_rad).reduce(|a, b| a.zip_with(b, |a, b| a + b));
         // Counted on: 2.5 before the first row, 60 in the log, 10 after its last.
         assert_eq!(sum, Some(Wheels { left: 72.5, right: -10.0 }));
-        assert!(pieces.windows(2).all(|pair| pair[0].t_s + pair[0].dt_s == pair[1].t_s));
-        assert!(!cursor.pieces(2.0, 5.1, &mut pieces));
+        assert!(intervals.windows(2).all(|pair| pair[0].t_s + pair[0].dt_s == pair[1].t_s));
+        assert!(!cursor.intervals(2.0, 5.1, &mut intervals));
     }
 
     #[test]

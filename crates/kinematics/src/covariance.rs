@@ -36,14 +36,14 @@ const TANGENT_SERIES_BELOW_RAD: f64 = 0.3;
 
 /// Scatter of an arc's end position when the noise sums of both wheels are held fixed, in the chord's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ArcScatter {
+pub struct BridgeCovariance {
     /// Variance along the chord, m².
     pub along_var_m2: f64,
     /// Variance across the chord, m²; `σ_θ² L²/12` for a straight of length `L`.
     pub across_var_m2: f64,
 }
 
-impl ArcScatter {
+impl BridgeCovariance {
     /// Scatter within an arc of given wheel travels (metres) whose travels vary by `travel_var_m2` (m²) over it.
     #[inline]
     #[must_use]
@@ -128,7 +128,7 @@ impl OdometryCovariance {
         transition[(0, 2)] = -(displacement.y_m - world_from_body.y_m);
         transition[(1, 2)] = displacement.x_m - world_from_body.x_m;
 
-        let scatter = ArcScatter::within(travel_m, travel_var_m2, wheel_separation_m);
+        let scatter = BridgeCovariance::within(travel_m, travel_var_m2, wheel_separation_m);
         let (sin, cos) = sin_cos(chord_heading_rad);
         let (along, across) = (scatter.along_var_m2, scatter.across_var_m2);
         let mut within = Matrix3::zeros();
@@ -230,13 +230,13 @@ mod tests {
     #[test]
     fn scatter_of_a_straight_is_a_twelfth_and_of_a_full_turn_a_half() {
         let wheel_var = Wheels::both(1e-6);
-        let straight = ArcScatter::within(Wheels::both(3.0), wheel_var, SEPARATION_M);
+        let straight = BridgeCovariance::within(Wheels::both(3.0), wheel_var, SEPARATION_M);
         let theta_var = 2e-6 / (SEPARATION_M * SEPARATION_M);
         assert!((straight.across_var_m2 / (theta_var * 9.0 / 12.0) - 1.0).abs() < 1e-14);
         assert_eq!(straight.along_var_m2, 0.0);
         // On the spot the centre's noise, (δ_R+δ_L)/2, is spread over all directions: half of its variance on each axis.
         let half_m = std::f64::consts::PI * SEPARATION_M;
-        let spin = ArcScatter::within(Wheels { left: -half_m, right: half_m }, wheel_var, SEPARATION_M);
+        let spin = BridgeCovariance::within(Wheels { left: -half_m, right: half_m }, wheel_var, SEPARATION_M);
         assert!((spin.along_var_m2 / (0.5e-6 / 2.0) - 1.0).abs() < 1e-12);
         assert!((spin.across_var_m2 / (0.5e-6 / 2.0) - 1.0).abs() < 1e-12);
     }
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn many_noisy_small_steps_scatter_as_predicted() {
         // 4000 runs of 200 steps each round a 1.5 rad arc; each variance has relative standard error √(2/4000) = 2.2 %; five of
-        // them for 3 numbers make a false alarm of 2e-6. Leaving out the bridge is off by 25 %.
+        // them for 3 numbers make a false positive of 2e-6. Leaving out the bridge is off by 25 %.
         let (runs, steps) = (4000_u32, 200_u32);
         let travel_m = Wheels { left: 0.7, right: 0.7 + 1.5 * SEPARATION_M };
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(7);

@@ -135,13 +135,13 @@ impl Increment {
     #[inline]
     #[must_use]
     pub fn arc(self) -> Pose {
-        self.scattered_arc(0.0, 0.0).pose()
+        self.perturbed_arc(0.0, 0.0).pose()
     }
 
     /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead along it and to its left, metres.
     #[inline]
     #[must_use]
-    pub fn scattered_arc(self, along_m: f64, across_m: f64) -> Frame {
+    pub fn perturbed_arc(self, along_m: f64, across_m: f64) -> Frame {
         let half_rad = 0.5 * self.turn_rad;
         let (sin, cos) = sin_cos(half_rad);
         let chord_m = self.distance_m * sinc_given_sine(half_rad, sin);

@@ -14,7 +14,6 @@
 //! Source: Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial mediante la
 //! corrección de errores sistemáticos".
 
-mod ahead;
 mod angle;
 mod covariance;
 mod dead_reckoning;
@@ -22,13 +21,14 @@ mod drive;
 mod fleet;
 mod instruction_set;
 mod pose;
+mod prefetch;
 mod trajectory;
 mod trig;
 mod wheels;
 mod whole_log;
 
 pub use angle::{sinc_derivative, unwrap_near, wrap_to_pi};
-pub use covariance::{ArcScatter, OdometryCovariance, WheelNoise};
+pub use covariance::{BridgeCovariance, OdometryCovariance, WheelNoise};
 pub use dead_reckoning::{Count, DeadReckoning, Odometry, Rule};
 pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
 pub use fleet::Fleet;

@@ -5,9 +5,9 @@
 //! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
 //! turned in a step) goes through it instead.
 
-use crate::ahead::{soon_read, soon_written};
 use crate::dead_reckoning::{GROUP, Place, heading_rad};
 use crate::instruction_set::Kernel;
+use crate::prefetch::{prefetch_read, prefetch_write};
 use crate::trig::{Direction, short_sinc};
 use crate::{Count, DeadReckoning, InstructionSet, Pose, Rule, Wheels};
 
@@ -56,7 +56,7 @@ impl Sink for Every<'_> {
     fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         let (now, later) = std::mem::take(&mut self.0).split_first_chunk_mut()?;
         if let Some(soon) = later.get(WRITTEN_AHEAD..) {
-            soon.first_chunk::<GROUP>().into_iter().for_each(soon_written);
+            soon.first_chunk::<GROUP>().into_iter().for_each(prefetch_write);
         }
         self.0 = later;
         Some(now)
@@ -390,7 +390,7 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
         let (mut before, mut is_within) = (self.state.counts, true);
         for (group, (left, right)) in counts.left.iter().zip(counts.right).enumerate() {
             for soon in [soon.left, soon.right] {
-                soon.get(group * GROUP..).and_then(<[C]>::first_chunk::<GROUP>).into_iter().for_each(soon_read);
+                soon.get(group * GROUP..).and_then(<[C]>::first_chunk::<GROUP>).into_iter().for_each(prefetch_read);
             }
             is_within &= columns.displace(&self.state, before, Wheels { left, right }, group);
             columns.next_group();

@@ -13,7 +13,7 @@ fn number(k: u64, below: u64) -> i64 {
     (((word ^ (word >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 33) % below).cast_signed()
 }
 
-/// A robot that drives on and looks around: steps of 0 to 20 counts.
+/// A robot that drives on and measurements around: steps of 0 to 20 counts.
 fn wandering(rows: usize) -> Wheels<Vec<i64>> {
     let column = |seed: u64| {
         (0..rows as u64)

@@ -14,7 +14,7 @@ pub struct Interval<'r> {
     pub t_s: f64,
     /// Length, seconds.
     pub dt_s: f64,
-    /// Start and end of the logged interval of which it is a part, or the whole: a look between two rows cuts it.
+    /// Start and end of the logged interval of which it is a part, or the whole: a measurement between two rows cuts it.
     pub row_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
@@ -74,9 +74,9 @@ impl Interval<'_> {
     }
 }
 
-/// One look of the outside instrument.
+/// One measurement of the outside instrument.
 #[derive(Debug, Clone, Copy)]
-pub struct Look<'r> {
+pub struct Measurement<'r> {
     /// When it was, seconds from the run's start.
     pub t_s: f64,
     /// Where the robot was then, by the counts and what the instrument saw.
@@ -90,17 +90,17 @@ pub struct Look<'r> {
 /// A parameter of a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermParameter {
-    /// Its name, with the unit's suffix; the same as in the effect's forward face where the two mean the same.
+    /// Its name, with the unit's suffix; the same as in the effect's simulation model where the two mean the same.
     pub name: &'static str,
     /// Its unit, for people.
     pub unit: &'static str,
     /// A size that would be large for a real robot: the standard deviation of what is plausible before any data.
-    pub plausible: f64,
+    pub prior_sigma: f64,
 }
 
 /// A mean term, linear in its parameters: what an effect adds to the motion of an interval, or to what the instrument sees.
 ///
-/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it. Intervals and looks come in the order of time.
+/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it. Intervals and measurements come in the order of time.
 /// Runs may go to copies of a term, at the same time.
 pub trait ModelTerm: CopyTerm + Send + Sync {
     /// The parameters in the order of the gradients.
@@ -118,8 +118,8 @@ pub trait ModelTerm: CopyTerm + Send + Sync {
     }
 
     /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each parameter, at zero size. `gradient` is as above.
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        let _ = (look, gradient);
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        let _ = (measurement, gradient);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::program::{Motion, MotionProgram};
 
 /// How fast a robot gets done what it is told.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pace {
+pub struct DriveLimits {
     /// Nominal distance between the wheel contacts, metres.
     pub wheel_separation_m: f64,
     /// Speed of the faster wheel's contact, m/s.
@@ -44,7 +44,7 @@ impl std::iter::Sum for Cost {
     }
 }
 
-impl Pace {
+impl DriveLimits {
     /// What one run costs.
     #[must_use]
     pub fn cost(&self, program: &MotionProgram) -> Cost {
@@ -82,8 +82,8 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, TAU};
 
     /// v²/a = 0.125 m, so that half a metre has a top and a tenth has none.
-    fn pace() -> Pace {
-        Pace { wheel_separation_m: 0.4, cruise_speed_m_s: 0.25, acceleration_m_s2: 0.5, handling_s: 0.0 }
+    fn drive_limits() -> DriveLimits {
+        DriveLimits { wheel_separation_m: 0.4, cruise_speed_m_s: 0.25, acceleration_m_s2: 0.5, handling_s: 0.0 }
     }
 
     fn close(found: Cost, time_s: f64, metres: f64) {
@@ -94,21 +94,21 @@ mod tests {
 
     #[test]
     fn a_motion_takes_its_trapezoid_and_the_wheels_travel() {
-        close(pace().motion(Motion::Straight { length_m: -0.5 }), 2.0 + 0.5, 0.5);
-        close(pace().motion(Motion::Straight { length_m: 0.02 }), 2.0 * 0.2, 0.02);
+        close(drive_limits().motion(Motion::Straight { length_m: -0.5 }), 2.0 + 0.5, 0.5);
+        close(drive_limits().motion(Motion::Straight { length_m: 0.02 }), 2.0 * 0.2, 0.02);
         // A turn on the spot: 0.2 m of wheel a radian.
-        close(pace().motion(Motion::Spin { turn_rad: -5.0 }), 4.0 + 0.5, 1.0);
+        close(drive_limits().motion(Motion::Spin { turn_rad: -5.0 }), 4.0 + 0.5, 1.0);
         // The inner wheel turns about its own contact: the outer one goes twice as far as the centre.
-        close(pace().motion(Motion::Arc { radius_m: 0.2, turn_rad: -5.0 }), 8.0 + 0.5, 1.0);
+        close(drive_limits().motion(Motion::Arc { radius_m: 0.2, turn_rad: -5.0 }), 8.0 + 0.5, 1.0);
         // Inside the contact the inner wheel goes backward: its travel counts all the same.
-        close(pace().motion(Motion::Arc { radius_m: 0.1, turn_rad: 5.0 }), 6.0 + 0.5, 1.0);
-        close(pace().motion(Motion::Pause { duration_s: 3.0 }), 3.0, 0.0);
-        assert_eq!(pace().motion(Motion::Measure), Cost::default());
+        close(drive_limits().motion(Motion::Arc { radius_m: 0.1, turn_rad: 5.0 }), 6.0 + 0.5, 1.0);
+        close(drive_limits().motion(Motion::Pause { duration_s: 3.0 }), 3.0, 0.0);
+        assert_eq!(drive_limits().motion(Motion::Measure), Cost::default());
     }
 
     #[test]
     fn both_branches_of_the_trapezoid_meet() {
-        let at = |travel_m: f64| pace().trapezoid_s(travel_m);
+        let at = |travel_m: f64| drive_limits().trapezoid_s(travel_m);
         // The slope there is 1/v = 4 s/m: 1e-9 m on either side are 4e-9 s.
         assert!((at(0.125) - 1.0).abs() < 1e-15);
         assert!((at(0.125 - 1e-9) - 1.0).abs() < 5e-9 && (at(0.125 + 1e-9) - 1.0).abs() < 5e-9);
@@ -116,13 +116,13 @@ mod tests {
 
     #[test]
     fn every_run_is_handled_once_and_costs_add_up() {
-        let pace = Pace { handling_s: 30.0, ..pace() };
+        let drive_limits = DriveLimits { handling_s: 30.0, ..drive_limits() };
         let squares = Schedule::Squares { side_m: 1.0, runs_each_way: 1 }.programs();
         let turn = 0.2 * FRAC_PI_2;
         let (time_s, metres) = (4.0 * (4.5 + turn / 0.25 + 0.5) + 30.0, 4.0 * (1.0 + turn));
-        close(pace.cost(&squares[0]), time_s, metres);
-        close(squares.iter().map(|program| pace.cost(program)).sum(), 2.0 * time_s, 2.0 * metres);
+        close(drive_limits.cost(&squares[0]), time_s, metres);
+        close(squares.iter().map(|program| drive_limits.cost(program)).sum(), 2.0 * time_s, 2.0 * metres);
         let spin = &Schedule::Spins { turn_rad: TAU, runs: 1 }.programs()[0];
-        close(pace.cost(spin), 0.2 * TAU / 0.25 + 0.5 + 30.0, 0.2 * TAU);
+        close(drive_limits.cost(spin), 0.2 * TAU / 0.25 + 0.5 + 30.0, 0.2 * TAU);
     }
 }

@@ -4,6 +4,6 @@ mod cost;
 mod platform;
 mod program;
 
-pub use cost::{Cost, Pace};
+pub use cost::{Cost, DriveLimits};
 pub use platform::{Platform, record_session};
 pub use program::{Motion, MotionProgram, Schedule};

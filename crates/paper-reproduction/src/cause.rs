@@ -51,7 +51,7 @@ struct Words {
     says: &'static str,
     unit: &'static str,
     scale: f64,
-    plausible: (f64, f64),
+    prior_sigma: (f64, f64),
     because: &'static str,
 }
 
@@ -67,7 +67,7 @@ impl Extension {
     ];
 
     fn words(self) -> Words {
-        let words = |says, unit, scale, plausible, because| Words { says, unit, scale, plausible, because };
+        let words = |says, unit, scale, prior_sigma, because| Words { says, unit, scale, prior_sigma, because };
         match self {
             Self::None => words("the paper's model as it stands", "", 1.0, (0.0, 0.0), "nothing is assumed"),
             Self::CornerWheelbase => words(
@@ -125,7 +125,8 @@ pub struct Fitted {
     /// Unit of the size.
     pub unit: &'static str,
     /// Whether the size is physically plausible.
-    pub plausible: bool,
+    #[serde(rename = "plausible")]
+    pub prior_sigma: bool,
     /// Why that is judged so.
     pub because: &'static str,
     /// Sum of squared departures from the five published numbers, in their standard deviations.
@@ -289,7 +290,7 @@ fn predict(
 /// The five published numbers with their standard deviations.
 fn published(table_2: &Table2) -> ([f64; NUMBERS], [f64; NUMBERS]) {
     let umbmark = TABLE_2_UMBMARK.sensitivity;
-    let of_mean = |shape: super::shape::Shape| shape.std / (shape.count as f64).sqrt();
+    let of_mean = |shape: super::shape::Variant| shape.std / (shape.count as f64).sqrt();
     let simulated = |method, symbol| table_2.cell(method, symbol).map_or(f64::NAN, |cell| cell.sigma);
     let rounding = |half_digit: f64| half_digit / 3_f64.sqrt();
     (
@@ -356,7 +357,7 @@ fn fit(
         says: words.says,
         size,
         unit: words.unit,
-        plausible: (words.plausible.0..=words.plausible.1).contains(&size),
+        prior_sigma: (words.prior_sigma.0..=words.prior_sigma.1).contains(&size),
         because: words.because,
         misfit: residual(&predicted).norm_squared(),
         parameters,

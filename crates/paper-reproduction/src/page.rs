@@ -216,11 +216,11 @@ impl Reproduction {
         for fitted in &causes.fitted {
             let size =
                 if fitted.unit.is_empty() { "–".to_owned() } else { format!("{:+.2} {}", fitted.size, fitted.unit) };
-            let plausible = if fitted.plausible { "yes" } else { "no" };
+            let prior_sigma = if fitted.prior_sigma { "yes" } else { "no" };
             let [c_left, c_right, base, ratio, squares] = fitted.predicts;
             writeln!(
                 page,
-                "| {} | {size} | {plausible}: {} | {:.1} | {} | {c_left:.4} | {c_right:.4} | {base:.1} | {ratio:.5} | {squares:.1} |",
+                "| {} | {size} | {prior_sigma}: {} | {:.1} | {} | {c_left:.4} | {c_right:.4} | {base:.1} | {ratio:.5} | {squares:.1} |",
                 fitted.says, fitted.because, fitted.misfit, fitted.parameters
             )?;
         }
@@ -273,13 +273,13 @@ impl Causes {
         let names = |extensions: &[Extension]| {
             extensions.iter().map(|extension| spoken(*extension)).collect::<Vec<_>>().join(", ")
         };
-        let plausible: Vec<Extension> = self
+        let prior_sigma: Vec<Extension> = self
             .fitted
             .iter()
-            .filter(|fitted| fitted.plausible && self.not_told_apart.contains(&fitted.extension))
+            .filter(|fitted| fitted.prior_sigma && self.not_told_apart.contains(&fitted.extension))
             .map(|fitted| fitted.extension)
             .collect();
-        let of_these = match plausible.as_slice() {
+        let of_these = match prior_sigma.as_slice() {
             [] => "None of them has a plausible size.".to_owned(),
             [one] => format!("Of these only **{}** has a plausible size.", spoken(*one)),
             several => format!("Of these {} have a plausible size.", names(several)),

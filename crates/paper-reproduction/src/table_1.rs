@@ -16,7 +16,7 @@ use serde::Serialize;
 use sim_yair::SimulationError;
 
 use super::published::TABLE_1;
-use super::shape::{ROWS, Shape};
+use super::shape::{ROWS, Variant};
 use super::units::{COUNTS_PER_PULSE, MM_PER_M};
 use bench::Trial;
 
@@ -153,21 +153,21 @@ impl Experiment {
 const TRIALS_PER_TASK: u64 = 50;
 
 /// Shapes of `trials` experiments in order.
-fn shapes(scenario: &Scenario, first: u64, trials: u64) -> Result<Vec<Wheels<Shape>>, SimulationError> {
+fn variants(scenario: &Scenario, first: u64, trials: u64) -> Result<Vec<Wheels<Variant>>, SimulationError> {
     let tasks = trials.div_ceil(TRIALS_PER_TASK);
-    let done: Result<Vec<Vec<Wheels<Shape>>>, SimulationError> = (0..tasks)
+    let done: Result<Vec<Vec<Wheels<Variant>>>, SimulationError> = (0..tasks)
         .into_par_iter()
         .map(|task| {
             let mut experiment = Experiment::new(scenario)?;
             let from = task * TRIALS_PER_TASK;
-            let mut shapes = Vec::new();
+            let mut variants = Vec::new();
             for trial in from..(from + TRIALS_PER_TASK).min(trials) {
                 let values = experiment.sensitivities(first + trial)?;
-                if let (Some(left), Some(right)) = (Shape::of(&values.left), Shape::of(&values.right)) {
-                    shapes.push(Wheels { left, right });
+                if let (Some(left), Some(right)) = (Variant::of(&values.left), Variant::of(&values.right)) {
+                    variants.push(Wheels { left, right });
                 }
             }
-            Ok(shapes)
+            Ok(variants)
         })
         .collect();
     Ok(done?.into_iter().flatten().collect())
@@ -181,15 +181,16 @@ pub fn table_1(base: &Scenario, trials: u64, progress: &(dyn Fn(u64) + Sync)) ->
     let mut tables = Vec::new();
     for hypothesis in Hypothesis::ALL {
         let (reading_sigma_m, sensitivity_sigma) = fitted_sizes(base, hypothesis)?;
-        let shapes = shapes(&scenario(base, hypothesis, reading_sigma_m, sensitivity_sigma), TRIALS_TO_FIT, trials)?;
+        let variants =
+            variants(&scenario(base, hypothesis, reading_sigma_m, sensitivity_sigma), TRIALS_TO_FIT, trials)?;
         progress(trials);
         tables.push(Table1 {
             hypothesis,
             reading_sigma_m,
             sensitivity_sigma,
-            left: rows(&shapes, Side::Left),
-            right: rows(&shapes, Side::Right),
-            log_likelihood: log_synthetic_likelihood(&shapes),
+            left: rows(&variants, Side::Left),
+            right: rows(&variants, Side::Right),
+            log_likelihood: log_synthetic_likelihood(&variants),
             below_best: 0.0,
         });
     }
@@ -217,9 +218,9 @@ fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), S
     let published = 0.5 * (TABLE_1.left.variance + TABLE_1.right.variance);
     let mean_c = 0.5 * (TABLE_1.left.mean + TABLE_1.right.mean);
     let variance = |reading_sigma_m: f64, sensitivity_sigma: f64| -> Result<f64, SimulationError> {
-        let shapes = shapes(&scenario(base, hypothesis, reading_sigma_m, sensitivity_sigma), 0, TRIALS_TO_FIT)?;
-        let n = shapes.len() as f64;
-        Ok(shapes.iter().map(|shape| 0.5 * (shape.left.variance + shape.right.variance)).sum::<f64>() / n)
+        let variants = variants(&scenario(base, hypothesis, reading_sigma_m, sensitivity_sigma), 0, TRIALS_TO_FIT)?;
+        let n = variants.len() as f64;
+        Ok(variants.iter().map(|shape| 0.5 * (shape.left.variance + shape.right.variance)).sum::<f64>() / n)
     };
     if hypothesis == Hypothesis::Wheels {
         return Ok((0.0, published.sqrt() / mean_c));
@@ -232,10 +233,10 @@ fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), S
     Ok((reading_sigma_m, ((1.0 - share) * left_to_explain).sqrt() / mean_c))
 }
 
-fn rows(shapes: &[Wheels<Shape>], side: Side) -> Vec<Row> {
+fn rows(variants: &[Wheels<Variant>], side: Side) -> Vec<Row> {
     ROWS.iter()
         .map(|(statistic, of)| {
-            let mut values: Vec<f64> = shapes.iter().map(|shape| of(&shape[side])).collect();
+            let mut values: Vec<f64> = variants.iter().map(|shape| of(&shape[side])).collect();
             values.sort_unstable_by(f64::total_cmp);
             let published = of(&TABLE_1[side]);
             let below = values.iter().filter(|value| **value < published).count();
@@ -257,18 +258,18 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 /// What of a shape can tell hypotheses apart once location and scale are fitted: the spread of both wheels, the extremes in standard deviations, and the
 /// standardized moments.
-fn features(shape: &Wheels<Shape>) -> Vec<f64> {
+fn features(shape: &Wheels<Variant>) -> Vec<f64> {
     Side::BOTH
         .iter()
         .flat_map(|side| {
-            let Shape { mean, std, min, max, skewness_z, kurtosis_z, .. } = shape[*side];
+            let Variant { mean, std, min, max, skewness_z, kurtosis_z, .. } = shape[*side];
             [std.ln(), (mean - min) / std, (max - mean) / std, skewness_z, kurtosis_z]
         })
         .collect()
 }
 
-fn log_synthetic_likelihood(shapes: &[Wheels<Shape>]) -> f64 {
-    let features_of: Vec<DVector<f64>> = shapes.iter().map(|shape| DVector::from_vec(features(shape))).collect();
+fn log_synthetic_likelihood(variants: &[Wheels<Variant>]) -> f64 {
+    let features_of: Vec<DVector<f64>> = variants.iter().map(|shape| DVector::from_vec(features(shape))).collect();
     let size = features_of[0].len();
     let n = features_of.len() as f64;
     let mean = features_of.iter().fold(DVector::zeros(size), |sum, feature| sum + feature) / n;

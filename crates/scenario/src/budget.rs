@@ -4,7 +4,7 @@
 //! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
 //! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
 
-use motion_programs::{Cost, MotionProgram, Pace, Schedule};
+use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{NoFit, ScenarioError};
@@ -81,12 +81,12 @@ impl Budget {
     }
 
     /// Protocols that stay in the room and within the budget.
-    pub(crate) fn fit(&self, protocols: &[Schedule], pace: &Pace) -> Result<Vec<Schedule>, NoFit> {
+    pub(crate) fn fit(&self, protocols: &[Schedule], drive_limits: &DriveLimits) -> Result<Vec<Schedule>, NoFit> {
         let mut parts = Vec::with_capacity(protocols.len());
         for stated in protocols.iter().filter(|stated| stated.runs() > 0) {
             let schedule = self.bounded(*stated)?;
             let pairs = 0.5 * number(schedule.runs());
-            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), pace) });
+            parts.push(Part { schedule, pairs, pair_cost: cost(&schedule.with_pairs(1).programs(), drive_limits) });
         }
         let affords = |factor: f64| {
             self.affords(parts.iter().fold(Cost::default(), |sum, part| Cost {
@@ -145,9 +145,9 @@ fn number(runs: u64) -> f64 {
     runs as f64
 }
 
-/// What programs cost at a pace.
-pub(crate) fn cost(programs: &[MotionProgram], pace: &Pace) -> Cost {
-    programs.iter().map(|program| pace.cost(program)).sum()
+/// What programs cost a robot.
+pub(crate) fn cost(programs: &[MotionProgram], drive_limits: &DriveLimits) -> Cost {
+    programs.iter().map(|program| drive_limits.cost(program)).sum()
 }
 
 #[cfg(test)]
@@ -178,7 +178,7 @@ mod tests {
     }
 
     fn fit(budget: Budget, protocols: &[Schedule]) -> Result<Vec<Schedule>, NoFit> {
-        budget.fit(protocols, &paper(budget).pace())
+        budget.fit(protocols, &paper(budget).drive_limits())
     }
 
     fn cost_of(budget: Budget, protocols: &[Schedule]) -> Cost {

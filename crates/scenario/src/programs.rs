@@ -1,6 +1,6 @@
 //! What a scenario drives, fitted to its budget, and what that costs.
 
-use motion_programs::{Cost, MotionProgram, Pace, Schedule};
+use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 
 use crate::budget::cost;
 use crate::error::NoFit;
@@ -28,20 +28,20 @@ impl Scenario {
     /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the driving alone.
     #[must_use]
     pub fn cost_of(&self, programs: &[MotionProgram]) -> Cost {
-        cost(programs, &self.pace())
+        cost(programs, &self.drive_limits())
     }
 
     pub(crate) fn fitted(&self, protocols: &[Schedule]) -> Result<Vec<MotionProgram>, NoFit> {
         let fitted = match &self.budget {
-            Some(budget) => budget.fit(protocols, &self.pace())?,
+            Some(budget) => budget.fit(protocols, &self.drive_limits())?,
             None => protocols.to_vec(),
         };
         Ok(fitted.iter().flat_map(Schedule::programs).collect())
     }
 
     /// How fast the robot drives, and what a person needs for each run.
-    pub(crate) fn pace(&self) -> Pace {
-        Pace {
+    pub(crate) fn drive_limits(&self) -> DriveLimits {
+        DriveLimits {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: self.robot.cruise_speed_m_s,
             acceleration_m_s2: self.robot.acceleration_m_s2,

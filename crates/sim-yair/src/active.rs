@@ -1,6 +1,6 @@
 //! The effects at work in a simulated robot, each called at the stages at which it acts and at no other.
 
-use effects::{Command, Forward, Readout, RunStart, SampleClock, Sighting, Step, StreamName};
+use effects::{Command, Forward, PoseReading, Readout, RunStart, SampleClock, Step, StreamName};
 
 /// Effects in the order in which they act.
 pub(crate) struct ActiveEffects {
@@ -11,8 +11,8 @@ pub(crate) struct ActiveEffects {
 /// Who acts at which hook: positions, in order.
 #[derive(Debug, Default)]
 struct Roster {
-    begin_run: Vec<usize>,
-    start_run: Vec<usize>,
+    on_run_start: Vec<usize>,
+    seed_run: Vec<usize>,
     start_motion: Vec<usize>,
     command: Vec<usize>,
     motor: Vec<usize>,
@@ -46,8 +46,8 @@ impl ActiveEffects {
         for (position, (_, effect)) in effects.iter().enumerate() {
             let hooks = effect.hooks();
             for (acts, roster) in [
-                (hooks.begin_run, &mut at.begin_run),
-                (hooks.start_run, &mut at.start_run),
+                (hooks.on_run_start, &mut at.on_run_start),
+                (hooks.seed_run, &mut at.seed_run),
                 (hooks.start_motion, &mut at.start_motion),
                 (hooks.command, &mut at.command),
                 (hooks.motor, &mut at.motor),
@@ -68,16 +68,16 @@ impl ActiveEffects {
 
     /// A run begins: each effect that draws gets its stream from `stream`.
     #[inline]
-    pub(crate) fn start_run(&mut self, stream: impl Fn(StreamName) -> effects::Stream) {
-        for &position in &self.at.start_run {
+    pub(crate) fn seed_run(&mut self, stream: impl Fn(StreamName) -> effects::Stream) {
+        for &position in &self.at.seed_run {
             let (name, effect) = &mut self.effects[position];
-            effect.start_run(stream(*name));
+            effect.seed_run(stream(*name));
         }
     }
 
     calls! {
         /// A run begins, at its place in the session.
-        begin_run(run: RunStart<'_>);
+        on_run_start(run: RunStart<'_>);
         /// A motion begins.
         start_motion();
         /// What the wheels are told.
@@ -95,7 +95,7 @@ impl ActiveEffects {
         /// When counters are read and what time the row bears.
         clock(sample: SampleClock);
         /// What the outside sees.
-        instrument(sighting: Sighting);
+        instrument(reading: PoseReading);
     }
 
     /// Is a motion told and counted the same way at every trial, whatever is drawn?

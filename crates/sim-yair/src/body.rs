@@ -1,12 +1,12 @@
 //! The robot's body on its way from the shafts to the floor, the same in both engines.
 //!
 //! A step is a stretch of constant wheel rates; it becomes one SE(2) arc with the wheels' random walk summed over it. In the closed form a step may be a
-//! whole motion, and then the noise *inside* the arc is added too: the Brownian bridge of [`kinematics::ArcScatter`], σ_θ²L²/12 across a straight of
+//! whole motion, and then the noise *inside* the arc is added too: the Brownian bridge of [`kinematics::BridgeCovariance`], σ_θ²L²/12 across a straight of
 //! length L. Without it the spread of UMBmark's results comes out too small.
 
 use dataset::MarkedPoint;
-use effects::{Sighting, Step, Stream};
-use kinematics::{ArcScatter, Frame, Increment, Pose, WheelNoise, Wheels};
+use effects::{PoseReading, Step, Stream};
+use kinematics::{BridgeCovariance, Frame, Increment, Pose, WheelNoise, Wheels};
 
 use crate::active::ActiveEffects;
 use crate::actuator::{Profile, ShaftMotion};
@@ -51,7 +51,7 @@ pub(crate) struct Body {
     /// What each contact has gone over the ground, metres.
     pub(crate) ground_m: Wheels<f64>,
     /// What the drive's centre has gone, forward and backward, metres.
-    pub(crate) way_m: f64,
+    pub(crate) distance_m: f64,
     wheel_angle_rad: Wheels<f64>,
     sensitivity: Wheels<f64>,
 }
@@ -63,7 +63,7 @@ impl Body {
             t_s: 0.0,
             world_from_body: start.world_from_body.into(),
             ground_m: Wheels::both(0.0),
-            way_m: 0.0,
+            distance_m: 0.0,
             wheel_angle_rad: start.counts.map(|counts| counts / setup.counts_per_rad),
             sensitivity: Wheels::both(1.0),
         }
@@ -131,7 +131,7 @@ impl Body {
         let (mut travel_m, mut along_m, mut across_m) = (step.travel_m, 0.0, step.lateral_m);
         if var_m2.left > 0.0 || var_m2.right > 0.0 {
             let [left, right] = if setup.closed_form {
-                let scatter = ArcScatter::within(step.travel_m, var_m2, step.wheel_separation_m);
+                let scatter = BridgeCovariance::within(step.travel_m, var_m2, step.wheel_separation_m);
                 let [left, right, along, across] = wheel_noise.normals();
                 along_m += scatter.along_var_m2.sqrt() * along;
                 across_m += scatter.across_var_m2.sqrt() * across;
@@ -144,9 +144,9 @@ impl Body {
         }
         self.ground_m = self.ground_m.zip_with(travel_m, |sum_m, travel_m| sum_m + travel_m);
         let mut increment = Increment::from_travel(travel_m, step.wheel_separation_m);
-        self.way_m += increment.distance_m.abs();
+        self.distance_m += increment.distance_m.abs();
         increment.turn_rad += step.extra_turn_rad;
-        let before_from_after = increment.scattered_arc(along_m, across_m);
+        let before_from_after = increment.perturbed_arc(along_m, across_m);
         let world_from_body = if setup.closed_form {
             self.world_from_body * before_from_after
         } else {
@@ -159,12 +159,12 @@ impl Body {
 
     /// What an instrument that looks at `t_s`, now, sees: when and where.
     #[inline]
-    pub(crate) fn sighting(&self, effects: &mut ActiveEffects, t_s: f64) -> (f64, Frame) {
+    pub(crate) fn reading(&self, effects: &mut ActiveEffects, t_s: f64) -> (f64, Frame) {
         if !effects.act_on_instruments() {
             return (t_s, self.world_from_body);
         }
-        let mut sighting = Sighting { t_s, world_from_body: self.world_from_body.pose() };
-        effects.instrument(&mut sighting);
-        (sighting.t_s, sighting.world_from_body.into())
+        let mut reading = PoseReading { t_s, world_from_body: self.world_from_body.pose() };
+        effects.instrument(&mut reading);
+        (reading.t_s, reading.world_from_body.into())
     }
 }

@@ -93,7 +93,7 @@ impl<'a> Drive<'a> {
 
     /// How long the run has taken, seconds, and how far the drive's centre has gone, metres.
     pub(crate) const fn so_far(&self) -> (f64, f64) {
-        (self.body.t_s, self.body.way_m)
+        (self.body.t_s, self.body.distance_m)
     }
 
     /// Performs one motion and, where the counters have moved on, writes the row of its end.
@@ -116,7 +116,7 @@ impl<'a> Drive<'a> {
     pub(crate) fn stand(&mut self) {
         self.look_if_due();
         if self.run.point_readings.last().is_none_or(|reading| self.body.t_s > reading.t_s + SAME_INSTANT_S) {
-            let (t_s, world_from_body) = self.body.sighting(self.effects, self.body.t_s);
+            let (t_s, world_from_body) = self.body.reading(self.effects, self.body.t_s);
             for observer in &mut *self.observers {
                 observer.read_standing(t_s, world_from_body, &self.setup.points, &mut self.run.point_readings);
             }
@@ -191,17 +191,17 @@ impl<'a> Drive<'a> {
     #[inline]
     fn look_if_due(&mut self) {
         if self.next_look_s <= self.body.t_s + SAME_INSTANT_S {
-            self.look();
+            self.measurement();
         }
     }
 
-    fn look(&mut self) {
+    fn measurement(&mut self) {
         for k in 0..self.observers.len() {
-            let look_s = self.observers[k].next_look_s();
-            if look_s <= self.body.t_s + SAME_INSTANT_S {
+            let measurement_s = self.observers[k].next_look_s();
+            if measurement_s <= self.body.t_s + SAME_INSTANT_S {
                 // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
-                let (t_s, world_from_body) = self.body.sighting(self.effects, look_s);
-                self.observers[k].look(t_s, world_from_body, self.body.ground_m, self.run);
+                let (t_s, world_from_body) = self.body.reading(self.effects, measurement_s);
+                self.observers[k].measurement(t_s, world_from_body, self.body.ground_m, self.run);
             }
         }
         self.next_look_s = next_look_s(self.observers);

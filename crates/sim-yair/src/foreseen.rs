@@ -15,7 +15,7 @@ use crate::planned_motion::PlannedMotion;
 
 /// What a run does from one standstill to the next.
 #[derive(Debug, Clone)]
-struct Leg {
+struct PropagationInterval {
     /// Does it begin a motion, for which effects and sensitivities draw?
     sets_out: bool,
     pieces: Vec<Piece>,
@@ -25,17 +25,17 @@ struct Leg {
 
 /// A run foreseen.
 #[derive(Debug, Clone)]
-pub(crate) struct Course {
+pub(crate) struct PrecomputedRun {
     /// Each leg ends with a row.
-    legs: Vec<Leg>,
+    legs: Vec<PropagationInterval>,
     /// When, seconds.
     rows_s: Vec<f64>,
 }
 
-impl Course {
+impl PrecomputedRun {
     /// The course of a plan's motions; `None` where one of them has its say only when it comes.
     pub(crate) fn new(motions: &[PlannedMotion]) -> Option<Self> {
-        let mut legs = vec![Leg { sets_out: false, pieces: Vec::new(), is_read: true }];
+        let mut legs = vec![PropagationInterval { sets_out: false, pieces: Vec::new(), is_read: true }];
         let (mut t_s, mut rows_s) = (0.0, vec![0.0]);
         for motion in motions {
             let (sets_out, pieces) = match motion {
@@ -54,7 +54,7 @@ impl Course {
                 return None;
             }
             t_s = ends_s;
-            legs.push(Leg { sets_out, pieces, is_read: false });
+            legs.push(PropagationInterval { sets_out, pieces, is_read: false });
             rows_s.push(t_s);
         }
         if let Some(last) = legs.last_mut() {
@@ -97,7 +97,7 @@ impl Course {
             (ticks.left[rows], ticks.right[rows]) = (readout.ticks.left, readout.ticks.right);
             rows += usize::from(readout.written);
             if leg.is_read {
-                let (t_s, world_from_body) = body.sighting(effects, body.t_s);
+                let (t_s, world_from_body) = body.reading(effects, body.t_s);
                 for observer in &mut *observers {
                     observer.read_standing(t_s, world_from_body, &setup.points, &mut run.point_readings);
                 }
@@ -148,9 +148,9 @@ mod tests {
             let (mut run, mut asked) = (Run::default(), Run::default());
             for program in &programs {
                 let plan = foreseen.plan(program.clone());
-                assert!(plan.course.is_some(), "{}", program.id);
+                assert!(plan.precomputed_run.is_some(), "{}", program.id);
                 foreseen.drive_plan_into(&plan, &mut run).expect("drives");
-                asking.drive_plan_into(&crate::Plan { course: None, ..plan }, &mut asked).expect("drives");
+                asking.drive_plan_into(&crate::Plan { precomputed_run: None, ..plan }, &mut asked).expect("drives");
                 assert_eq!(run, asked);
                 assert_eq!(foreseen.last_true_ends(), asking.last_true_ends());
             }

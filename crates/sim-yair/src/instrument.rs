@@ -14,7 +14,7 @@ pub(crate) struct Observer {
     name: StreamName,
     stream: Stream,
     samples: u32,
-    /// What each wheel's contact had gone at the last look, metres.
+    /// What each wheel's contact had gone at the last measurement, metres.
     ground_m: Wheels<f64>,
 }
 
@@ -48,12 +48,12 @@ impl Observer {
     }
 
     /// Does the instrument look at the robot when nobody asks it to?
-    pub(crate) const fn looks_by_itself(&self) -> bool {
+    pub(crate) const fn free_running(&self) -> bool {
         matches!(self.instrument, Instrument::MotionCapture { .. } | Instrument::Tachometer { .. })
     }
 
-    /// A look at the moving robot at [`Self::next_look_s`], whose contacts have gone so far over the ground.
-    pub(crate) fn look(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
+    /// A measurement at the moving robot at [`Self::next_look_s`], whose contacts have gone so far over the ground.
+    pub(crate) fn measurement(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
         if let Instrument::Tachometer { rate_hz, sigma_m_s } = self.instrument {
             let mut speed = |now_m, before_m| (now_m - before_m) * rate_hz + sigma_m_s * self.stream.normal();
             // The first sample, at standstill, has nothing before it.

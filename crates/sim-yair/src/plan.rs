@@ -2,7 +2,7 @@
 
 use motion_programs::MotionProgram;
 
-use crate::foreseen::Course;
+use crate::foreseen::PrecomputedRun;
 use crate::planned_motion::PlannedMotion;
 
 /// A program made ready for the robot that [`crate::SimulatedRobot::plan`] was asked of.
@@ -11,7 +11,7 @@ pub struct Plan {
     pub(crate) program: MotionProgram,
     pub(crate) motions: Vec<PlannedMotion>,
     /// The motions once more, where the closed form foresees all of the run.
-    pub(crate) course: Option<Course>,
+    pub(crate) precomputed_run: Option<PrecomputedRun>,
 }
 
 impl Plan {

@@ -10,7 +10,7 @@ use crate::active::ActiveEffects;
 use crate::actuator::{Actuator, ConstantSpeed, Profile, ServoPair};
 use crate::body::{DriveSetup, DriveStreams, Start};
 use crate::drive::Drive;
-use crate::foreseen::Course;
+use crate::foreseen::PrecomputedRun;
 use crate::instrument::Observer;
 use crate::plan::Plan;
 use crate::planned_motion::PlannedMotion;
@@ -68,7 +68,7 @@ pub struct SimulatedRobot {
 #[derive(Debug, Clone, Copy, Default)]
 struct Session {
     t_s: f64,
-    way_m: f64,
+    distance_m: f64,
 }
 
 impl SimulatedRobot {
@@ -183,10 +183,13 @@ impl SimulatedRobot {
         let pieces = |command: &_| foreseen.then(|| self.setup.profile.pieces(command, |_| Wheels::both(1.0)));
         let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, pieces);
         let motions: Vec<_> = program.motions.iter().map(planned).collect();
-        let undisturbed = self.setup.log_interval_s.is_none() && !self.observers.iter().any(Observer::looks_by_itself);
-        let course =
-            if foreseen && undisturbed && self.effects.leave_clocks_alone() { Course::new(&motions) } else { None };
-        Plan { program, motions, course }
+        let undisturbed = self.setup.log_interval_s.is_none() && !self.observers.iter().any(Observer::free_running);
+        let precomputed_run = if foreseen && undisturbed && self.effects.leave_clocks_alone() {
+            PrecomputedRun::new(&motions)
+        } else {
+            None
+        };
+        Plan { program, motions, precomputed_run }
     }
 
     /// Drives a program as [`Platform::drive_into`] does.
@@ -202,10 +205,10 @@ impl SimulatedRobot {
             self.session = Session::default();
         }
         empty(run, &plan.program);
-        let Session { t_s: session_s, way_m: session_m } = self.session;
+        let Session { t_s: session_s, distance_m: session_m } = self.session;
         run.info.start_s = Some(session_s);
-        self.effects.begin_run(&mut RunStart { number, session_s, session_m, info: &mut run.info });
-        self.effects.start_run(|name| streams.stream(name));
+        self.effects.on_run_start(&mut RunStart { number, session_s, session_m, info: &mut run.info });
+        self.effects.seed_run(|name| streams.stream(name));
         for observer in &mut self.observers {
             observer.restart(|name| streams.stream(name));
         }
@@ -214,11 +217,11 @@ impl SimulatedRobot {
             self.streams.sensitivity = streams.stream(SENSITIVITY);
         }
         let start = self.start(streams.stream(PLACEMENT), streams.stream(WHEEL_PHASE));
-        if let Some(course) = &plan.course {
+        if let Some(precomputed_run) = &plan.precomputed_run {
             let at_work = (&mut self.effects, &mut self.observers[..]);
-            let body = course.drive(&self.setup, &start, &mut self.streams, at_work, run);
+            let body = precomputed_run.drive(&self.setup, &start, &mut self.streams, at_work, run);
             self.session.t_s += body.t_s;
-            self.session.way_m += body.way_m;
+            self.session.distance_m += body.distance_m;
             self.last_ends = (start.world_from_body, body.world_from_body.pose());
             return Ok(());
         }
@@ -241,9 +244,9 @@ impl SimulatedRobot {
             drive.perform(motion)?;
         }
         drive.stand();
-        let (t_s, way_m) = drive.so_far();
+        let (t_s, distance_m) = drive.so_far();
         self.session.t_s += t_s;
-        self.session.way_m += way_m;
+        self.session.distance_m += distance_m;
         self.last_ends = (start.world_from_body, drive.world_from_body());
         Ok(())
     }

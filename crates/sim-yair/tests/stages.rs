@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use dataset::{Protocol, ProtocolSettings, Run, WheelLog};
-use effects::{Command, Forward, Readout, RunStart, SampleClock, Sighting, Step};
+use effects::{Command, Forward, PoseReading, Readout, RunStart, SampleClock, Step};
 use kinematics::Pose;
 use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
@@ -89,8 +89,8 @@ probe!(TornRead, readout, Readout, |readout| {
 probe!(LateClock, clock, SampleClock, |sample| {
     sample.stamp_s += 0.003;
 });
-probe!(TurnedCamera, instrument, Sighting, |sighting| {
-    sighting.world_from_body = Pose::new(0.0, 1.0, 0.0) * sighting.world_from_body;
+probe!(TurnedCamera, instrument, PoseReading, |reading| {
+    reading.world_from_body = Pose::new(0.0, 1.0, 0.0) * reading.world_from_body;
 });
 
 #[test]
@@ -187,7 +187,7 @@ fn motion_capture_looks_at_its_rate_stamps_late_and_rides_its_lever() {
 struct Diary;
 
 impl Forward for Diary {
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         let said = [("number", f64::from(run.number)), ("session_s", run.session_s), ("session_m", run.session_m)];
         run.info.covariates = said.map(|(name, value)| (name.to_owned(), value)).into();
     }

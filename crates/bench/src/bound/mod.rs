@@ -119,16 +119,16 @@ impl FisherInformation {
         let scale = Matrix3::from_diagonal(&self.geometry_m);
         let eigen = SymmetricEigen::new(scale * self.matrix * scale);
         let rounding = ROUNDING_SHARE * eigen.eigenvalues.max();
-        let (mut variance, mut unseen) = (0.0, 0.0);
+        let (mut variance, mut unobservable) = (0.0, 0.0);
         for (direction, &eigenvalue) in eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues) {
             let share = direction[row] * direction[row];
             if eigenvalue > rounding {
                 variance += share / eigenvalue;
             } else {
-                unseen += share;
+                unobservable += share;
             }
         }
-        (unseen < UNSEEN_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
+        (unobservable < UNSEEN_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
     }
 }
 

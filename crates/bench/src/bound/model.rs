@@ -160,8 +160,8 @@ mod tests {
     #[test]
     fn two_marks_across_the_axle_give_the_textbook_pose() {
         let grid = Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 2e-3 };
-        let sight = Sight::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
-        let seen = sight.covariance(Pose::new(3.0, -1.0, 0.7));
+        let measurement = Sight::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
+        let seen = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
         // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of them.
         let expected = Matrix3::from_diagonal(&Vector3::new(2e-6, 2e-6, 2.0 * 4e-6 / 0.16));
         assert!((seen - expected).abs().max() < 1e-18, "{seen}");
@@ -172,8 +172,8 @@ mod tests {
     fn rounding_to_the_grid_adds_a_twelfth_of_its_square() {
         let marks = [mark(0.0, 0.2), mark(0.0, -0.2)];
         let grid = |reading_sigma_m| Sight::of(&Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }, &marks);
-        let sight = grid(4e-4).expect("dithered");
-        assert!((sight.covariance(Pose::IDENTITY)[(0, 0)] / (0.5 * (1.6e-7 + 1e-6 / 12.0)) - 1.0).abs() < 1e-14);
+        let measurement = grid(4e-4).expect("dithered");
+        assert!((measurement.covariance(Pose::IDENTITY)[(0, 0)] / (0.5 * (1.6e-7 + 1e-6 / 12.0)) - 1.0).abs() < 1e-14);
         assert!(matches!(grid(3e-4), Err(NoBound::RoundedReadings { .. })));
     }
 

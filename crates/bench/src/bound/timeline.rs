@@ -24,9 +24,9 @@ pub(super) enum Event {
         share: f64,
     },
     /// An instrument looks.
-    Look {
+    Measurement {
         /// Which, in the model's order.
-        sight: usize,
+        measurement: usize,
         /// When, seconds from the run's start.
         t_s: f64,
     },
@@ -100,9 +100,9 @@ impl Run<'_> {
             return;
         }
         self.last_standing_s = Some(self.t_s);
-        for (sight, instrument) in self.model.sights.iter().enumerate() {
+        for (measurement, instrument) in self.model.sights.iter().enumerate() {
             if instrument.rate_hz.is_none() {
-                self.timeline.events.push(Event::Look { sight, t_s: self.t_s });
+                self.timeline.events.push(Event::Measurement { measurement, t_s: self.t_s });
             }
         }
     }
@@ -114,7 +114,7 @@ impl Run<'_> {
             return;
         }
         let (speed, acceleration) = self.model.pace_counts(counts);
-        let pace = Pace::of(longest, speed, self.model.ramps.then_some(acceleration));
+        let time_scale = TimeScale::of(longest, speed, self.model.ramps.then_some(acceleration));
         let before = self.phase;
         for side in Side::BOTH {
             // Whole counts.
@@ -128,17 +128,17 @@ impl Run<'_> {
             });
         }
         self.timeline.events.push(Event::Motion(Travel { counts, before, after: self.phase }));
-        self.pass(pace.duration_s, Some(&pace));
+        self.pass(time_scale.duration_s, Some(&time_scale));
     }
 
     /// Time passes, standing or moving at a pace.
-    fn pass(&mut self, duration_s: f64, pace: Option<&Pace>) {
-        self.look_until(duration_s, pace);
+    fn pass(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
+        self.look_until(duration_s, time_scale);
         self.t_s += duration_s;
     }
 
     /// Every look that an instrument takes by itself until `duration_s` from now, and the driving up to there.
-    fn look_until(&mut self, duration_s: f64, pace: Option<&Pace>) {
+    fn look_until(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
         let mut driven = 0.0;
         let mut drive_to = |share: f64, events: &mut Vec<Event>| {
             if share > driven {
@@ -148,18 +148,21 @@ impl Run<'_> {
         };
         loop {
             let next = (0..self.looks.len())
-                .filter_map(|sight| Some((f64::from(self.looks[sight]) / self.model.sights[sight].rate_hz?, sight)))
+                .filter_map(|measurement| {
+                    Some((f64::from(self.looks[measurement]) / self.model.sights[measurement].rate_hz?, measurement))
+                })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((t_s, sight)) = next.filter(|(t_s, _)| *t_s <= self.t_s + duration_s + SAME_INSTANT_S) else {
+            let Some((t_s, measurement)) = next.filter(|(t_s, _)| *t_s <= self.t_s + duration_s + SAME_INSTANT_S)
+            else {
                 break;
             };
-            self.looks[sight] += 1;
-            if let Some(pace) = pace {
-                drive_to(pace.share(t_s - self.t_s), &mut self.timeline.events);
+            self.looks[measurement] += 1;
+            if let Some(time_scale) = time_scale {
+                drive_to(time_scale.share(t_s - self.t_s), &mut self.timeline.events);
             }
-            self.timeline.events.push(Event::Look { sight, t_s });
+            self.timeline.events.push(Event::Measurement { measurement, t_s });
         }
-        if pace.is_some() {
+        if time_scale.is_some() {
             drive_to(1.0, &mut self.timeline.events);
         }
     }
@@ -167,13 +170,13 @@ impl Run<'_> {
 
 /// How a motion's travel goes by: constant speed, or a trapezoid of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Pace {
+struct TimeScale {
     duration_s: f64,
     /// Length of each ramp.
     ramp_s: f64,
 }
 
-impl Pace {
+impl TimeScale {
     /// `longest` counts at most at `speed` counts/s, up and down at `acceleration` counts/s² where there are ramps.
     fn of(longest: f64, speed: f64, acceleration: Option<f64>) -> Self {
         match acceleration {
@@ -212,24 +215,24 @@ mod tests {
     #[test]
     fn a_trapezoid_drives_all_of_its_travel_at_the_speed_that_it_says() {
         // With a top (4 s at 0.25 of 1 and ramps of 0.5 s), without, and without ramps.
-        for (pace, duration_s) in [
-            (Pace::of(1.0, 0.25, Some(0.5)), 4.5),
-            (Pace::of(0.02, 0.25, Some(0.5)), 0.4),
-            (Pace::of(1.0, 0.25, None), 4.0),
+        for (time_scale, duration_s) in [
+            (TimeScale::of(1.0, 0.25, Some(0.5)), 4.5),
+            (TimeScale::of(0.02, 0.25, Some(0.5)), 0.4),
+            (TimeScale::of(1.0, 0.25, None), 4.0),
         ] {
-            assert!((pace.duration_s - duration_s).abs() < 1e-12, "{pace:?}");
-            assert_eq!((pace.share(0.0), pace.share(pace.duration_s)), (0.0, 1.0));
-            let (steps, h) = (1000, pace.duration_s / 1000.0);
-            let shares: Vec<f64> = (0..=steps).map(|step| pace.share(f64::from(step) * h)).collect();
-            let top = 1.0 / (pace.duration_s - pace.ramp_s);
+            assert!((time_scale.duration_s - duration_s).abs() < 1e-12, "{time_scale:?}");
+            assert_eq!((time_scale.share(0.0), time_scale.share(time_scale.duration_s)), (0.0, 1.0));
+            let (steps, h) = (1000, time_scale.duration_s / 1000.0);
+            let shares: Vec<f64> = (0..=steps).map(|step| time_scale.share(f64::from(step) * h)).collect();
+            let top = 1.0 / (time_scale.duration_s - time_scale.ramp_s);
             for (step, ends) in (0..steps).zip(shares.windows(2)) {
                 let middle_s = (f64::from(step) + 0.5) * h;
-                let ramp = middle_s.min(pace.duration_s - middle_s) / pace.ramp_s;
+                let ramp = middle_s.min(time_scale.duration_s - middle_s) / time_scale.ramp_s;
                 let speed = if ramp < 1.0 { top * ramp } else { top };
                 // A step across a ramp's end is off by an eighth of the speed's change in it.
                 assert!(
-                    ((ends[1] - ends[0]) / h - speed).abs() <= 0.2 * top * h / pace.ramp_s.max(h),
-                    "{pace:?} {middle_s}"
+                    ((ends[1] - ends[0]) / h - speed).abs() <= 0.2 * top * h / time_scale.ramp_s.max(h),
+                    "{time_scale:?} {middle_s}"
                 );
             }
         }
@@ -245,7 +248,7 @@ mod tests {
         let timeline = Timeline::of(&model, &motions);
         assert_eq!(timeline.phases, Wheels::both(vec![0, 20]));
         // The grid reads at both ends only.
-        let looks: Vec<_> = timeline.events.iter().filter(|event| matches!(event, Event::Look { .. })).collect();
+        let looks: Vec<_> = timeline.events.iter().filter(|event| matches!(event, Event::Measurement { .. })).collect();
         assert_eq!(looks.len(), 2);
     }
 }

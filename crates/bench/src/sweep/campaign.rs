@@ -53,7 +53,7 @@ pub struct Campaign<'a> {
 
 /// How a campaign ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Ended {
+pub enum Outcome {
     /// With the result of all points.
     Whole(SweepResult),
     /// With a shard, in the folder, for the merge.
@@ -72,9 +72,9 @@ impl SweepPlan {
         let campaign =
             Campaign { jobs, folder: None, resume: false, shard: Shard::WHOLE, rows: false, stop: &stop, progress };
         match self.campaign(&campaign)? {
-            Ended::Whole(result) => Ok(result),
+            Outcome::Whole(result) => Ok(result),
             // Nobody stops it and there is one shard.
-            Ended::Shard | Ended::Stopped(_) => unreachable!("a whole campaign that nobody stops ends whole"),
+            Outcome::Shard | Outcome::Stopped(_) => unreachable!("a whole campaign that nobody stops ends whole"),
         }
     }
 
@@ -83,7 +83,7 @@ impl SweepPlan {
     ///
     /// # Errors
     /// As [`Self::run`]; also when the folder holds another campaign or an unfinished one that is not to be gone on with, and when it cannot be written.
-    pub fn campaign(&self, campaign: &Campaign<'_>) -> Result<Ended, BenchError> {
+    pub fn campaign(&self, campaign: &Campaign<'_>) -> Result<Outcome, BenchError> {
         let mut state = State::new(self, campaign.shard, campaign.rows)?;
         let path = campaign.folder.map(|folder| folder.join(STATE_FILE));
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
@@ -139,12 +139,12 @@ impl SweepPlan {
             state.write(path)?;
         }
         if !state.is_complete() {
-            return Ok(Ended::Stopped(self.progress(&state)));
+            return Ok(Outcome::Stopped(self.progress(&state)));
         }
         if campaign.shard != Shard::WHOLE {
-            return Ok(Ended::Shard);
+            return Ok(Outcome::Shard);
         }
-        Ok(Ended::Whole(self.result(state.finished.into_iter().map(|(_, result)| result).collect())))
+        Ok(Outcome::Whole(self.result(state.finished.into_iter().map(|(_, result)| result).collect())))
     }
 
     pub(super) fn result(&self, points: Vec<super::result::PointResult>) -> SweepResult {

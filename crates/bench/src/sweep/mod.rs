@@ -15,7 +15,7 @@ mod tally;
 mod validation;
 
 pub use accuracy::{AccuracyCheck, Comparison, FALSE_ALARM_BUDGET, compare, read_baseline};
-pub use campaign::{Campaign, Ended, Progress};
+pub use campaign::{Campaign, Outcome, Progress};
 pub use merge::{Merged, merge};
 pub use plan::{SweepOptions, SweepPlan, TRACKED};
 pub use result::{Coverage, DriftResult, EstimatorResult, MethodCost, PointResult, Quantile, SweepResult};

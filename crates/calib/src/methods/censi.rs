@@ -16,11 +16,11 @@ use motion_programs::Schedule;
 use kinematics::{Increment, Pose, Wheels, unwrap_near, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector3};
 
-use crate::estimate::{CalibError, Calibration, Covariance, Method, Mounting, Parameter, Rejected, drive, nominal};
-use crate::pose_measurements::{Look, Looks, Spacing};
+use crate::estimate::{CalibError, Calibration, Covariance, Method, Extrinsics, Parameter, Rejected, drive, nominal};
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::robust::left_of_variance;
-use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
-use estimation::WheelTrack;
+use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use estimation::WheelAngleInterpolator;
 
 /// The method with its trimming and its limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ const LEAST_COST_RATIO: f64 = 4.0;
 
 /// A displacement that the instrument saw, and how the wheels turned meanwhile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Excursion {
+pub struct DisplacementSample {
     /// The run's id.
     pub run: String,
     /// Turns of both wheels, row by row, radians.
@@ -55,7 +55,7 @@ pub struct Excursion {
     pub sensor_from_later: Pose,
 }
 
-impl Excursion {
+impl DisplacementSample {
     fn whole_rad(&self) -> Vector2<f64> {
         self.wheel_rad.iter().fold(Vector2::zeros(), |sum, rad| sum + Vector2::new(rad.left, rad.right))
     }
@@ -93,26 +93,26 @@ pub struct Solution {
 }
 
 impl CensiFit {
-    fn lengths(&self) -> Lengths {
-        Lengths { m_per_rad: self.radius_m, separation_m: self.separation_m }
+    fn geometry_parameters(&self) -> GeometryParameters {
+        GeometryParameters { m_per_rad: self.radius_m, separation_m: self.separation_m }
     }
 
-    fn reckon(&self, excursion: &Excursion) -> Reckoned {
-        let mut reckoned = Reckoned::at(Pose::IDENTITY);
-        excursion.wheel_rad.iter().for_each(|rad| reckoned.advance(&self.lengths(), *rad));
-        reckoned
+    fn reckon(&self, sample: &DisplacementSample) -> DeadReckoned {
+        let mut dead_reckoned = DeadReckoned::at(Pose::IDENTITY);
+        sample.wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&self.geometry_parameters(), *rad));
+        dead_reckoned
     }
 
     /// What the instrument should have seen: ⊖ℓ ⊕ o ⊕ ℓ.
     #[must_use]
-    pub fn predicted(&self, excursion: &Excursion) -> Pose {
-        self.body_from_sensor.inverse() * self.reckon(excursion).pose * self.body_from_sensor
+    pub fn predicted(&self, sample: &DisplacementSample) -> Pose {
+        self.body_from_sensor.inverse() * self.reckon(sample).pose * self.body_from_sensor
     }
 
     /// Predicted minus seen, in the instrument's earlier frame: x, y in metres, heading in radians.
     #[must_use]
-    pub fn residual(&self, excursion: &Excursion) -> Vector3<f64> {
-        let (predicted, seen) = (self.predicted(excursion), excursion.sensor_from_later);
+    pub fn residual(&self, sample: &DisplacementSample) -> Vector3<f64> {
+        let (predicted, seen) = (self.predicted(sample), sample.sensor_from_later);
         Vector3::new(
             predicted.x_m - seen.x_m,
             predicted.y_m - seen.y_m,
@@ -122,19 +122,19 @@ impl CensiFit {
 
     /// ∂[`Self::predicted`]/∂(left radius, right radius, separation, ℓ_x, ℓ_y, ℓ_θ).
     #[must_use]
-    pub fn jacobian(&self, excursion: &Excursion) -> Matrix3x6<f64> {
-        let Reckoned { pose, by_lengths } = self.reckon(excursion);
+    pub fn jacobian(&self, sample: &DisplacementSample) -> Matrix3x6<f64> {
+        let DeadReckoned { pose, by_geometry } = self.reckon(sample);
         let place = self.body_from_sensor;
         let sensor_from_body = rotation(-place.theta_rad);
         let turned = rotation(pose.theta_rad);
         let lever = Vector2::new(place.x_m, place.y_m);
         // The lever arm sweeps sideways as the robot turns.
         let swept = rotation(pose.theta_rad + FRAC_PI_2) * lever;
-        let by_length: Matrix2x3<f64> = by_lengths.fixed_rows::<2>(0) + swept * by_lengths.row(2);
-        let predicted = self.predicted(excursion);
+        let by_length: Matrix2x3<f64> = by_geometry.fixed_rows::<2>(0) + swept * by_geometry.row(2);
+        let predicted = self.predicted(sample);
         let mut jacobian = Matrix3x6::zeros();
         jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&(sensor_from_body * by_length));
-        jacobian.fixed_view_mut::<1, 3>(2, 0).copy_from(&by_lengths.row(2));
+        jacobian.fixed_view_mut::<1, 3>(2, 0).copy_from(&by_geometry.row(2));
         jacobian.fixed_view_mut::<2, 2>(0, 3).copy_from(&(sensor_from_body * (turned - Matrix2::identity())));
         jacobian.fixed_view_mut::<2, 1>(0, 5).copy_from(&Vector2::new(predicted.y_m, -predicted.x_m));
         jacobian
@@ -144,12 +144,12 @@ impl CensiFit {
     #[must_use]
     pub fn information<'e>(
         &self,
-        excursions: impl Iterator<Item = &'e Excursion>,
+        samples: impl Iterator<Item = &'e DisplacementSample>,
         sigma: Vector3<f64>,
     ) -> Matrix6<f64> {
         let weight = Matrix3::from_diagonal(&sigma.map(|sigma| 1.0 / (sigma * sigma)));
-        excursions.fold(Matrix6::zeros(), |sum, excursion| {
-            let jacobian = self.jacobian(excursion);
+        samples.fold(Matrix6::zeros(), |sum, sample| {
+            let jacobian = self.jacobian(sample);
             sum + jacobian.transpose() * weight * jacobian
         })
     }
@@ -173,8 +173,8 @@ impl Censi {
 
     /// What the instrument saw in all sessions: displacements where a run has them, else pairs of poses that follow each other.
     #[must_use]
-    pub fn excursions(&self, sessions: &[Session<'_>]) -> Vec<Excursion> {
-        let mut excursions = Vec::new();
+    pub fn samples(&self, sessions: &[Session<'_>]) -> Vec<DisplacementSample> {
+        let mut samples = Vec::new();
         for session in sessions {
             let Ok(geometry) = session.robot.geometry() else { continue };
             let nominal = CensiFit {
@@ -183,39 +183,39 @@ impl Censi {
                 body_from_sensor: Pose::IDENTITY,
             };
             for run in &session.runs {
-                let Some(track) = WheelTrack::of(run, session.robot) else { continue };
+                let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
                 if run.run().displacements.is_empty() {
                     let spacing = Spacing { every_m: self.least_distance_m, every_rad: self.least_turn_rad };
-                    let Some(looks) = Looks::at(run, &track, &geometry, spacing) else { continue };
-                    let mut before = looks.start;
-                    excursions.extend(looks.later.into_iter().filter_map(|Look { wheel_rad, pose }| {
+                    let Some(measurements) = PoseMeasurements::at(run, &track, &geometry, spacing) else { continue };
+                    let mut before = measurements.start;
+                    samples.extend(measurements.later.into_iter().filter_map(|PoseMeasurement { wheel_rad, pose }| {
                         let seen = before.to(pose);
                         before = pose;
-                        excursion(run, &nominal, wheel_rad, seen)
+                        sample(run, &nominal, wheel_rad, seen)
                     }));
                 } else {
-                    excursions.extend(run.run().displacements.iter().filter_map(|seen| {
+                    samples.extend(run.run().displacements.iter().filter_map(|seen| {
                         let later = Pose::new(seen.dx_m, seen.dy_m, seen.dtheta_rad);
-                        excursion(run, &nominal, track.steps(seen.t0_s, seen.t1_s)?, later)
+                        sample(run, &nominal, track.steps(seen.t0_s, seen.t1_s)?, later)
                     }));
                 }
             }
         }
-        excursions
+        samples
     }
 
     /// Fits, drops the worst and fits again, as often as [`Self::rounds`] says.
     ///
     /// # Errors
     /// [`CalibError`] when the excursions do not determine the parameters.
-    pub fn trimmed(&self, excursions: &[Excursion]) -> Result<Trimmed, CalibError> {
-        let mut kept = vec![true; excursions.len()];
+    pub fn trimmed(&self, samples: &[DisplacementSample]) -> Result<Trimmed, CalibError> {
+        let mut kept = vec![true; samples.len()];
         let mut dropped = (0, 0);
         for _ in 0..self.rounds {
-            let [Solution { fit, .. }, _] = solutions(&mut among(excursions, &kept).map(|(_, excursion)| excursion))?;
-            let errors: Vec<(usize, f64, f64)> = among(excursions, &kept)
-                .map(|(index, excursion)| {
-                    let residual = fit.residual(excursion);
+            let [Solution { fit, .. }, _] = solutions(&mut among(samples, &kept).map(|(_, sample)| sample))?;
+            let errors: Vec<(usize, f64, f64)> = among(samples, &kept)
+                .map(|(index, sample)| {
+                    let residual = fit.residual(sample);
                     (index, residual.x.hypot(residual.y), residual.z.abs())
                 })
                 .collect();
@@ -232,7 +232,7 @@ impl Censi {
                 dropped.1 += usize::from(error_rad > limit_rad);
             }
         }
-        let [cheap, dear] = solutions(&mut among(excursions, &kept).map(|(_, excursion)| excursion))?;
+        let [cheap, dear] = solutions(&mut among(samples, &kept).map(|(_, sample)| sample))?;
         if dear.cost_m2 <= LEAST_COST_RATIO * cheap.cost_m2.max(0.0) {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
@@ -240,52 +240,52 @@ impl Censi {
                 why: "the instrument sees no translation that stands out from its error; add straight runs".to_owned(),
             });
         }
-        let share = |count: usize| count as f64 / excursions.len() as f64;
+        let share = |count: usize| count as f64 / samples.len() as f64;
         Ok(Trimmed { fit: cheap.fit, kept, dropped: (share(dropped.0), share(dropped.1)) })
     }
 }
 
-fn excursion(run: &RunView<'_>, nominal: &CensiFit, wheel_rad: Vec<Wheels<f64>>, seen: Pose) -> Option<Excursion> {
-    let mut excursion = Excursion { run: run.info().id.clone(), wheel_rad, sensor_from_later: seen };
+fn sample(run: &RunView<'_>, nominal: &CensiFit, wheel_rad: Vec<Wheels<f64>>, seen: Pose) -> Option<DisplacementSample> {
+    let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: seen };
     // Standing still says nothing, and its small errors would make those of motion look like outliers.
-    if excursion.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
+    if sample.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
         return None;
     }
     // Whole turns come from the wheels.
-    let about_rad = nominal.reckon(&excursion).pose.theta_rad;
-    excursion.sensor_from_later.theta_rad = unwrap_near(seen.theta_rad, about_rad);
-    Some(excursion)
+    let about_rad = nominal.reckon(&sample).pose.theta_rad;
+    sample.sensor_from_later.theta_rad = unwrap_near(seen.theta_rad, about_rad);
+    Some(sample)
 }
 
-fn among<'e>(excursions: &'e [Excursion], kept: &'e [bool]) -> impl Iterator<Item = (usize, &'e Excursion)> {
-    excursions.iter().enumerate().filter(|(index, _)| kept[*index])
+fn among<'e>(samples: &'e [DisplacementSample], kept: &'e [bool]) -> impl Iterator<Item = (usize, &'e DisplacementSample)> {
+    samples.iter().enumerate().filter(|(index, _)| kept[*index])
 }
 
 /// Both stationary solutions of the constrained least squares, the cheaper one first.
 ///
 /// # Errors
 /// [`CalibError`] when the excursions do not determine the parameters.
-pub fn solutions<'e>(excursions: &mut (dyn Iterator<Item = &'e Excursion> + '_)) -> Result<[Solution; 2], CalibError> {
+pub fn solutions<'e>(samples: &mut (dyn Iterator<Item = &'e DisplacementSample> + '_)) -> Result<[Solution; 2], CalibError> {
     // First the turns, linear in J₂₁ and J₂₂.
-    let excursions: Vec<&Excursion> = excursions.collect();
+    let samples: Vec<&DisplacementSample> = samples.collect();
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-    for excursion in &excursions {
-        let whole_rad = excursion.whole_rad();
+    for sample in &samples {
+        let whole_rad = sample.whole_rad();
         normal += whole_rad * whole_rad.transpose();
-        right += whole_rad * excursion.sensor_from_later.theta_rad;
+        right += whole_rad * sample.sensor_from_later.theta_rad;
     }
     excited(&normal)?;
     let turn_by_rad: Vector2<f64> = normal.lu().solve(&right).unwrap_or_default();
     // Then the rest. A robot with a separation of 1 and these turns moves by o/b.
-    let unit = Lengths { m_per_rad: Wheels { left: -turn_by_rad.x, right: turn_by_rad.y }, separation_m: 1.0 };
+    let unit = GeometryParameters { m_per_rad: Wheels { left: -turn_by_rad.x, right: turn_by_rad.y }, separation_m: 1.0 };
     let (mut place, mut mixed, mut heading) = (Matrix3::zeros(), Matrix3x2::zeros(), Matrix2::zeros());
-    for excursion in &excursions {
-        let by_separation = excursion.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
+    for sample in &samples {
+        let by_separation = sample.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
             let travel = unit.m_per_rad.zip_with(*rad, |m_per_rad, rad| m_per_rad * rad);
             pose * Increment::from_travel(travel, unit.separation_m).arc()
         });
         let (sin, cos) = by_separation.theta_rad.sin_cos();
-        let seen = excursion.sensor_from_later;
+        let seen = sample.sensor_from_later;
         let rows = Matrix2x3::new(-by_separation.x_m, 1.0 - cos, sin, -by_separation.y_m, -sin, 1.0 - cos);
         let turned = Matrix2::new(seen.x_m, -seen.y_m, seen.y_m, seen.x_m);
         place += rows.transpose() * rows;
@@ -293,16 +293,16 @@ pub fn solutions<'e>(excursions: &mut (dyn Iterator<Item = &'e Excursion> + '_))
         heading += turned.transpose() * turned;
     }
     let eigenvalues = place.symmetric_eigenvalues();
-    let unseen = CalibError::Unobservable {
+    let unobservable = CalibError::Unobservable {
         method: Censi::NAME,
         parameter: Parameter::SensorX,
-        why: "between two looks the robot turns by nothing or by whole turns only; add looks after quarter turns"
+        why: "between two looks the robot turns by nothing or by whole turns only; add measurements after quarter turns"
             .to_owned(),
     };
     if eigenvalues.min() * LARGEST_PLACE_CONDITION <= eigenvalues.max() {
-        return Err(unseen);
+        return Err(unobservable);
     }
-    let inverse = place.try_inverse().ok_or(unseen)?;
+    let inverse = place.try_inverse().ok_or(unobservable)?;
     // With (b, ℓ_x, ℓ_y) at their best for a heading, the cost is a quadratic form in (cos, sin); its eigenvectors are the stationary solutions, the multiplier of the
     // print is minus the eigenvalue.
     let form = heading - mixed.transpose() * inverse * mixed;
@@ -336,7 +336,7 @@ fn excited(normal: &Matrix2<f64>) -> Result<(), CalibError> {
         return Ok(());
     }
     if eigen.eigenvalues[strong] <= 0.0 {
-        return Err(not_applicable("the wheels do not turn between two looks of the instrument"));
+        return Err(not_applicable("the wheels do not turn between two measurements of the instrument"));
     }
     let proportion = eigen.eigenvectors.column(strong);
     let (left, right) = (proportion[0], proportion[1]);
@@ -370,16 +370,16 @@ impl Method for Censi {
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, _) = nominal(Self::NAME, sessions)?;
-        let excursions = self.excursions(sessions);
-        if excursions.is_empty() {
+        let samples = self.samples(sessions);
+        if samples.is_empty() {
             return Err(not_applicable(
                 "no run has displacements (displacement.csv) or two poses (truth.csv with headings, or two marked points) while the wheels turn",
             ));
         }
-        let Trimmed { fit, kept, dropped } = self.trimmed(&excursions)?;
+        let Trimmed { fit, kept, dropped } = self.trimmed(&samples)?;
         let mut by_run: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
-        for (excursion, kept) in excursions.iter().zip(&kept) {
-            let (all, lost) = by_run.entry(&excursion.run).or_default();
+        for (sample, kept) in samples.iter().zip(&kept) {
+            let (all, lost) = by_run.entry(&sample.run).or_default();
             *all += 1;
             *lost += usize::from(!kept);
         }
@@ -392,7 +392,7 @@ impl Method for Censi {
             })
             .collect();
 
-        let covariance = covariance(&fit, &excursions, &kept, dropped);
+        let covariance = covariance(&fit, &samples, &kept, dropped);
         let block = |covariance: &Matrix6<f64>| {
             let mut scale = Matrix3::identity();
             scale[(0, 0)] = 2.0; // radii to diameters
@@ -403,7 +403,7 @@ impl Method for Censi {
         let geometry = drive(Self::NAME, fit.radius_m.map(|radius_m| 2.0 * radius_m), fit.separation_m)?;
         Ok(Calibration {
             covariance: covariance.as_ref().map(block),
-            mounting: Some(Mounting {
+            extrinsics: Some(Extrinsics {
                 body_from_sensor: fit.body_from_sensor,
                 covariance: covariance.map(|covariance| covariance.fixed_view::<3, 3>(3, 3).into_owned()),
             }),
@@ -415,9 +415,9 @@ impl Method for Censi {
 }
 
 /// Inverse Fisher information with the instrument's error as the kept residuals show it, made up for what trimming took of them.
-fn covariance(fit: &CensiFit, excursions: &[Excursion], kept: &[bool], dropped: (f64, f64)) -> Option<Matrix6<f64>> {
-    let (sum, count) = among(excursions, kept).fold((Vector3::zeros(), 0.0), |(sum, count), (_, excursion)| {
-        let residual = fit.residual(excursion);
+fn covariance(fit: &CensiFit, samples: &[DisplacementSample], kept: &[bool], dropped: (f64, f64)) -> Option<Matrix6<f64>> {
+    let (sum, count) = among(samples, kept).fold((Vector3::zeros(), 0.0), |(sum, count), (_, sample)| {
+        let residual = fit.residual(sample);
         (sum + residual.component_mul(&residual), count + 1.0)
     });
     // Three readings an excursion, six parameters.
@@ -429,7 +429,7 @@ fn covariance(fit: &CensiFit, excursions: &[Excursion], kept: &[bool], dropped: 
     let var = (sum / degrees_of_freedom).component_div(&Vector3::new(plane, plane, axis));
     // Errors below a picometre are arithmetic's.
     let sigma = var.map(|var| var.sqrt().max(1e-12));
-    fit.information(among(excursions, kept).map(|(_, excursion)| excursion), sigma).try_inverse()
+    fit.information(among(samples, kept).map(|(_, sample)| sample), sigma).try_inverse()
 }
 
 #[cfg(test)]
@@ -443,15 +443,15 @@ mod tests {
     };
 
     /// What the instrument sees of these wheel turns, row by row.
-    fn seen(fit: &CensiFit, wheel_rad: &[(f64, f64)]) -> Excursion {
+    fn seen(fit: &CensiFit, wheel_rad: &[(f64, f64)]) -> DisplacementSample {
         let wheel_rad = wheel_rad.iter().map(|&(left, right)| Wheels { left, right }).collect();
-        let mut excursion = Excursion { run: "run".to_owned(), wheel_rad, sensor_from_later: Pose::IDENTITY };
-        excursion.sensor_from_later = fit.predicted(&excursion);
-        excursion
+        let mut sample = DisplacementSample { run: "run".to_owned(), wheel_rad, sensor_from_later: Pose::IDENTITY };
+        sample.sensor_from_later = fit.predicted(&sample);
+        sample
     }
 
     /// Straights and turns both ways, bent in themselves.
-    fn excursions(fit: &CensiFit) -> Vec<Excursion> {
+    fn samples(fit: &CensiFit) -> Vec<DisplacementSample> {
         let turns: [&[(f64, f64)]; 6] = [
             &[(3.0, 3.1), (2.0, 1.0)],
             &[(-2.0, 2.0)],
@@ -482,7 +482,7 @@ mod tests {
     fn without_errors_the_cheaper_solution_is_the_robot_and_the_other_one_is_not() {
         for theta_rad in [0.4, -1.6, 3.1] {
             let truth = CensiFit { body_from_sensor: Pose::new(0.12, -0.05, theta_rad), ..TRUTH };
-            let [cheap, dear] = solutions(&mut excursions(&truth).iter()).expect("excited");
+            let [cheap, dear] = solutions(&mut samples(&truth).iter()).expect("excited");
             // Normal equations of a condition of about 10 twice over: a hundred roundings.
             assert!(off(&cheap.fit, &truth) < 1e-13, "{cheap:?}");
             assert!(off(&dear.fit, &truth) > 0.1 && dear.cost_m2 > 1e-2 && cheap.cost_m2 < 1e-12, "{dear:?}");
@@ -491,10 +491,10 @@ mod tests {
 
     #[test]
     fn an_interval_taken_for_one_arc_would_not_pass() {
-        let mut whole = excursions(&TRUTH);
-        for excursion in &mut whole {
-            let sum = excursion.whole_rad();
-            excursion.wheel_rad = vec![Wheels { left: sum.x, right: sum.y }];
+        let mut whole = samples(&TRUTH);
+        for sample in &mut whole {
+            let sum = sample.whole_rad();
+            sample.wheel_rad = vec![Wheels { left: sum.x, right: sum.y }];
         }
         let [cheap, _] = solutions(&mut whole.iter()).expect("excited");
         assert!(off(&cheap.fit, &TRUTH) > 1e-2);
@@ -503,8 +503,8 @@ mod tests {
     #[test]
     fn the_jacobian_is_the_derivative_and_would_not_pass_wrong() {
         let h = 1e-6;
-        for excursion in excursions(&TRUTH) {
-            let jacobian = TRUTH.jacobian(&excursion);
+        for sample in samples(&TRUTH) {
+            let jacobian = TRUTH.jacobian(&sample);
             for column in 0..6 {
                 let moved = |by: f64| {
                     let mut fit = TRUTH;
@@ -517,7 +517,7 @@ mod tests {
                         &mut place.y_m,
                         &mut place.theta_rad,
                     ][column] += by;
-                    let Pose { x_m, y_m, theta_rad } = fit.predicted(&excursion);
+                    let Pose { x_m, y_m, theta_rad } = fit.predicted(&sample);
                     Vector3::new(x_m, y_m, theta_rad)
                 };
                 let difference = (moved(h) - moved(-h)) / (2.0 * h);
@@ -529,8 +529,8 @@ mod tests {
         }
     }
 
-    fn message(excursions: &[Excursion]) -> String {
-        solutions(&mut excursions.iter()).expect_err("not excited").to_string()
+    fn message(samples: &[DisplacementSample]) -> String {
+        solutions(&mut samples.iter()).expect_err("not excited").to_string()
     }
 
     #[test]
@@ -552,7 +552,7 @@ mod tests {
 
     #[test]
     fn the_worst_in_position_or_heading_go_each_round() {
-        let mut all: Vec<Excursion> = (0..40).flat_map(|_| excursions(&TRUTH)).collect();
+        let mut all: Vec<DisplacementSample> = (0..40).flat_map(|_| samples(&TRUTH)).collect();
         all[7].sensor_from_later.x_m += 0.3;
         all[11].sensor_from_later.theta_rad += 0.3;
         let trimmed = Censi::DEFAULT.trimmed(&all).expect("excited");

@@ -20,7 +20,7 @@ use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
-use estimation::WheelTrack;
+use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,14 +43,14 @@ const SETTLED: f64 = 1e-13;
 
 /// An arc of constant wheel ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Leg {
+struct PropagationInterval {
     /// Signed radius, metres: positive counter-clockwise.
     radius_m: f64,
     /// Turn of each wheel, radians.
     wheel_rad: Wheels<f64>,
 }
 
-impl Leg {
+impl PropagationInterval {
     /// What the radius should be, metres, with its slopes over e and B.
     fn predicted(&self, ratio: f64, separation_m: f64) -> (f64, Vector2<f64>) {
         let Wheels { left, right } = self.wheel_rad;
@@ -71,8 +71,8 @@ pub fn base_and_ratio(ccw: (f64, f64), cw: (f64, f64)) -> Option<(f64, f64)> {
     let (half, free) = ((r_ccw_m + r_cw_m) * (product + 1.0), product - 1.0);
     let root = (half * half - 4.0 * r_ccw_m * r_cw_m * free * free).sqrt();
     let base_m = 4.0 * r_ccw_m * r_cw_m * free / (half + root);
-    let bend = |radius_m: f64| (2.0 * radius_m + base_m) / (2.0 * radius_m - base_m);
-    let ratio = (bend(r_ccw_m) / bend(r_cw_m) * q_cw / q_ccw).sqrt();
+    let curvature = |radius_m: f64| (2.0 * radius_m + base_m) / (2.0 * radius_m - base_m);
+    let ratio = (curvature(r_ccw_m) / curvature(r_cw_m) * q_cw / q_ccw).sqrt();
     (base_m > 0.0 && ratio.is_finite()).then_some((base_m, ratio))
 }
 
@@ -94,7 +94,7 @@ struct Reading {
 }
 
 fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Option<Vec<Reading>> {
-    let track = WheelTrack::of(run, robot)?;
+    let track = WheelAngleInterpolator::of(run, robot)?;
     let (mut readings, mut last_s, mut wheel_rad) = (Vec::new(), None, Wheels::both(0.0));
     for (t_s, pose) in run.observed_poses() {
         let Some(steps) = track.steps(last_s.unwrap_or(t_s), t_s) else { continue };
@@ -108,7 +108,7 @@ fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -
 }
 
 /// The legs of one run; or why it has none.
-fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<Leg>, &'static str> {
+fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<PropagationInterval>, &'static str> {
     let readings = readings(run, robot, geometry).ok_or("the run has no odometry")?;
     let (mut legs, mut bent, mut end) = (Vec::new(), false, 0);
     for (start, first) in readings.iter().enumerate() {
@@ -133,7 +133,7 @@ fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Re
         }
         let wheel_rad = turned(first, last);
         let forward = (wheel_rad.left + wheel_rad.right).signum();
-        legs.push(Leg { radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine), wheel_rad });
+        legs.push(PropagationInterval { radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine), wheel_rad });
     }
     match (legs.is_empty(), bent) {
         (false, _) => Ok(legs),
@@ -218,7 +218,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(runs: &[Vec<Leg>], nominal_separation_m: f64) -> Self {
+    fn of(runs: &[Vec<PropagationInterval>], nominal_separation_m: f64) -> Self {
         let mut fit = Self { ratio: 1.0, separation_m: nominal_separation_m, settled: false };
         for _ in 0..ROUNDS {
             let (normal, right) = fit.normal(runs);
@@ -234,7 +234,7 @@ impl Fit {
     }
 
     /// The normal equations' matrix and right side.
-    fn normal<'l>(&self, legs: impl IntoIterator<Item = &'l Vec<Leg>>) -> (Matrix2<f64>, Vector2<f64>) {
+    fn normal<'l>(&self, legs: impl IntoIterator<Item = &'l Vec<PropagationInterval>>) -> (Matrix2<f64>, Vector2<f64>) {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for leg in legs.into_iter().flatten() {
             let (predicted_m, slope) = leg.predicted(self.ratio, self.separation_m);
@@ -245,7 +245,7 @@ impl Fit {
     }
 
     /// Covariance of e and B from the scatter between the runs, which have one equation each for two unknowns.
-    fn covariance(&self, runs: &[Vec<Leg>]) -> Option<DMatrix<f64>> {
+    fn covariance(&self, runs: &[Vec<PropagationInterval>]) -> Option<DMatrix<f64>> {
         let dynamic = |matrix: Matrix2<f64>| DMatrix::from_column_slice(2, 2, matrix.as_slice());
         let (normal, _) = self.normal(runs);
         let scores: Vec<_> =
@@ -258,10 +258,10 @@ impl Fit {
 mod tests {
     use super::*;
 
-    fn leg(radius_m: f64, ratio: f64, separation_m: f64) -> Leg {
+    fn leg(radius_m: f64, ratio: f64, separation_m: f64) -> PropagationInterval {
         // A quarter turn on wheels of 1/(e + 1) and e/(e + 1) metres a radian.
         let arc = |side: f64| (radius_m + side * 0.5 * separation_m) * 1.5;
-        Leg { radius_m, wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio } }
+        PropagationInterval { radius_m, wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio } }
     }
 
     #[test]
@@ -289,7 +289,7 @@ mod tests {
             assert!((fit.ratio - ratio).abs() < 1e-12 && (fit.separation_m - base_m).abs() < 1e-12);
         }
         // Backward: both turns and the sign of the path change, the radius does not.
-        let backward = Leg { wheel_rad: runs[0][0].wheel_rad.map(|rad| -rad), ..runs[0][0] };
+        let backward = PropagationInterval { wheel_rad: runs[0][0].wheel_rad.map(|rad| -rad), ..runs[0][0] };
         assert_eq!(backward.predicted(ratio, base_m).0, runs[0][0].predicted(ratio, base_m).0);
     }
 

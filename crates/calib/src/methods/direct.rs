@@ -13,7 +13,7 @@ use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
-use crate::pose_measurements::Ends;
+use crate::pose_measurements::ConvergenceCriterion;
 use crate::robust::{MedianMad, Summary, mean};
 
 /// The method with its outlier rule.
@@ -92,13 +92,13 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         })
     }
 
-    /// The wheels' turns between the first and the last look, and the marks then.
+    /// The wheels' turns between the first and the last measurement, and the marks then.
     fn measured(&self, run: &RunView<'_>) -> Result<Option<(Wheels<f64>, Marks)>, CalibError> {
         let half_m = 0.5 * self.geometry.wheel_separation_m();
         let readings = &run.run().point_readings;
         if readings.is_empty() {
             // Poses: the contacts themselves are the marks. What the wheels turned before and after was not seen.
-            return Ok(Ends::of(run, self.session.robot, &self.geometry).map(|ends| {
+            return Ok(ConvergenceCriterion::of(run, self.session.robot, &self.geometry).map(|ends| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
                 let (start, end) = (contacts.map(|p| ends.start * p), contacts.map(|p| ends.end * p));
                 (ends.turned_rad(), Marks { start, end, outside_m: Wheels::both(0.0) })

@@ -16,10 +16,10 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
-use crate::pose_measurements::{Look, Looks, Spacing};
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::robust::Summary;
-use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
-use estimation::WheelTrack;
+use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,12 +55,12 @@ struct Straight {
 
 impl Straight {
     /// What is missing to the end that was seen, and the slopes of the reckoned end over r_L and r_R and over B.
-    fn missing(&self, at: &Lengths) -> (Vector2<f64>, Matrix2<f64>, Vector2<f64>) {
-        let mut end = Reckoned::at(Pose::IDENTITY);
+    fn missing(&self, at: &GeometryParameters) -> (Vector2<f64>, Matrix2<f64>, Vector2<f64>) {
+        let mut end = DeadReckoned::at(Pose::IDENTITY);
         for step in &self.steps_rad {
             end.advance(at, *step);
         }
-        let slopes = end.by_lengths.fixed_rows::<2>(0);
+        let slopes = end.by_geometry.fixed_rows::<2>(0);
         let missing_m = self.seen_m - Vector2::new(end.pose.x_m, end.pose.y_m);
         (missing_m, slopes.fixed_columns::<2>(0).into_owned(), slopes.column(2).into_owned())
     }
@@ -76,7 +76,7 @@ struct Spin {
 
 impl Spin {
     /// B θ by the wheels (metres) and θ with its whole turns (radians).
-    fn of_wheels(&self, at: &Lengths) -> (f64, f64) {
+    fn of_wheels(&self, at: &GeometryParameters) -> (f64, f64) {
         let travel_m = self.wheel_rad.right * at.m_per_rad.right - self.wheel_rad.left * at.m_per_rad.left;
         (travel_m, unwrap_near(self.seen_rad, travel_m / at.separation_m))
     }
@@ -91,7 +91,7 @@ struct Step1 {
 }
 
 impl Step1 {
-    fn of(straights: &[Straight], at: &Lengths) -> Option<Self> {
+    fn of(straights: &[Straight], at: &GeometryParameters) -> Option<Self> {
         let (mut normal, mut asked, mut by_base) = (Matrix2::zeros(), Vector2::zeros(), Vector2::zeros());
         let mut scores = Vec::with_capacity(straights.len());
         for straight in straights {
@@ -108,7 +108,7 @@ impl Step1 {
 }
 
 /// Step 2: the wheelbase of one direction, metres, by the least squares of the heading over its gain; `None` without spins that way.
-fn separation_m(spins: &[Spin], at: &Lengths, sign: f64) -> Option<f64> {
+fn separation_m(spins: &[Spin], at: &GeometryParameters, sign: f64) -> Option<f64> {
     let of_way = spins.iter().map(|spin| spin.of_wheels(at)).filter(|(_, turn_rad)| turn_rad * sign > 0.0);
     let (squares, products) = of_way.fold((0.0, 0.0), |(squares, products), (travel_m, turn_rad)| {
         (squares + travel_m * travel_m, products + travel_m * turn_rad)
@@ -116,13 +116,13 @@ fn separation_m(spins: &[Spin], at: &Lengths, sign: f64) -> Option<f64> {
     (products > 0.0).then_some(squares / products)
 }
 
-fn mean_m(spins: &[Spin], at: &Lengths) -> Option<f64> {
+fn mean_m(spins: &[Spin], at: &GeometryParameters) -> Option<f64> {
     let ways: Vec<f64> = [1.0, -1.0].into_iter().filter_map(|sign| separation_m(spins, at, sign)).collect();
     (!ways.is_empty()).then(|| ways.iter().sum::<f64>() / ways.len() as f64)
 }
 
 /// Covariance of r_L, r_R and B. Each step's own scatter, and each step's answer moves with the other's.
-fn covariance(step: &Step1, spins: &[Spin], at: &Lengths) -> Option<Matrix3<f64>> {
+fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<Matrix3<f64>> {
     let normal = DMatrix::from_column_slice(2, 2, step.normal.as_slice());
     let radii = scatter_between_runs(&normal, &step.scores, 1)?;
     let (mut base_var, mut base_by, mut ways) = (0.0, Vector2::zeros(), 0.0);
@@ -156,10 +156,10 @@ fn covariance(step: &Step1, spins: &[Spin], at: &Lengths) -> Option<Matrix3<f64>
 
 /// The first and the last look at a run within its log, and how the wheels turned in between, row by row; `None` without two.
 ///
-/// The wheels are taken at the looks' instants: an instrument that stops looking before the log ends has not seen what they turned since.
-fn whole(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<(Pose, Look)> {
-    let looks = Looks::at(run, &WheelTrack::of(run, robot)?, nominal, Spacing::ENDS)?;
-    let Looks { start, mut later, .. } = looks;
+/// The wheels are taken at the measurements' instants: an instrument that stops looking before the log ends has not seen what they turned since.
+fn whole(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<(Pose, PoseMeasurement)> {
+    let measurements = PoseMeasurements::at(run, &WheelAngleInterpolator::of(run, robot)?, nominal, Spacing::ENDS)?;
+    let PoseMeasurements { start, mut later, .. } = measurements;
     Some((start, later.pop()?))
 }
 
@@ -183,11 +183,11 @@ impl Method for Ivanjko {
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
         let (mut straights, mut spins) = (Vec::new(), Vec::new());
-        let mut at = Lengths { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
+        let mut at = GeometryParameters { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
         for session in sessions {
             for run in &session.runs {
                 let Some((start, end)) = whole(run, session.robot, &geometry) else { continue };
-                let Look { wheel_rad: steps_rad, pose: end } = end;
+                let PoseMeasurement { wheel_rad: steps_rad, pose: end } = end;
                 let sum = |sum: Wheels<f64>, step: &Wheels<f64>| sum.zip_with(*step, |sum, step| sum + step);
                 let wheel_rad = steps_rad.iter().fold(Wheels::both(0.0), sum);
                 match run.info().protocol {

@@ -9,13 +9,13 @@
 
 use dataset::{Blocks, DatasetError, Session, Warning};
 use motion_programs::Schedule;
-use estimation::{Apart, Column, FitSettings, JointFit, LargeFit, Model, OneStepError, fit_large};
+use estimation::{Grouping, Column, FitSettings, ModelFit, LargeFit, Model, OneStepError, fit_large};
 use kinematics::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::dead_reckoning_jacobian::unseen;
+use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Method, Mounting, NotObservable, OwnInstrument, Rejected, drive, nominal,
+    CalibError, Calibration, Covariance, Method, Extrinsics, NotObservable, GroupInstrument, Rejected, drive, nominal,
 };
 
 /// The method with the settings of its fit.
@@ -90,7 +90,7 @@ impl Method for Joint {
 }
 
 /// The fit as a calibration of sessions with these names.
-fn calibration(fit: &JointFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
+fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
     let Model { m_per_rad, separation_m, .. } = fit.fit.model;
     let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
     let covariance = fit.covariance(&mut []);
@@ -99,9 +99,9 @@ fn calibration(fit: &JointFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
     let at = |column: Column| fit.columns.iter().position(|of| *of == column);
     let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
     let instrument = fit.mean_instrument();
-    let mounting = fit.has(Column::MountX).then(|| Mounting {
+    let extrinsics = fit.has(Column::SensorX).then(|| Extrinsics {
         body_from_sensor: instrument.body_from_sensor,
-        covariance: at(Column::MountX)
+        covariance: at(Column::SensorX)
             .filter(|_| covariance.is_some())
             .map(|first| Matrix3::from_fn(|i, j| var(first + i, first + j).unwrap_or(f64::NAN))),
     });
@@ -110,9 +110,9 @@ fn calibration(fit: &JointFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
         covariance: covariance
             .as_ref()
             .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
-        mounting,
+        extrinsics,
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
-        own_instruments: own_instruments(fit, names),
+        group_instruments: group_instruments(fit, names),
         not_observable: not_observable(fit),
         runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         runs_rejected: rejected(fit),
@@ -123,18 +123,18 @@ fn calibration(fit: &JointFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
 
 /// What the measurements do not determine of the geometry.
 #[must_use]
-pub fn not_observable(fit: &JointFit<'_>) -> Vec<NotObservable> {
-    fit.unseen
+pub fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
+    fit.unobservable
         .iter()
         .map(|direction| {
-            let (parameter, why) = unseen(&Vector3::new(direction[0], direction[1], direction[2]));
+            let (parameter, why) = unobservable(&Vector3::new(direction[0], direction[1], direction[2]));
             NotObservable { parameter, why }
         })
         .collect()
 }
 
 /// Runs without use and runs of which no measurement fitted.
-fn rejected(fit: &JointFit<'_>) -> Vec<Rejected> {
+fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
     let id = |run: (usize, usize)| fit.records.ids[run.0][run.1].clone();
     let unused = fit.records.unused.iter().map(|run| Rejected {
         run: id(*run),
@@ -148,14 +148,14 @@ fn rejected(fit: &JointFit<'_>) -> Vec<Rejected> {
 }
 
 /// The instruments of groups, by the sessions' names.
-fn own_instruments(fit: &JointFit<'_>, names: &[&str]) -> Vec<OwnInstrument> {
+fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
     let Some(own) = &fit.fit.model.own else { return Vec::new() };
     let name = |(session, run): (usize, usize)| {
         let session_name = names[session].to_owned();
-        match own.apart {
-            Apart::Session => session_name,
-            Apart::Run if names.len() == 1 => fit.records.ids[session][run].clone(),
-            Apart::Run => format!("{session_name}/{}", fit.records.ids[session][run]),
+        match own.grouping {
+            Grouping::Session => session_name,
+            Grouping::Run if names.len() == 1 => fit.records.ids[session][run].clone(),
+            Grouping::Run => format!("{session_name}/{}", fit.records.ids[session][run]),
         }
     };
     own.of
@@ -163,11 +163,11 @@ fn own_instruments(fit: &JointFit<'_>, names: &[&str]) -> Vec<OwnInstrument> {
         .map(|(group, instrument)| {
             let shown = |column: Column, value: f64| fit.shows(*group, column).then_some(value);
             let Pose { x_m, y_m, theta_rad } = instrument.body_from_sensor;
-            OwnInstrument {
+            GroupInstrument {
                 of: name(*group),
-                sensor_x_m: shown(Column::MountX, x_m),
-                sensor_y_m: shown(Column::MountY, y_m),
-                sensor_theta_rad: shown(Column::MountTheta, theta_rad),
+                sensor_x_m: shown(Column::SensorX, x_m),
+                sensor_y_m: shown(Column::SensorY, y_m),
+                sensor_theta_rad: shown(Column::SensorTheta, theta_rad),
                 latency_s: shown(Column::Latency, instrument.latency_s),
             }
         })

@@ -17,7 +17,7 @@ use motion_programs::Schedule;
 use kinematics::{Wheels, wrap_to_pi};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::Ends;
+use crate::pose_measurements::ConvergenceCriterion;
 use crate::robust::Summary;
 
 /// The method; it has nothing to choose.
@@ -57,7 +57,7 @@ impl Method for JungChung {
             for run in &session.runs {
                 let of_way = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
                 let Some((_, errors_rad)) = of_way else { continue };
-                let Some(ends) = Ends::of(run, session.robot, &geometry) else { continue };
+                let Some(ends) = ConvergenceCriterion::of(run, session.robot, &geometry) else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
@@ -67,7 +67,7 @@ impl Method for JungChung {
                         "its squares must all have the same side_m; calibrate them apart",
                     ));
                 }
-                // The wheels at the looks' instants: what they turned after the last one was not seen.
+                // The wheels at the measurements' instants: what they turned after the last one was not seen.
                 let turned_m = ends.turned_rad().zip_with(geometry.m_per_rad(), |rad, m_per_rad| m_per_rad * rad);
                 let reckoned_rad = geometry.increment(turned_m).turn_rad;
                 errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - reckoned_rad));

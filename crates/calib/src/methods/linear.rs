@@ -17,7 +17,7 @@ use kinematics::{DriveGeometry, Pose, Side, Wheels, sinc, unwrap_near};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use estimation::WheelTrack;
+use estimation::WheelAngleInterpolator;
 
 /// How many parameters the model has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub enum Form {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Readings {
     /// Its last pose seen from its first, where the robot stands: the papers' form.
-    Ends,
+    ConvergenceCriterion,
     /// Every pose seen from the first: for single long runs, and to see the scale on closed paths. Clocks that differ then enter the headings.
     All,
 }
@@ -68,7 +68,7 @@ const DIFFERENCE: f64 = 1e-4;
 
 impl Linear {
     /// The method as the table of contents offers it: the physical form on the runs' ends.
-    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::Ends };
+    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::ConvergenceCriterion };
 
     const NAME: &'static str = "linear";
 
@@ -98,13 +98,13 @@ struct Equation {
 
 impl Driven {
     fn of(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry, readings: Readings) -> Option<Self> {
-        let track = WheelTrack::of(run, robot)?;
+        let track = WheelAngleInterpolator::of(run, robot)?;
         // Poses outside of the log have no odometry to be compared with.
         let mut seen: Vec<(f64, Pose)> = run.observed_poses();
         seen.retain(|(t_s, _)| track.steps(*t_s, *t_s).is_some());
         let ((start_s, start), after) = seen.split_first()?;
         let chosen = match readings {
-            Readings::Ends => &after[after.len().checked_sub(1)?..],
+            Readings::ConvergenceCriterion => &after[after.len().checked_sub(1)?..],
             Readings::All => after,
         };
         let (mut last_s, mut wheel_rad, mut rolled_rad) = (*start_s, Wheels::both(0.0), Wheels::both(0.0));

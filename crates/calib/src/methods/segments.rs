@@ -14,8 +14,8 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationR
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
-use crate::pose_measurements::{Look, Looks, Spacing};
-use crate::dead_reckoning_jacobian::{Lengths, Reckoned, unseen};
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
+use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned, unobservable};
 
 /// The method with its segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,22 +35,22 @@ pub struct Cost {
     pub gradient_m: Vector3<f64>,
 }
 
-/// A direction in which relative changes of the three lengths move the path by so much less than in the best one is not seen.
+/// A direction in which relative changes of the three geometry parameters move the path by so much less than in the best one is not seen.
 const LEAST_SENSITIVITY: f64 = 1e-3;
 
-/// Errors of all paths as a function of the three lengths over their nominal values.
+/// Errors of all paths as a function of the three geometry parameters over their nominal values.
 #[derive(Debug, Clone)]
 struct PathErrors<'p> {
-    paths: &'p [Looks<'p>],
+    paths: &'p [PoseMeasurements<'p>],
     nominal: Vector3<f64>,
     heading_m: f64,
     factors: Vector3<f64>,
 }
 
 impl PathErrors<'_> {
-    fn lengths(&self) -> Lengths {
+    fn geometry_parameters(&self) -> GeometryParameters {
         let [left, right, separation_m] = self.nominal.component_mul(&self.factors).into();
-        Lengths { m_per_rad: Wheels { left, right }, separation_m }
+        GeometryParameters { m_per_rad: Wheels { left, right }, separation_m }
     }
 
     fn rows(&self) -> usize {
@@ -59,15 +59,15 @@ impl PathErrors<'_> {
 
     /// Calls `visit` with path, error (m, m, weighted rad) and its derivatives by the factors, at the end of every segment.
     fn for_each_end(&self, mut visit: impl FnMut(usize, Vector3<f64>, Matrix3<f64>)) {
-        let lengths = self.lengths();
+        let geometry_parameters = self.geometry_parameters();
         let weight = Vector3::new(1.0, 1.0, self.heading_m);
         for (number, path) in self.paths.iter().enumerate() {
-            let mut reckoned = Reckoned::at(path.start);
-            for Look { wheel_rad, pose: seen } in &path.later {
-                wheel_rad.iter().for_each(|rad| reckoned.advance(&lengths, *rad));
-                let Reckoned { pose, by_lengths } = reckoned;
+            let mut dead_reckoned = DeadReckoned::at(path.start);
+            for PoseMeasurement { wheel_rad, pose: seen } in &path.later {
+                wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
+                let DeadReckoned { pose, by_geometry } = dead_reckoned;
                 let error = Vector3::new(pose.x_m - seen.x_m, pose.y_m - seen.y_m, pose.theta_rad - seen.theta_rad);
-                let by_factors = by_lengths * Matrix3::from_diagonal(&self.nominal);
+                let by_factors = by_geometry * Matrix3::from_diagonal(&self.nominal);
                 visit(number, error.component_mul(&weight), Matrix3::from_diagonal(&weight) * by_factors);
             }
         }
@@ -133,7 +133,7 @@ impl Segments {
     /// # Errors
     /// [`CalibError`] when no run has two poses.
     pub fn cost(&self, sessions: &[Session<'_>], geometry: &DriveGeometry) -> Result<Cost, CalibError> {
-        let (paths, _) = Looks::of_all(Self::NAME, sessions, self.spacing())?;
+        let (paths, _) = PoseMeasurements::of_all(Self::NAME, sessions, self.spacing())?;
         let radius_m = geometry.m_per_rad();
         let lengths_m = Vector3::new(radius_m.left, radius_m.right, geometry.wheel_separation_m());
         let errors =
@@ -149,7 +149,7 @@ impl Segments {
     }
 }
 
-/// Refuses paths on which some change of the lengths moves next to nothing.
+/// Refuses paths on which some change of the geometry parameters moves next to nothing.
 fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
     let eigen = normal.symmetric_eigen();
     let weak = eigen.eigenvalues.imin();
@@ -157,7 +157,7 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
     if sensitivity >= LEAST_SENSITIVITY {
         return Ok(());
     }
-    let (parameter, missing) = unseen(&eigen.eigenvectors.column(weak).into_owned());
+    let (parameter, missing) = unobservable(&eigen.eigenvectors.column(weak).into_owned());
     let why = format!("{missing} (relative sensitivity {sensitivity:.0e}, at least {LEAST_SENSITIVITY:.0e})");
     Err(CalibError::Unobservable { method: Segments::NAME, parameter, why })
 }
@@ -193,7 +193,7 @@ impl Method for Segments {
         "any path with straights and turns, seen as poses: least errors of dead reckoning at the ends of its segments"
     }
 
-    /// The authors drove what was at hand. Straights, spins and squares show all three lengths by their ends alone.
+    /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by their ends alone.
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 0.5, runs: 40 },
@@ -204,7 +204,7 @@ impl Method for Segments {
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
-        let (paths, runs_rejected) = Looks::of_all(Self::NAME, sessions, self.spacing())?;
+        let (paths, runs_rejected) = PoseMeasurements::of_all(Self::NAME, sessions, self.spacing())?;
         let radius_m = geometry.m_per_rad();
         let nominal = Vector3::new(radius_m.left, radius_m.right, geometry.wheel_separation_m());
         let errors = PathErrors { paths: &paths, nominal, heading_m: self.heading_m, factors: Vector3::repeat(1.0) };
@@ -220,7 +220,7 @@ impl Method for Segments {
             let covariance = to_lengths * covariance * to_lengths;
             Covariance::from_column_slice(3, 3, covariance.as_slice())
         });
-        let Lengths { m_per_rad, separation_m } = errors.lengths();
+        let GeometryParameters { m_per_rad, separation_m } = errors.geometry_parameters();
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
         Ok(Calibration {
             covariance,
@@ -241,13 +241,13 @@ mod tests {
     const NOMINAL: [f64; 3] = [0.08, 0.08, 0.363];
     const TRUTH: [f64; 3] = [0.0811, 0.0797, 0.366];
 
-    /// Runs of a robot with the lengths of [`TRUTH`], of straights and turns as `turn_rad` says, seen to within `error`.
-    fn runs(count: u32, turn_rad: f64, straight_rad: f64, error: f64) -> Vec<Looks<'static>> {
-        let lengths = Lengths { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
+    /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns as `turn_rad` says, seen to within `error`.
+    fn runs(count: u32, turn_rad: f64, straight_rad: f64, error: f64) -> Vec<PoseMeasurements<'static>> {
+        let geometry_parameters = GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
         (0..count)
             .map(|run| {
                 let start = Pose::new(0.1, 0.2, f64::from(run));
-                let mut reckoned = Reckoned::at(start);
+                let mut dead_reckoned = DeadReckoned::at(start);
                 let later = (0..6_u32)
                     .map(|leg| {
                         let way = if run % 2 == 0 { turn_rad } else { -turn_rad };
@@ -256,23 +256,23 @@ mod tests {
                         } else {
                             vec![Wheels { left: -way, right: way }; 2]
                         };
-                        wheel_rad.iter().for_each(|rad| reckoned.advance(&lengths, *rad));
-                        // No pattern that the lengths could follow, and the same every time.
+                        wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
+                        // No pattern that the geometry parameters could follow, and the same every time.
                         let off = |k: f64| error * (12.9898 * f64::from(7 * run + leg) + 78.233 * k).sin();
-                        let Pose { x_m, y_m, theta_rad } = reckoned.pose;
-                        Look { wheel_rad, pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)) }
+                        let Pose { x_m, y_m, theta_rad } = dead_reckoned.pose;
+                        PoseMeasurement { wheel_rad, pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)) }
                     })
                     .collect();
-                Looks { run: "run", start, later }
+                PoseMeasurements { run: "run", start, later }
             })
             .collect()
     }
 
-    fn errors<'p>(paths: &'p [Looks<'p>]) -> PathErrors<'p> {
+    fn errors<'p>(paths: &'p [PoseMeasurements<'p>]) -> PathErrors<'p> {
         PathErrors { paths, nominal: NOMINAL.into(), heading_m: 0.5, factors: Vector3::repeat(1.0) }
     }
 
-    fn found(paths: &[Looks<'_>]) -> Vector3<f64> {
+    fn found(paths: &[PoseMeasurements<'_>]) -> Vector3<f64> {
         let (errors, report) = LevenbergMarquardt::new().minimize(errors(paths));
         assert!(report.termination.was_successful(), "{report:?}");
         errors.factors
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn paths_that_do_not_show_a_length_are_refused_by_its_name() {
-        let refused = |paths: &[Looks<'_>]| {
+        let refused = |paths: &[PoseMeasurements<'_>]| {
             let normal = errors(paths).shares().iter().map(|share| share.normal).sum();
             match observable(&normal) {
                 Err(CalibError::Unobservable { parameter, .. }) => Some(parameter),

@@ -18,7 +18,7 @@ use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
-use estimation::WheelTrack;
+use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Tachometer {
 
 /// Travel of each wheel for one radian, metres, by one run; or why it says nothing.
 fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'static str> {
-    let track = WheelTrack::of(run, robot).ok_or("the run has no odometry")?;
+    let track = WheelAngleInterpolator::of(run, robot).ok_or("the run has no odometry")?;
     let rows_s = &run.odometry().t_s;
     let (mut travel_m, mut turned_rad) = (Wheels::both(0.0), Wheels::both(0.0_f64));
     for samples in run.run().wheel_reference.windows(2) {

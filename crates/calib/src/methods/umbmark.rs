@@ -16,7 +16,7 @@ use kinematics::{Pose, Rule, Wheels};
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::Ends;
+use crate::pose_measurements::ConvergenceCriterion;
 use crate::robust::Summary;
 
 /// Which coordinate of the end errors α and β are taken from.
@@ -77,9 +77,9 @@ impl Method for Umbmark {
                 let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol)) else {
                     continue;
                 };
-                // Marks are read at standstills, before and after the whole log; poses from the first look to the last, and what lies outside was not seen.
+                // Marks are read at standstills, before and after the whole log; poses from the first measurement to the last, and what lies outside was not seen.
                 let by_marks = run.run().truth.is_empty();
-                let ends = if by_marks { None } else { Ends::of(run, session.robot, &geometry) };
+                let ends = if by_marks { None } else { ConvergenceCriterion::of(run, session.robot, &geometry) };
                 let observed = if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
                 let Some((world_from_start, world_from_end)) = observed else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
@@ -91,13 +91,13 @@ impl Method for Umbmark {
                 }
                 // In the start's frame the odometry starts at the origin and the first leg points along +x.
                 let seen = world_from_start.to(world_from_end);
-                let mut reckoned = ends.map(|ends| ends.reckoned(&geometry));
+                let mut dead_reckoned = ends.map(|ends| ends.dead_reckoned(&geometry));
                 if by_marks {
-                    let visit = |_, pose| reckoned = Some(pose);
+                    let visit = |_, pose| dead_reckoned = Some(pose);
                     run.dead_reckon(session.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, visit);
                 }
-                if let Some(reckoned) = reckoned {
-                    errors.push((seen.x_m - reckoned.x_m, seen.y_m - reckoned.y_m));
+                if let Some(dead_reckoned) = dead_reckoned {
+                    errors.push((seen.x_m - dead_reckoned.x_m, seen.y_m - dead_reckoned.y_m));
                 }
             }
         }

@@ -4,8 +4,8 @@ use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Point, Pose, Rule};
 use scenario::{Budget, Instrument, Scenario};
 
-use crate::augmented_model::Extended;
-use crate::extended_scenario::{Pace, READ_STANDING_S};
+use crate::augmented_model::AugmentedModel;
+use crate::extended_scenario::{READ_STANDING_S, SamplingStatistics};
 
 /// What the user allows; `None` is taken from the data or the scenario.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -61,9 +61,9 @@ pub(crate) struct Setting {
 
 impl Setting {
     /// That of the data, as far as the user does not say otherwise.
-    pub(crate) fn of_data(datasets: &[Dataset], model: &Extended<'_>, limits: &Limits) -> Option<Self> {
+    pub(crate) fn of_data(datasets: &[Dataset], model: &AugmentedModel<'_>, limits: &Limits) -> Option<Self> {
         let first = datasets.first()?;
-        let pace = Pace::of(datasets, model);
+        let pace = SamplingStatistics::of(datasets, model);
         let separation_m = first.robot.wheel_separation_m;
         let (free_m, floor) = match limits.room_m {
             Some(room_m) => (room_m.map(|side| side - CLEARANCE * separation_m), of_room(room_m)),
@@ -75,8 +75,8 @@ impl Setting {
         let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
         let (minutes, time) = minutes(limits, MINUTES);
         let between = |run: &Run| run.truth.len() > 2 || run.displacements.len() > 1 || !run.point_readings.is_empty();
-        let reading = if pace.between_looks_s <= READ_STANDING_S {
-            Reading::Even(pace.between_looks_s)
+        let reading = if pace.between_measurements_s <= READ_STANDING_S {
+            Reading::Even(pace.between_measurements_s)
         } else if runs().any(between) {
             Reading::Standing
         } else {
@@ -107,7 +107,7 @@ impl Setting {
         let of = if limits.room_m.is_some() { of_room(room_m) } else { format!("{} of [budget]", of_room(room_m)) };
         let handling_s = budget.and_then(|budget| budget.handling_s).unwrap_or(HANDLING_S);
         let (minutes, time) = minutes(limits, budget.and_then(|budget| budget.minutes).unwrap_or(MINUTES));
-        let between_looks_s = scenario.instruments.iter().find_map(|instrument| match *instrument {
+        let between_measurements_s = scenario.instruments.iter().find_map(|instrument| match *instrument {
             Instrument::MotionCapture { rate_hz, .. } => Some(1.0 / rate_hz),
             _ => None,
         });
@@ -115,9 +115,9 @@ impl Setting {
             robot: scenario.robot.nominal(),
             top_speed_m_s: limits.top_speed_m_s.unwrap_or(scenario.robot.cruise_speed_m_s),
             acceleration_m_s2: scenario.robot.acceleration_m_s2,
-            // Where only looks come at intervals, a row stands beside each.
-            between_rows_s: scenario.log.map_or(between_looks_s.unwrap_or(f64::INFINITY), |log| log.interval_s),
-            reading: between_looks_s.map_or(Reading::Standing, Reading::Even),
+            // Where only measurements come at intervals, a row stands beside each.
+            between_rows_s: scenario.log.map_or(between_measurements_s.unwrap_or(f64::INFINITY), |log| log.interval_s),
+            reading: between_measurements_s.map_or(Reading::Standing, Reading::Even),
             sees_heading: true,
             relative: false,
             twist: false,
@@ -128,8 +128,8 @@ impl Setting {
         })
     }
 
-    pub(crate) fn pace(&self, speed_m_s: f64) -> motion_programs::Pace {
-        motion_programs::Pace {
+    pub(crate) fn pace(&self, speed_m_s: f64) -> motion_programs::DriveLimits {
+        motion_programs::DriveLimits {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: speed_m_s,
             acceleration_m_s2: self.acceleration_m_s2,

@@ -1,24 +1,24 @@
 //! What to drive to see what would not have shown: manoeuvres are added as long as they bring something into sight, by what they bring a minute.
 //!
-//! An effect is in sight when a size that would be large for a real robot shows with nine chances in ten (√λ = 4.57). Before there is any data the three lengths of
+//! An effect is in sight when a size that would be large for a real robot shows with nine chances in ten (√λ = 4.57). Before there is any data the three geometry parameters of
 //! the drive count too, by the logarithm of their standard deviations (Wald 1943, D-optimum designs); adding the best run again and again is Wynn's rule (1970).
 
 use std::collections::BTreeMap;
 
 use effects::{CATALOGUE, Excitation};
-use estimation::{Column, Evidence, JointFit, Model, Noise, total};
+use estimation::{Column, Model, ModelFit, Noise, NormalEquations, total};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
 
 use super::constraints::{Limits, Setting};
-use super::manoeuvres::{Manoeuvre, Part, evidences, library};
+use super::manoeuvres::{Manoeuvre, Part, equations_of, library};
 use super::rival_odds::{Frame, with_parts, with_runs};
 use super::text;
 use super::text::Predictions;
-use crate::augmented_model::Extended;
-use crate::candidate::{Choice, mean_terms, terms};
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::{Candidate, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::settings::SHOWS;
+use crate::settings::DETECTION_SQRT_LAMBDA;
 
 /// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
 const SHAPES: usize = 3;
@@ -42,8 +42,8 @@ fn conditions(id: &str) -> Option<&'static str> {
     }
 }
 
-fn is_driven(choice: &Choice) -> bool {
-    conditions(choice.id()).is_none()
+fn is_driven(candidate: &Candidate) -> bool {
+    conditions(candidate.id()).is_none()
 }
 
 /// What stays out of sight, and what would show it.
@@ -58,75 +58,75 @@ fn out_of_sight(ids: &[&str]) -> String {
     format!(" Still out of sight: {}.", each.collect::<Vec<_>>().join(", "))
 }
 
-/// An effect at one of its shapes.
+/// An effect at one of its variants.
 struct Target {
     id: &'static str,
-    choice: Choice,
+    candidate: Candidate,
     columns: Vec<usize>,
 }
 
-fn targets(choices: &[Choice], first: usize) -> Vec<Target> {
+fn targets(candidates: &[Candidate], first: usize) -> Vec<Target> {
     let mut at = first;
-    let target = |choice: &Choice| {
-        let columns: Vec<usize> = (at..at + choice.parameters().len()).collect();
+    let target = |candidate: &Candidate| {
+        let columns: Vec<usize> = (at..at + candidate.parameters().len()).collect();
         at += columns.len();
-        Target { id: choice.id(), choice: choice.clone(), columns }
+        Target { id: candidate.id(), candidate: candidate.clone(), columns }
     };
-    choices.iter().map(target).collect()
+    candidates.iter().map(target).collect()
 }
 
-/// The first, the middle and the last shape of each effect.
-fn some_shapes(choices: &[Choice]) -> Vec<Choice> {
-    choices
+/// The first, the middle and the last variant of each effect.
+fn some_shapes(candidates: &[Candidate]) -> Vec<Candidate> {
+    candidates
         .chunk_by(|a, b| a.id() == b.id())
-        .flat_map(|shapes| {
-            let last = shapes.len() - 1;
-            let mut places: Vec<usize> = (0..SHAPES).map(|k| k * last / (SHAPES - 1)).collect();
-            places.dedup();
-            places.into_iter().map(|place| shapes[place].clone())
+        .flat_map(|variants| {
+            let last = variants.len() - 1;
+            let mut indices: Vec<usize> = (0..SHAPES).map(|k| k * last / (SHAPES - 1)).collect();
+            indices.dedup();
+            indices.into_iter().map(|index| variants[index].clone())
         })
         .collect()
 }
 
 /// How well a target's most telling parameter shows at a size that would be large, in standard deviations, and the smallest size that would show.
-fn shown(frame: &Frame, evidence: &Evidence, target: &Target) -> Option<(f64, Smallest)> {
-    let information = frame.information(evidence, &target.columns, &frame.free)?;
-    let parameters = target.choice.parameters().into_iter().enumerate();
+fn shown(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<(f64, Smallest)> {
+    let information = frame.information(equations, &target.columns, &frame.free)?;
+    let parameters = target.candidate.parameters().into_iter().enumerate();
     parameters
         .map(|(k, parameter)| {
             let root = information[(k, k)].max(0.0).sqrt();
             let (name, unit) = (parameter.name.to_owned(), parameter.unit.to_owned());
-            (parameter.plausible * root, Smallest { value: SHOWS / root, unit, parameter: name })
+            (parameter.prior_sigma * root, Smallest { value: DETECTION_SQRT_LAMBDA / root, unit, parameter: name })
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// For each effect its best shape.
-fn all_shown(frame: &Frame, evidence: &Evidence, targets: &[Target]) -> Vec<(&'static str, f64, Smallest)> {
+/// For each effect its best variant.
+fn all_shown(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> Vec<(&'static str, f64, Smallest)> {
     targets
         .chunk_by(|a, b| a.id == b.id)
-        .filter_map(|shapes| {
-            let best = shapes.iter().filter_map(|target| shown(frame, evidence, target));
+        .filter_map(|variants| {
+            let best = variants.iter().filter_map(|target| shown(frame, equations, target));
             let (sigmas, smallest) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some((shapes[0].id, sigmas, smallest))
+            Some((variants[0].id, sigmas, smallest))
         })
         .collect()
 }
 
 /// How many effects are in sight, those half in sight in part.
-fn in_sight(frame: &Frame, evidence: &Evidence, targets: &[Target]) -> f64 {
-    all_shown(frame, evidence, targets).iter().map(|(_, sigmas, _)| (sigmas / SHOWS).min(1.0)).sum()
+fn in_sight(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
+    all_shown(frame, equations, targets).iter().map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0)).sum()
 }
 
 /// Runs added one pair after the other, by what they bring a minute, as long as there is time.
 fn mix(
-    options: &[(Manoeuvre, Evidence)],
-    before: &Evidence,
+    options: &[(Manoeuvre, NormalEquations)],
+    before: &NormalEquations,
     setting: &Setting,
-    worth: impl Fn(&Evidence) -> f64,
-) -> (Vec<Part>, Evidence, f64) {
-    let (mut parts, mut evidence, mut minutes): (Vec<Part>, _, _) = (Vec::new(), before.clone(), 0.0);
-    let mut here = worth(&evidence);
+    worth: impl Fn(&NormalEquations) -> f64,
+) -> (Vec<Part>, NormalEquations, f64) {
+    let (mut parts, mut equations, mut minutes): (Vec<Part>, _, _) = (Vec::new(), before.clone(), 0.0);
+    let mut here = worth(&equations);
     loop {
         let best = options
             .iter()
@@ -136,7 +136,7 @@ fn mix(
                 if minutes + cost > setting.minutes || !(known || parts.len() < MOST_KINDS) {
                     return None;
                 }
-                let after = with_runs(&evidence, &[(of, 1.0)]);
+                let after = with_runs(&equations, &[(of, 1.0)]);
                 let there = worth(&after);
                 let preferred = if known { NEW_KIND } else { 1.0 };
                 (there - here > LEAST_GAIN).then_some((
@@ -153,28 +153,28 @@ fn mix(
             Some(part) => part.pairs += 1,
             None => parts.push(Part { manoeuvre: *manoeuvre, pairs: 1 }),
         }
-        (evidence, here) = (after, there);
+        (equations, here) = (after, there);
         minutes += cost;
     }
-    (parts, evidence, minutes)
+    (parts, equations, minutes)
 }
 
 /// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into sight late makes earlier runs needless, and what never did
 /// made some in vain.
 fn pruned<'i>(
     parts: &mut Vec<Part>,
-    options: &[(Manoeuvre, Evidence)],
-    before: &Evidence,
-    after: &Evidence,
-    shown: impl Fn(&Evidence) -> Vec<&'i str>,
-) -> Evidence {
+    options: &[(Manoeuvre, NormalEquations)],
+    before: &NormalEquations,
+    after: &NormalEquations,
+    shown: impl Fn(&NormalEquations) -> Vec<&'i str>,
+) -> NormalEquations {
     let all = shown(after);
     let of = |parts: &[Part]| with_parts(before, parts, options);
-    for place in (0..parts.len()).rev() {
-        while parts[place].pairs > 0 {
-            parts[place].pairs -= 1;
+    for index in (0..parts.len()).rev() {
+        while parts[index].pairs > 0 {
+            parts[index].pairs -= 1;
             if shown(&of(parts)) != all {
-                parts[place].pairs += 1;
+                parts[index].pairs += 1;
                 break;
             }
         }
@@ -185,35 +185,37 @@ fn pruned<'i>(
 
 /// What to drive to bring into sight what the data were blind to; the error says why nothing does.
 pub(super) fn show(
-    model: &Extended<'_>,
-    catalogue: &[Choice],
-    blind: &[Blind],
+    model: &AugmentedModel<'_>,
+    catalogue: &[Candidate],
+    detectability: &[Blind],
     setting: &Setting,
     manoeuvres: &[Manoeuvre],
 ) -> Result<NextExperiment, String> {
-    let hidden: Vec<Choice> = catalogue
+    let hidden: Vec<Candidate> = catalogue
         .iter()
-        .filter(|choice| is_driven(choice) && blind.iter().any(|blind| blind.id == choice.id()))
+        .filter(|candidate| {
+            is_driven(candidate) && detectability.iter().any(|detectability| detectability.id == candidate.id())
+        })
         .cloned()
         .collect();
     let hidden = some_shapes(&hidden);
-    let all: Vec<Choice> = model.choices.iter().chain(&hidden).cloned().collect();
-    let own: usize = model.choices.iter().map(|choice| choice.parameters().len()).sum();
+    let all: Vec<Candidate> = model.candidates.iter().chain(&hidden).cloned().collect();
+    let own: usize = model.candidates.iter().map(|candidate| candidate.parameters().len()).sum();
     let targets = targets(&hidden, Column::BASE.len() + own);
-    let before = total(&model.fit.scan(&mut terms(&all)).runs).ok_or("no run has looks")?;
+    let before = total(&model.fit.scan(&mut terms(&all)).runs).ok_or("no run has measurements")?;
     let frame = Frame::of(&model.fit, &all);
-    let options = evidences(&model.fit, &all, setting, manoeuvres);
-    let (mut parts, after, _) = mix(&options, &before, setting, |evidence| in_sight(&frame, evidence, &targets));
+    let options = equations_of(&model.fit, &all, setting, manoeuvres);
+    let (mut parts, after, _) = mix(&options, &before, setting, |equations| in_sight(&frame, equations, &targets));
     let after =
-        pruned(&mut parts, &options, &before, &after, |evidence| ids_shown(&all_shown(&frame, evidence, &targets)));
+        pruned(&mut parts, &options, &before, &after, |equations| ids_shown(&all_shown(&frame, equations, &targets)));
     let minutes: f64 = parts.iter().map(|part| f64::from(part.pairs) * part.manoeuvre.cost(setting).minutes).sum();
     let was: Vec<&str> = ids_shown(&all_shown(&frame, &before, &targets));
     let now: Vec<_> = all_shown(&frame, &after, &targets)
         .into_iter()
-        .filter(|(id, sigmas, _)| *sigmas >= SHOWS && !was.contains(id))
+        .filter(|(id, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA && !was.contains(id))
         .collect();
     if parts.is_empty() || now.is_empty() {
-        let ids: Vec<&str> = blind.iter().map(|blind| &blind.id[..]).collect();
+        let ids: Vec<&str> = detectability.iter().map(|detectability| &detectability.id[..]).collect();
         return Err(format!(
             "nothing that can be driven {} brings anything else into sight.{}",
             setting.within,
@@ -222,8 +224,11 @@ pub(super) fn show(
     }
     let predicts: BTreeMap<String, String> =
         now.iter().map(|(id, _, smallest)| ((*id).to_owned(), from_size(smallest))).collect();
-    let still: Vec<&str> =
-        blind.iter().map(|blind| &blind.id[..]).filter(|id| !predicts.contains_key(*id) && !was.contains(id)).collect();
+    let still: Vec<&str> = detectability
+        .iter()
+        .map(|detectability| &detectability.id[..])
+        .filter(|id| !predicts.contains_key(*id) && !was.contains(id))
+        .collect();
     let still = out_of_sight(&still);
     let ids: Vec<&str> = now.iter().map(|(id, ..)| *id).collect();
     let why = format!(
@@ -240,7 +245,7 @@ fn from_size(smallest: &Smallest) -> String {
 }
 
 fn ids_shown<'s>(shown: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
-    shown.iter().filter(|(_, sigmas, _)| *sigmas >= SHOWS).map(|(id, ..)| *id).collect()
+    shown.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
 }
 
 /// What to drive before there is any data.
@@ -250,7 +255,7 @@ pub struct ScenarioPlan {
     pub scenario: String,
     /// What to drive.
     pub next_experiment: NextExperiment,
-    /// Standard deviations that the runs will leave of the lengths that they determine, metres, by the names of `calibrate`.
+    /// Standard deviations that the runs will leave of the geometry parameters that they determine, metres, by the names of `calibrate`.
     pub sigmas: BTreeMap<String, f64>,
     /// What will show, from which size on.
     pub shows: Vec<Blind>,
@@ -285,7 +290,7 @@ pub enum PlanError {
     },
 }
 
-/// What to drive with a scenario's robot before there is any data, so that its three lengths are determined well and few effects stay out of sight.
+/// What to drive with a scenario's robot before there is any data, so that its three geometry parameters are determined well and few effects stay out of sight.
 ///
 /// # Errors
 /// [`PlanError`] when floor, time or instruments allow nothing.
@@ -298,14 +303,15 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     if setting.free_m.iter().any(|side_m| *side_m <= 0.0) {
         return Err(nothing_fits());
     }
-    let fit: JointFit<'_> = JointFit::unfitted(Model::of(&geometry, 0), noise, &[]);
-    let choices: Vec<Choice> = some_shapes(&mean_terms(&[])).into_iter().filter(is_driven).collect();
-    let targets = targets(&choices, Column::BASE.len());
-    let frame = Frame::of(&fit, &choices);
-    let options = evidences(&fit, &choices, &setting, &library(&setting));
+    let fit: ModelFit<'_> = ModelFit::from_parameters(Model::of(&geometry, 0), noise, &[]);
+    let candidates: Vec<Candidate> = some_shapes(&mean_terms(&[])).into_iter().filter(is_driven).collect();
+    let targets = targets(&candidates, Column::BASE.len());
+    let frame = Frame::of(&fit, &candidates);
+    let options = equations_of(&fit, &candidates, &setting, &library(&setting));
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
-    let worth = |evidence: &Evidence| in_sight(&frame, evidence, &targets) - LENGTH_WORTH * spread(&frame, evidence);
+    let worth =
+        |equations: &NormalEquations| in_sight(&frame, equations, &targets) - LENGTH_WORTH * spread(&frame, equations);
     let (parts, after, minutes) = mix(&options, &before, &setting, worth);
     if parts.is_empty() {
         return Err(nothing_fits());
@@ -325,13 +331,14 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
     let all = all_shown(&frame, &after, &targets);
-    let (shows, blind): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, sigmas, _)| *sigmas >= SHOWS);
+    let (shows, detectability): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA);
     let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
         let why = if sigmas > 1e-3 { from_size(&smallest) } else { "no run excites it".to_owned() };
         Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > 1e-3).then_some(smallest) }
     };
     let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
-    let mut blind_to: Vec<Blind> = blind.into_iter().map(entry).collect();
+    let mut blind_to: Vec<Blind> = detectability.into_iter().map(entry).collect();
     let not_driven = CATALOGUE.iter().filter_map(|id| Some((*id, conditions(id)?)));
     blind_to.extend(not_driven.map(|(id, how)| Blind {
         id: id.to_owned(),
@@ -347,7 +354,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
             100.0 * relative[2]
         )
     } else {
-        "does not determine the three lengths".to_owned()
+        "does not determine the three geometry parameters".to_owned()
     };
     let why = format!(
         "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would show at a large size, sought {}.",
@@ -359,10 +366,10 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
 }
 
-/// Sum of the logarithms of the lengths' relative standard deviations.
-fn spread(frame: &Frame, evidence: &Evidence) -> f64 {
+/// Sum of the logarithms of the geometry parameters' relative standard deviations.
+fn spread(frame: &Frame, equations: &NormalEquations) -> f64 {
     frame
-        .estimate(evidence, &frame.free)
+        .estimate(equations, &frame.free)
         .map_or(0.0, |(_, covariance)| (0..Column::GEOMETRY.len()).map(|k| 0.5 * covariance[(k, k)].ln()).sum())
 }
 

@@ -2,67 +2,68 @@
 
 use std::collections::BTreeMap;
 
-use estimation::{Column, Evidence, JointFit, total};
+use estimation::{Column, ModelFit, NormalEquations, total};
 
 use super::constraints::Setting;
-use super::manoeuvres::{Manoeuvre, Part, evidences};
+use super::manoeuvres::{Manoeuvre, Part, equations_of};
 use super::predict::predictions;
-use super::rival_odds::{Candidate, Frame, Rivals, Sure, with_parts, with_runs};
+use super::rival_odds::{Confidence, Frame, RivalColumns, Rivals, with_parts, with_runs};
 use super::text;
 use super::text::Predictions;
 use crate::augmented_model::without;
-use crate::candidate::{Choice, terms};
+use crate::candidate::{Candidate, terms};
 use crate::document::NextExperiment;
-use crate::finding::is_faint;
-use crate::selection::Found;
-use crate::settings::FAINT;
+use crate::finding::is_of_low_significance;
+use crate::selection::SearchResult;
+use crate::settings::LOW_SIGNIFICANCE;
 
 /// Two kinds of run must save this share of the time against one to be worth the trouble.
 const WORTH_TWO_KINDS: f64 = 0.8;
 /// More pairs of runs of one kind nobody drives.
-const MOST_PAIRS: u32 = 50;
+const MAX_PAIRS: u32 = 50;
 
 /// What to drive to tell apart the names of one finding; the error says why nothing does.
-pub(super) fn tell_apart(
-    base: &JointFit<'_>,
-    found: &Found<'_>,
-    place: usize,
+pub(super) fn discriminate(
+    base: &ModelFit<'_>,
+    found: &SearchResult<'_>,
+    index: usize,
     setting: &Setting,
     manoeuvres: &[Manoeuvre],
 ) -> Result<NextExperiment, String> {
-    let without = without(base, &found.model, place).ok_or("the model without this finding has no fit")?;
-    let names: Vec<Choice> = found.names[place].iter().map(|name| name.choice.clone()).collect();
-    let all: Vec<Choice> = without.choices.iter().chain(&names).cloned().collect();
-    let mut at = Column::BASE.len() + parameters(&without.choices);
-    let candidates = names.iter().map(|choice| {
-        let columns: Vec<usize> = (at..at + choice.parameters().len()).collect();
+    let without = without(base, &found.model, index).ok_or("the model without this finding has no fit")?;
+    let names: Vec<Candidate> = found.names[index].iter().map(|name| name.candidate.clone()).collect();
+    let all: Vec<Candidate> = without.candidates.iter().chain(&names).cloned().collect();
+    let mut at = Column::BASE.len() + parameters(&without.candidates);
+    let candidates = names.iter().map(|candidate| {
+        let columns: Vec<usize> = (at..at + candidate.parameters().len()).collect();
         at += columns.len();
-        Candidate { choice: choice.clone(), columns }
+        RivalColumns { candidate: candidate.clone(), columns }
     });
-    let candidates: Vec<Candidate> = candidates.collect();
-    let before = total(&without.fit.scan(&mut terms(&all)).runs).ok_or("no run has looks")?;
+    let candidates: Vec<RivalColumns> = candidates.collect();
+    let before = total(&without.fit.scan(&mut terms(&all)).runs).ok_or("no run has measurements")?;
     let frame = Frame::of(&without.fit, &all);
     let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
-    let options = evidences(&without.fit, &all, setting, manoeuvres);
+    let options = equations_of(&without.fit, &all, setting, manoeuvres);
     // What hardly stands out is to stand out as well, where that can be.
-    let both = is_faint(found, place).then(|| rivals.clone().standing_out(FAINT));
-    let id = |k: usize| rivals.candidates[k].choice.id();
+    let both = is_of_low_significance(found, index).then(|| rivals.clone().standing_out(LOW_SIGNIFICANCE));
+    let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
-    let asked = |rivals| Asked { rivals, before: &before, options: &options, setting };
+    let asked = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
     // What tells them as likely as not is worth driving where nothing tells them for certain.
-    let ways = both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Sure::Certain), (rivals, Sure::AsNot)]);
-    let plan = ways.into_iter().find_map(|(rivals, sure)| asked(rivals).plan(sure));
-    let Plan { sure, told, mut parts, mut minutes } = plan.ok_or_else(|| asked(&rivals).why_nothing(&names))?;
-    let never: Vec<_> = rivals.pairs().into_iter().filter(|pair| !told.contains(pair)).collect();
+    let ways = both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Confidence::P95), (rivals, Confidence::P50)]);
+    let plan = ways.into_iter().find_map(|(rivals, confidence)| asked(rivals).plan(confidence));
+    let Discrimination { confidence, discriminated, mut parts, mut minutes } =
+        plan.ok_or_else(|| asked(&rivals).why_nothing(&names))?;
+    let never: Vec<_> = rivals.pairs().into_iter().filter(|pair| !discriminated.contains(pair)).collect();
     if parts.iter().all(|part| part.pairs == 1) && 2.0 * minutes <= setting.minutes {
         // A single run each way leaves nothing to compare it with.
         parts.iter_mut().for_each(|part| part.pairs = 2);
         minutes *= 2.0;
     }
     let after = with_parts(&before, &parts, &options);
-    let sigmas = told.iter().filter_map(|pair| rivals.apart(&after, *pair)).map(|apart| apart.sigmas);
+    let sigmas = discriminated.iter().filter_map(|pair| rivals.apart(&after, *pair)).map(|apart| apart.sigmas);
     let sigmas = sigmas.fold(f64::INFINITY, f64::min);
-    let (what, predicts) = predictions(base, &without, &rivals, &before, &told, &parts, setting)
+    let (what, predicts) = predictions(base, &without, &rivals, &before, &discriminated, &parts, setting)
         .map_or((String::new(), Predictions::Sizes(BTreeMap::new())), |(what, of)| (what, Predictions::Of(of)));
     let pairs = |pairs: &[(usize, usize)]| {
         let each: Vec<String> = pairs.iter().map(|(a, b)| format!("{} from {}", id(*a), id(*b))).collect();
@@ -71,9 +72,9 @@ pub(super) fn tell_apart(
     let (tells, still) = if never.is_empty() {
         (listed(&names), String::new())
     } else {
-        (pairs(&told), format!(" It does not tell {}.", pairs(&never)))
+        (pairs(&discriminated), format!(" It does not tell {}.", pairs(&never)))
     };
-    let tell = if sure == Sure::Certain { "tells" } else { "tells, with even chances," };
+    let tell = if confidence == Confidence::P95 { "tells" } else { "tells, with even chances," };
     let why = format!(
         "it takes {minutes:.1} min and {tell} {tells} by {sigmas:.1} standard deviations or more, sought {}. Diagnose the new runs together with the old ones.{still}{what}",
         setting.within
@@ -81,12 +82,12 @@ pub(super) fn tell_apart(
     Ok(text::next_experiment(&parts, setting, minutes, &why, predicts))
 }
 
-fn parameters(choices: &[Choice]) -> usize {
-    choices.iter().map(|choice| choice.parameters().len()).sum()
+fn parameters(candidates: &[Candidate]) -> usize {
+    candidates.iter().map(|candidate| candidate.parameters().len()).sum()
 }
 
-fn listed(names: &[Choice]) -> String {
-    let ids: Vec<&str> = names.iter().map(Choice::id).collect();
+fn listed(names: &[Candidate]) -> String {
+    let ids: Vec<&str> = names.iter().map(Candidate::id).collect();
     match ids.split_last() {
         Some((last, [])) => (*last).to_owned(),
         Some((last, others)) => format!("{} and {last}", others.join(", ")),
@@ -98,56 +99,56 @@ fn listed(names: &[Choice]) -> String {
 type Pair = (usize, usize);
 
 /// Kinds of run, each with the evidence of a pair of them.
-type Driven = (Manoeuvre, Evidence);
+type Driven = (Manoeuvre, NormalEquations);
 
 /// What pairs of names are told apart, how surely, and by what.
-struct Plan {
-    sure: Sure,
-    told: Vec<Pair>,
+struct Discrimination {
+    confidence: Confidence,
+    discriminated: Vec<Pair>,
     parts: Vec<Part>,
     minutes: f64,
 }
 
 /// Names, what is known of them, and what can be driven.
-struct Asked<'a> {
+struct DiscriminationSearch<'a> {
     rivals: &'a Rivals,
-    before: &'a Evidence,
+    before: &'a NormalEquations,
     options: &'a [Driven],
     setting: &'a Setting,
 }
 
-impl Asked<'_> {
+impl DiscriminationSearch<'_> {
     /// For certain, what takes the least time; else what tells them farthest apart within the time.
-    fn plan(&self, sure: Sure) -> Option<Plan> {
+    fn plan(&self, confidence: Confidence) -> Option<Discrimination> {
         // A pair that nothing tells apart, however long it is driven, must not hide what tells the others apart.
         let tellable: Vec<Pair> = self
             .rivals
             .pairs()
             .into_iter()
             .filter(|pair| {
-                let tells = |option| self.least_pairs(&[*pair], &[option], sure, self.setting.minutes).is_some();
+                let tells = |option| self.least_pairs(&[*pair], &[option], confidence, self.setting.minutes).is_some();
                 self.options.iter().any(tells)
             })
             .collect();
         if tellable.is_empty() {
             return None;
         }
-        let of = |told: Vec<Pair>| {
-            let (parts, minutes) = match sure {
-                Sure::Certain => self.quickest(&told)?,
-                Sure::AsNot => self.farthest(&told)?,
+        let of = |discriminated: Vec<Pair>| {
+            let (parts, minutes) = match confidence {
+                Confidence::P95 => self.quickest(&discriminated)?,
+                Confidence::P50 => self.farthest(&discriminated)?,
             };
-            Some(Plan { sure, told, parts, minutes })
+            Some(Discrimination { confidence, discriminated, parts, minutes })
         };
-        of(tellable.clone()).or_else(|| of(self.most_told(&tellable, sure)))
+        of(tellable.clone()).or_else(|| of(self.most_discriminated(&tellable, confidence)))
     }
 
     /// Says that nothing tells names apart, and how far apart the best leaves them.
-    fn why_nothing(&self, names: &[Choice]) -> String {
+    fn why_nothing(&self, names: &[Candidate]) -> String {
         let pairs = self.rivals.pairs();
         let best = self.options.iter().filter_map(|option| {
-            let evidence = self.after(&[option], self.most_pairs(&[option], self.setting.minutes));
-            let worst = pairs.iter().filter_map(|pair| self.rivals.apart(&evidence, *pair)).map(|apart| apart.sigmas);
+            let equations = self.after(&[option], self.most_pairs(&[option], self.setting.minutes));
+            let worst = pairs.iter().filter_map(|pair| self.rivals.apart(&equations, *pair)).map(|apart| apart.sigmas);
             Some((option.0, worst.min_by(f64::total_cmp)?))
         });
         let what = format!("nothing that can be driven {} tells {} apart", self.setting.within, listed(names));
@@ -161,31 +162,32 @@ impl Asked<'_> {
     }
 
     /// The evidence with so many pairs of runs of each of some kinds.
-    fn after(&self, kinds: &[&Driven], pairs: u32) -> Evidence {
-        let added: Vec<(&Evidence, f64)> = kinds.iter().map(|(_, of)| (of, f64::from(pairs))).collect();
+    fn after(&self, kinds: &[&Driven], pairs: u32) -> NormalEquations {
+        let added: Vec<(&NormalEquations, f64)> = kinds.iter().map(|(_, of)| (of, f64::from(pairs))).collect();
         with_runs(self.before, &added)
     }
 
     /// How well so many pairs of runs of each of some kinds tell the worst told of some names.
-    fn margin(&self, names: &[Pair], kinds: &[&Driven], pairs: u32, sure: Sure) -> f64 {
-        let evidence = self.after(kinds, pairs);
-        let margin =
-            |pair: &Pair| self.rivals.apart(&evidence, *pair).map_or(f64::NEG_INFINITY, |apart| apart.margin(sure));
+    fn margin(&self, names: &[Pair], kinds: &[&Driven], pairs: u32, confidence: Confidence) -> f64 {
+        let equations = self.after(kinds, pairs);
+        let margin = |pair: &Pair| {
+            self.rivals.apart(&equations, *pair).map_or(f64::NEG_INFINITY, |apart| apart.margin(confidence))
+        };
         names.iter().map(margin).fold(f64::INFINITY, f64::min)
     }
 
     /// The pairs of names that the one kind of run, driven so many times, tells apart that tells most. Of names that some kind tells apart, at least one.
-    fn most_told(&self, names: &[Pair], sure: Sure) -> Vec<Pair> {
-        let told = |(option, pairs): (&Driven, u32)| -> Vec<Pair> {
-            names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, sure) >= 0.0).copied().collect()
+    fn most_discriminated(&self, names: &[Pair], confidence: Confidence) -> Vec<Pair> {
+        let discriminated = |(option, pairs): (&Driven, u32)| -> Vec<Pair> {
+            names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, confidence) >= 0.0).copied().collect()
         };
         let runs = |option| (1..=self.most_pairs(&[option], self.setting.minutes)).map(move |pairs| (option, pairs));
         // The most probable name counts for more than the others among themselves.
         self.options
             .iter()
             .flat_map(runs)
-            .map(told)
-            .max_by_key(|told| (told.iter().filter(|(a, _)| *a == 0).count(), told.len()))
+            .map(discriminated)
+            .max_by_key(|discriminated| (discriminated.iter().filter(|(a, _)| *a == 0).count(), discriminated.len()))
             .unwrap_or_default()
     }
 
@@ -193,7 +195,7 @@ impl Asked<'_> {
     fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
         let pairs = (within_min / self.minutes(kinds)).floor() as u32;
-        pairs.min(MOST_PAIRS)
+        pairs.min(MAX_PAIRS)
     }
 
     /// What a pair of runs of each kind takes.
@@ -202,10 +204,10 @@ impl Asked<'_> {
     }
 
     /// The least number of pairs of runs of each of some kinds that tells all given pairs of names apart.
-    fn least_pairs(&self, names: &[Pair], kinds: &[&Driven], sure: Sure, within_min: f64) -> Option<u32> {
+    fn least_pairs(&self, names: &[Pair], kinds: &[&Driven], confidence: Confidence, within_min: f64) -> Option<u32> {
         let most = self.most_pairs(kinds, within_min);
         // More runs can make a name whose form is not known well enough harder to drop: the margin is not monotonous, and all are tried.
-        (1..=most).find(|pairs| self.margin(names, kinds, *pairs, sure) >= 0.0)
+        (1..=most).find(|pairs| self.margin(names, kinds, *pairs, confidence) >= 0.0)
     }
 
     fn parts(&self, kinds: &[&Driven], pairs: u32) -> (Vec<Part>, f64) {
@@ -225,7 +227,7 @@ impl Asked<'_> {
     fn quickest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
         let quicker = |best: Option<(Vec<Part>, f64)>, kinds: &[&Driven], within_min: f64| {
             let least = best.as_ref().map_or(f64::INFINITY, |(_, minutes)| *minutes);
-            let pairs = self.least_pairs(names, kinds, Sure::Certain, within_min.min(least));
+            let pairs = self.least_pairs(names, kinds, Confidence::P95, within_min.min(least));
             pairs.map(|pairs| self.parts(kinds, pairs)).filter(|(_, minutes)| *minutes < least).or(best)
         };
         let one = self.options.iter().fold(None, |best, option| quicker(best, &[option], self.setting.minutes));
@@ -239,7 +241,7 @@ impl Asked<'_> {
         let kinds = singles.chain(self.twos().map(|two| two.to_vec()));
         let most = |kinds: Vec<&Driven>| {
             let all = self.most_pairs(&kinds, self.setting.minutes);
-            let of = |pairs: u32| (self.margin(names, &kinds, pairs, Sure::AsNot), pairs);
+            let of = |pairs: u32| (self.margin(names, &kinds, pairs, Confidence::P50), pairs);
             let (margin, pairs) = (1..=all).map(of).max_by(|a, b| a.0.total_cmp(&b.0))?;
             Some((margin, self.parts(&kinds, pairs)))
         };
@@ -255,7 +257,7 @@ mod tests {
     use super::*;
     use crate::plan::manoeuvres::library;
     use crate::plan::manoeuvres::tests::setting;
-    use crate::plan::rival_odds::tests::{evidence, rivals};
+    use crate::plan::rival_odds::tests::{log_bayes_factor, rivals};
 
     /// Where a kind of run says much of what both names have in common, each run raises what is asked of them by more than it tells them apart: few runs tell, many do not.
     #[test]
@@ -263,17 +265,20 @@ mod tests {
         // Both names say 10, and differ by λ/2 = 2.5.
         let apart = 0.05_f64.sqrt();
         let old = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, apart, 0.0]);
-        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 10.0, 10.0 * apart]));
+        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 10.0, 10.0 * apart]));
         let rivals = rivals(&before);
         // A pair of runs adds 1 to that, of 3 at least that are asked, and 150 to what both explain, of which a hundredth is asked.
         let (common, apart) = (3.0_f64.sqrt(), 0.02_f64.sqrt());
-        let new = evidence(&DMatrix::from_row_slice(2, 3, &[0.0, common, common, 0.0, apart, 0.0]), &DVector::zeros(2));
+        let new = log_bayes_factor(
+            &DMatrix::from_row_slice(2, 3, &[0.0, common, common, 0.0, apart, 0.0]),
+            &DVector::zeros(2),
+        );
         let setting = Setting { minutes: 1e4, ..setting() };
         let options = [(library(&setting)[0], new)];
-        let asked = Asked { rivals: &rivals, before: &before, options: &options, setting: &setting };
-        let margin = |pairs| asked.margin(&[(0, 1)], &[&options[0]], pairs, Sure::AsNot);
-        assert!(margin(1) > 0.0 && margin(MOST_PAIRS) < 0.0, "{} {}", margin(1), margin(MOST_PAIRS));
-        assert_eq!(asked.most_told(&[(0, 1)], Sure::AsNot), [(0, 1)]);
-        assert_eq!(asked.plan(Sure::AsNot).map(|plan| plan.told), Some(vec![(0, 1)]));
+        let asked = DiscriminationSearch { rivals: &rivals, before: &before, options: &options, setting: &setting };
+        let margin = |pairs| asked.margin(&[(0, 1)], &[&options[0]], pairs, Confidence::P50);
+        assert!(margin(1) > 0.0 && margin(MAX_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_PAIRS));
+        assert_eq!(asked.most_discriminated(&[(0, 1)], Confidence::P50), [(0, 1)]);
+        assert_eq!(asked.plan(Confidence::P50).map(|plan| plan.discriminated), Some(vec![(0, 1)]));
     }
 }

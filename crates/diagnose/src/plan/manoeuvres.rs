@@ -3,18 +3,18 @@
 use std::f64::consts::TAU;
 
 use dataset::{Dataset, Displacement, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
-use estimation::{Evidence, JointFit, Model, total};
+use estimation::{Model, ModelFit, NormalEquations, total};
 use kinematics::{Increment, Pose, Wheels};
 use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 
 use super::constraints::{Reading, Setting};
-use crate::candidate::{Choice, terms};
+use crate::candidate::{Candidate, terms};
 
 /// Shares of the largest size and of the top speed that are tried.
 const SIZES: [f64; 2] = [1.0, 0.5];
 const SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
 const TURNS: [f64; 2] = [1.0, 3.0];
-/// Shorter ways show nothing that a look does not blur, metres.
+/// Shorter ways show nothing that a measurement does not blur, metres.
 const SHORTEST_M: f64 = 0.2;
 
 /// A pair of runs, one in each direction, at one speed.
@@ -153,16 +153,16 @@ fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wh
 
 /// A trapezoid of speed over a way.
 struct Trapezoid {
-    way_m: f64,
+    distance_m: f64,
     top_m_s: f64,
     acceleration_m_s2: f64,
     duration_s: f64,
 }
 
 impl Trapezoid {
-    fn new(way_m: f64, speed_m_s: f64, acceleration_m_s2: f64) -> Self {
-        let top_m_s = speed_m_s.min((way_m * acceleration_m_s2).sqrt()).max(f64::MIN_POSITIVE);
-        Self { way_m, top_m_s, acceleration_m_s2, duration_s: way_m / top_m_s + top_m_s / acceleration_m_s2 }
+    fn new(distance_m: f64, speed_m_s: f64, acceleration_m_s2: f64) -> Self {
+        let top_m_s = speed_m_s.min((distance_m * acceleration_m_s2).sqrt()).max(f64::MIN_POSITIVE);
+        Self { distance_m, top_m_s, acceleration_m_s2, duration_s: distance_m / top_m_s + top_m_s / acceleration_m_s2 }
     }
 
     /// What share of the way is behind after a time.
@@ -173,15 +173,15 @@ impl Trapezoid {
         } else if t_s < self.duration_s - ramp_s {
             self.top_m_s * (t_s - 0.5 * ramp_s)
         } else {
-            self.way_m - 0.5 * self.acceleration_m_s2 * (self.duration_s - t_s).max(0.0).powi(2)
+            self.distance_m - 0.5 * self.acceleration_m_s2 * (self.duration_s - t_s).max(0.0).powi(2)
         };
-        gone_m / self.way_m
+        gone_m / self.distance_m
     }
 }
 
 /// When a run that is not driven yet is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Looks<'a> {
+pub(crate) enum Measurements<'a> {
     /// As the data's instrument looks.
     AsSoFar,
     /// At the start and at shares of the run's duration.
@@ -189,21 +189,21 @@ pub(crate) enum Looks<'a> {
 }
 
 /// A run as it would be recorded if the robot were as the model says and nothing had noise.
-pub(crate) fn foreseen_run(
+pub(crate) fn planned_run(
     program: &MotionProgram,
     setting: &Setting,
     speed_m_s: f64,
     model: &Model,
     phase_rad: Wheels<f64>,
-    looks: Looks<'_>,
+    measurements: Measurements<'_>,
 ) -> Option<Run> {
     let log = log(program, setting, speed_m_s, phase_rad)?;
     let end_s = *log.t_s.last()?;
-    let times: Vec<f64> = match (looks, setting.reading) {
-        (Looks::At(shares), _) => std::iter::once(0.0).chain(shares.iter().map(|share| share * end_s)).collect(),
-        (Looks::AsSoFar, Reading::AtEnds) => vec![0.0, end_s],
-        (Looks::AsSoFar, Reading::Standing) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
-        (Looks::AsSoFar, Reading::Even(between_s)) => {
+    let times: Vec<f64> = match (measurements, setting.reading) {
+        (Measurements::At(shares), _) => std::iter::once(0.0).chain(shares.iter().map(|share| share * end_s)).collect(),
+        (Measurements::AsSoFar, Reading::AtEnds) => vec![0.0, end_s],
+        (Measurements::AsSoFar, Reading::Standing) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
+        (Measurements::AsSoFar, Reading::Even(between_s)) => {
             let mut times: Vec<f64> = std::iter::successors(Some(0.0), |t_s| Some(t_s + between_s))
                 .take_while(|t_s| *t_s < end_s - 0.5 * between_s)
                 .collect();
@@ -219,10 +219,11 @@ pub(crate) fn foreseen_run(
         ..RunInfo::default()
     };
     let mut run = Run { info, ..Run::default() };
-    if setting.relative && looks == Looks::AsSoFar {
+    if setting.relative && measurements == Measurements::AsSoFar {
         run.displacements = poses.windows(2).map(displacement).collect();
     } else {
-        let heading = |pose: &Pose| (setting.sees_heading || looks != Looks::AsSoFar).then_some(pose.theta_rad);
+        let heading =
+            |pose: &Pose| (setting.sees_heading || measurements != Measurements::AsSoFar).then_some(pose.theta_rad);
         run.truth = poses.iter().map(|(t_s, pose)| TruthSample::new(*t_s, pose.x_m, pose.y_m, heading(pose))).collect();
     }
     let wheels = if setting.twist { twist(&log, setting)? } else { WheelLog::Angles(log.angle_rad) };
@@ -285,10 +286,10 @@ pub(crate) fn phase_rad(run: u32) -> Wheels<f64> {
 }
 
 /// A pair of runs of a manoeuvre.
-pub(crate) fn foreseen(manoeuvre: &Manoeuvre, setting: &Setting, model: &Model) -> Dataset {
+pub(crate) fn planned(manoeuvre: &Manoeuvre, setting: &Setting, model: &Model) -> Dataset {
     let programs = manoeuvre.schedule.with_pairs(1).programs();
     let runs = programs.iter().zip(0..).filter_map(|(program, number)| {
-        foreseen_run(program, setting, manoeuvre.speed_m_s, model, phase_rad(number), Looks::AsSoFar)
+        planned_run(program, setting, manoeuvre.speed_m_s, model, phase_rad(number), Measurements::AsSoFar)
     });
     of_runs(setting, runs.collect())
 }
@@ -318,23 +319,23 @@ impl Part {
 }
 
 /// The evidence of a pair of runs of each manoeuvre for a fit's own terms and some more.
-pub(crate) fn evidences(
-    fit: &JointFit<'_>,
-    all: &[Choice],
+pub(crate) fn equations_of(
+    fit: &ModelFit<'_>,
+    all: &[Candidate],
     setting: &Setting,
     manoeuvres: &[Manoeuvre],
-) -> Vec<(Manoeuvre, Evidence)> {
+) -> Vec<(Manoeuvre, NormalEquations)> {
     manoeuvres
         .iter()
         .filter_map(|manoeuvre| {
-            let dataset = foreseen(manoeuvre, setting, &fit.fit.model);
-            let foreseen = fit.foreseeing(&[dataset.session()]);
-            Some((*manoeuvre, total(&foreseen.scan(&mut terms(all)).runs)?))
+            let dataset = planned(manoeuvre, setting, &fit.fit.model);
+            let planned = fit.on_planned_runs(&[dataset.session()]);
+            Some((*manoeuvre, total(&planned.scan(&mut terms(all)).runs)?))
         })
         .collect()
 }
 
-/// Where to look.
+/// Where to measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Where {
     pub(super) direction: usize,
@@ -397,13 +398,13 @@ pub(super) mod tests {
         let setting = setting();
         for manoeuvre in library(&setting) {
             for program in manoeuvre.schedule.with_pairs(1).programs() {
-                let run = foreseen_run(
+                let run = planned_run(
                     &program,
                     &setting,
                     manoeuvre.speed_m_s,
                     &model(&setting),
                     phase_rad(1),
-                    Looks::AsSoFar,
+                    Measurements::AsSoFar,
                 )
                 .expect("a run");
                 let end = run.truth.last().expect("looks");
@@ -435,14 +436,16 @@ pub(super) mod tests {
     fn what_is_read_standing_is_read_where_the_program_says() {
         let setting = Setting { between_rows_s: f64::INFINITY, reading: Reading::Standing, ..setting() };
         let circle = &Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 }.programs()[1];
-        let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
+        let run =
+            planned_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Measurements::AsSoFar).expect("a run");
         let seen: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
         assert_eq!(seen.len(), 3);
         // Counter-clockwise from the origin along x: half a turn later the robot is a diameter to the left.
         assert!(seen[1].0.abs() < 1e-9 && (seen[1].1 - 1.0).abs() < 1e-9, "{seen:?}");
         // An instrument that saw no more than starts and ends so far sees no more of this run.
         let setting = Setting { reading: Reading::AtEnds, ..setting };
-        let run = foreseen_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Looks::AsSoFar).expect("a run");
+        let run =
+            planned_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Measurements::AsSoFar).expect("a run");
         assert_eq!(run.truth.len(), 2);
     }
 }

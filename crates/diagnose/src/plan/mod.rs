@@ -12,12 +12,12 @@ mod rival_odds;
 mod text;
 
 use dataset::Dataset;
-use estimation::JointFit;
+use estimation::ModelFit;
 
-use crate::augmented_model::Extended;
-use crate::candidate::Choice;
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::Candidate;
 use crate::document::{Blind, NextExperiment};
-use crate::selection::Found;
+use crate::selection::SearchResult;
 
 use constraints::Setting;
 pub use constraints::{HANDLING_S, Limits, MINUTES, moved_over_m};
@@ -27,8 +27,8 @@ use manoeuvres::library;
 /// What to drive to tell apart the names of the first finding that has several, or else to see what would not have shown; or why there is nothing to drive.
 pub(crate) fn next_experiment(
     datasets: &[Dataset],
-    (base, found): (&JointFit<'_>, &Found<'_>),
-    (model, catalogue, blind): (&Extended<'_>, &[Choice], &[Blind]),
+    (base, found): (&ModelFit<'_>, &SearchResult<'_>),
+    (model, catalogue, detectability): (&AugmentedModel<'_>, &[Candidate], &[Blind]),
     limits: &Limits,
 ) -> Result<NextExperiment, String> {
     let setting = Setting::of_data(datasets, model, limits).ok_or("there is no dataset")?;
@@ -40,17 +40,17 @@ pub(crate) fn next_experiment(
         return Err(format!("no run fits {}", setting.within));
     }
     let mut why = None;
-    for place in (0..found.names.len()).filter(|place| found.names[*place].len() > 1) {
-        match discriminate::tell_apart(base, found, place, &setting, &manoeuvres) {
+    for index in (0..found.names.len()).filter(|index| found.names[*index].len() > 1) {
+        match discriminate::discriminate(base, found, index, &setting, &manoeuvres) {
             Ok(next) => return Ok(next),
             Err(reason) => why = Some(reason),
         }
     }
-    match (why, blind) {
+    match (why, detectability) {
         (Some(why), _) => Err(why),
         (None, []) => {
             Err("no name is left to be told from another, and nothing of the catalogue is out of sight".to_owned())
         }
-        (None, blind) => coverage::show(model, catalogue, blind, &setting, &manoeuvres),
+        (None, detectability) => coverage::show(model, catalogue, detectability, &setting, &manoeuvres),
     }
 }

@@ -3,28 +3,28 @@
 //! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
 //! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
 
-use estimation::{Column, EndError, Evidence, JointFit, Model};
+use estimation::{Column, EndError, Model, ModelFit, NormalEquations};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::constraints::Setting;
-use super::manoeuvres::{Looks, Part, Where, foreseen_run, of_runs, phase_rad};
+use super::manoeuvres::{Measurements, Part, Where, of_runs, phase_rad, planned_run};
 use super::rival_odds::Rivals;
 use super::text;
-use crate::augmented_model::Extended;
-use crate::candidate::{Choice, terms};
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
 
 /// Instants of a run at which a prediction is made: shares of its duration.
 const INSTANTS: usize = 12;
 /// How the wheels stand at the start is not known: so many ways are averaged.
 const PHASES: usize = 4;
-/// A difference of so many standard deviations shows in a single kind of look; with less, only all looks together tell.
-const SHOWS: f64 = 2.0;
+/// A difference of so many standard deviations shows in a single kind of measurement; with less, only all measurements together tell.
+const SINGLE_MEASUREMENT_SIGMAS: f64 = 2.0;
 
 /// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the name, and variance by the noise.
 #[derive(Debug, Clone)]
-struct Seen {
+struct Measured {
     mean: Vector3<f64>,
     known_var: Vector3<f64>,
     noise_var: Vector3<f64>,
@@ -32,42 +32,43 @@ struct Seen {
 
 /// A sentence of what is predicted, and the prediction of each name.
 pub(super) fn predictions(
-    base: &JointFit<'_>,
-    without: &Extended<'_>,
+    base: &ModelFit<'_>,
+    without: &AugmentedModel<'_>,
     rivals: &Rivals,
-    before: &Evidence,
-    told: &[(usize, usize)],
+    before: &NormalEquations,
+    discriminated: &[(usize, usize)],
     parts: &[Part],
     setting: &Setting,
 ) -> Option<(String, Predicted)> {
-    let mut best: Option<(f64, Part, Where, Vec<Seen>)> = None;
+    let mut best: Option<(f64, Part, Where, Vec<Measured>)> = None;
     for part in parts {
-        let run = Foreseen::new(base, part, setting)?;
-        let of_names: Vec<Vec<Seen>> = rivals
-            .candidates
+        let run = PlannedRun::new(base, part, setting)?;
+        let of_names: Vec<Vec<Measured>> = rivals
+            .rival_columns
             .iter()
-            .map(|candidate| {
-                let (step, covariance) = rivals.frame.estimate(before, &rivals.frame.with(candidate))?;
+            .map(|rival_columns| {
+                let (step, covariance) = rivals.frame.estimate(before, &rivals.frame.with(rival_columns))?;
                 // The other names, which are not there under this one, need not be driven.
-                let all: Vec<Choice> = without.choices.iter().chain([&candidate.choice]).cloned().collect();
-                let own =
-                    (0..candidate.columns.len()).map(|k| Column::Term(without.fit.fit.model.sizes.len() + k).index());
+                let all: Vec<Candidate> =
+                    without.candidates.iter().chain([&rival_columns.candidate]).cloned().collect();
+                let own = (0..rival_columns.columns.len())
+                    .map(|k| Column::Term(without.fit.fit.model.term_values.len() + k).index());
                 let columns: Vec<usize> = rivals.frame.free.iter().copied().chain(own).collect();
                 run.of(&without.fit.fit.model, &all, &columns, (&step, &covariance))
             })
             .collect::<Option<_>>()?;
         let components = if setting.sees_heading { 3 } else { 2 };
-        for place in 0..of_names[0].len() {
+        for index in 0..of_names[0].len() {
             for component in 0..components {
-                let seen: Vec<Seen> = of_names.iter().map(|name| name[place].clone()).collect();
+                let seen: Vec<Measured> = of_names.iter().map(|name| name[index].clone()).collect();
                 let apart = |(a, b): &(usize, usize)| {
                     let (a, b) = (&seen[*a], &seen[*b]);
                     let var = a.known_var[component] + b.known_var[component] + a.noise_var[component];
                     (a.mean[component] - b.mean[component]).abs() / var.max(f64::MIN_POSITIVE).sqrt()
                 };
-                let sigmas = told.iter().map(apart).fold(f64::INFINITY, f64::min);
+                let sigmas = discriminated.iter().map(apart).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
-                    let at = Where { direction: place / INSTANTS, share: shares()[place % INSTANTS], component };
+                    let at = Where { direction: index / INSTANTS, share: shares()[index % INSTANTS], component };
                     best = Some((sigmas, *part, at, seen));
                 }
             }
@@ -75,9 +76,9 @@ pub(super) fn predictions(
     }
     let (sigmas, part, at, seen) = best?;
     let unit = if at.component == 2 { "rad" } else { "m" };
-    let values = rivals.candidates.iter().zip(&seen).map(|(candidate, seen)| {
+    let values = rivals.rival_columns.iter().zip(&seen).map(|(rival_columns, seen)| {
         let (value, var) = (seen.mean[at.component], (seen.known_var + seen.noise_var)[at.component]);
-        (candidate.choice.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
+        (rival_columns.candidate.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
     });
     let predicted = Predicted {
         direction: text::direction(&part.manoeuvre.schedule, at.direction).to_owned(),
@@ -86,8 +87,8 @@ pub(super) fn predictions(
         values: values.collect(),
     };
     let mut sentence = text::where_to_look(&part, &at);
-    if sigmas < SHOWS {
-        sentence.push_str(" No single look tells them apart: all looks of the runs together do.");
+    if sigmas < SINGLE_MEASUREMENT_SIGMAS {
+        sentence.push_str(" No single measurement tells them apart: all measurements of the runs together do.");
     }
     Some((sentence, predicted))
 }
@@ -98,41 +99,42 @@ fn shares() -> [f64; INSTANTS] {
     std::array::from_fn(|instant| (instant + 1) as f64 / INSTANTS as f64)
 }
 
-/// Where the looks of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
-fn looks_at(place: usize) -> impl Iterator<Item = usize> {
-    let (direction, instant) = (place / INSTANTS, place % INSTANTS);
+/// Where the measurements of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
+fn looks_at(index: usize) -> impl Iterator<Item = usize> {
+    let (direction, instant) = (index / INSTANTS, index % INSTANTS);
     (0..PHASES).map(move |phase| (direction * PHASES + phase) * INSTANTS + instant)
 }
 
 /// Runs of a part, each seen at its start and at every instant, by direction and phase.
-struct Foreseen {
+struct PlannedRun {
     dataset: dataset::Dataset,
     reference: Model,
-    /// What the noise makes of each look after the start.
+    /// What the noise makes of each measurement after the start.
     noise: Vec<Vector3<f64>>,
     runs: f64,
 }
 
-impl Foreseen {
-    fn new(base: &JointFit<'_>, part: &Part, setting: &Setting) -> Option<Self> {
+impl PlannedRun {
+    fn new(base: &ModelFit<'_>, part: &Part, setting: &Setting) -> Option<Self> {
         let programs = part.manoeuvre.schedule.with_pairs(1).programs();
         let model = &base.fit.model;
-        let driven = |looks: &[f64]| -> Option<dataset::Dataset> {
+        let driven = |measurements: &[f64]| -> Option<dataset::Dataset> {
             let mut runs = Vec::new();
             for program in &programs {
                 for phase in (0..).take(PHASES).map(phase_rad) {
                     let speed_m_s = part.manoeuvre.speed_m_s;
-                    let mut run = foreseen_run(program, setting, speed_m_s, model, phase, Looks::At(looks))?;
+                    let mut run =
+                        planned_run(program, setting, speed_m_s, model, phase, Measurements::At(measurements))?;
                     run.info.id = format!("{}_{}", program.id, runs.len());
                     runs.push(run);
                 }
             }
             Some(of_runs(setting, runs))
         };
-        // Each look by itself: one before it, which also errs, would say where the robot was.
+        // Each measurement by itself: one before it, which also errs, would say where the robot was.
         let of_instants: Vec<Vec<Vector3<f64>>> = shares()
             .iter()
-            .map(|share| Some(base.foreseeing(&[driven(&[*share])?.session()]).end_variances()))
+            .map(|share| Some(base.on_planned_runs(&[driven(&[*share])?.session()]).end_variances()))
             .collect::<Option<_>>()?;
         let dataset = driven(&shares())?;
         let noise = (0..dataset.runs.len()).flat_map(|run| of_instants.iter().map(move |of| of.get(run).copied()));
@@ -148,43 +150,45 @@ impl Foreseen {
     fn of(
         &self,
         model: &Model,
-        all: &[Choice],
+        all: &[Candidate],
         columns: &[usize],
         (step, covariance): (&DVector<f64>, &DMatrix<f64>),
-    ) -> Option<Vec<Seen>> {
-        let parameters: usize = all.iter().map(|choice| choice.parameters().len()).sum();
+    ) -> Option<Vec<Measured>> {
+        let parameters: usize = all.iter().map(|candidate| candidate.parameters().len()).sum();
         let mut named = model.clone();
-        named.sizes.resize(parameters, 0.0);
+        named.term_values.resize(parameters, 0.0);
         columns.iter().zip(step.iter()).for_each(|(column, by)| named.advance(column_at(*column), *by));
         let noise = estimation::Noise { variance: [1.0; 4] };
         // Only the records matter here: dead reckoning takes the model that it is given.
-        let fit = JointFit::unfitted(self.reference.clone(), noise, &[self.dataset.session()]);
-        let looks = |model: &Model| -> Option<Vec<Vector3<f64>>> {
-            let ends = fit.reckoned_looks(model, &mut terms(all));
+        let fit = ModelFit::from_parameters(self.reference.clone(), noise, &[self.dataset.session()]);
+        let measurements = |model: &Model| -> Option<Vec<Vector3<f64>>> {
+            let ends = fit.dead_reckoned_measurements(model, &mut terms(all));
             let vector = |end: &EndError| Vector3::new(end.off.x_m, end.off.y_m, end.off.theta_rad);
             (ends.len() == self.noise.len()).then(|| ends.iter().map(vector).collect())
         };
-        let here = looks(&named)?;
+        let here = measurements(&named)?;
         let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
             let by = 0.1 * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
-            Some(looks(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
+            Some(measurements(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
         #[allow(clippy::cast_precision_loss)] // four
         let mean =
-            |place, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(place).map(of).sum::<Vector3<f64>>() / PHASES as f64;
-        let seen = (0..here.len() / PHASES).map(|place| {
-            let own = mean(place, &|look| here[look]);
-            let noise = mean(place, &|look| self.noise[look]);
-            let spread = mean(place, &|look| (here[look] - own).component_mul(&(here[look] - own)));
-            let slope: Vec<Vector3<f64>> = slopes.iter().map(|of| mean(place, &|look| of[look])).collect();
+            |index, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(index).map(of).sum::<Vector3<f64>>() / PHASES as f64;
+        let seen = (0..here.len() / PHASES).map(|index| {
+            let own = mean(index, &|measurement| here[measurement]);
+            let noise = mean(index, &|measurement| self.noise[measurement]);
+            let spread =
+                mean(index, &|measurement| (here[measurement] - own).component_mul(&(here[measurement] - own)));
+            let slope: Vec<Vector3<f64>> =
+                slopes.iter().map(|of| mean(index, &|measurement| of[measurement])).collect();
             let known_var = Vector3::from_fn(|component, _| {
                 let slope = DVector::from_fn(slope.len(), |k, _| slope[k][component]);
                 (slope.transpose() * covariance * &slope)[0].max(0.0)
             });
-            Seen { mean: own, known_var, noise_var: (noise + spread) / self.runs }
+            Measured { mean: own, known_var, noise_var: (noise + spread) / self.runs }
         });
         Some(seen.collect())
     }

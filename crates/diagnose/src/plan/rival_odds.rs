@@ -3,12 +3,12 @@
 //! With Î the information of old and planned runs together, n what is free beside and b another name's sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s,
 //! the noncentrality of the test of b against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
 
-use estimation::{Column, Evidence, JointFit, RIDGE, inverse};
+use estimation::{Column, ModelFit, NormalEquations, RIDGE, inverse};
 use nalgebra::{DMatrix, DVector};
 
 use super::manoeuvres::{Manoeuvre, Part};
-use crate::candidate::Choice;
-use crate::model_comparison::reach;
+use crate::candidate::Candidate;
+use crate::model_comparison::log_odds_margin;
 
 /// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
 /// mounting, seconds.
@@ -19,32 +19,32 @@ const LATENCY_SD_S: f64 = 0.2;
 
 /// How sure it must be that names are told apart. The log of the odds is normal with mean λ/2 and variance λ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sure {
+pub(crate) enum Confidence {
     /// With 19 chances in 20.
-    Certain,
+    P95,
     /// With even chances.
-    AsNot,
+    P50,
 }
 
 /// With 19 chances in 20 a normal variable is not lower than so many standard deviations below its mean.
 const CERTAIN_SIGMAS: f64 = 1.645;
 
-/// The log of the odds that holds with 19 chances in 20: λ/2 − e√λ at the likeliest of those errors e of the new looks and of √λ, a size not being known
+/// The log of the odds that holds with 19 chances in 20: λ/2 − e√λ at the likeliest of those errors e of the new measurements and of √λ, a size not being known
 /// better than by the old data, that are as unlikely as that (the design point of first-order reliability, Hasofer & Lind 1974).
 fn certain_log_odds(root: f64, root_sigma: f64) -> f64 {
     const STEPS: u32 = 32;
     let at = |step: u32| {
-        let (looks, size) = (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(STEPS)).sin_cos();
+        let (measurements, size) = (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(STEPS)).sin_cos();
         let root = (root - CERTAIN_SIGMAS * size * root_sigma).max(0.0);
-        0.5 * root * root - CERTAIN_SIGMAS * looks * root
+        0.5 * root * root - CERTAIN_SIGMAS * measurements * root
     };
     (0..=STEPS).map(at).fold(f64::INFINITY, f64::min)
 }
 
 /// One of several names, with its columns of the normal equation.
 #[derive(Debug, Clone)]
-pub(crate) struct Candidate {
-    pub(crate) choice: Choice,
+pub(crate) struct RivalColumns {
+    pub(crate) candidate: Candidate,
     pub(crate) columns: Vec<usize>,
 }
 
@@ -57,49 +57,58 @@ pub(crate) struct Frame {
 
 impl Frame {
     /// Of a fit with further terms: first those of the fit, then those of the candidates.
-    pub(crate) fn of(fit: &JointFit<'_>, terms: &[Choice]) -> Self {
+    pub(crate) fn of(fit: &ModelFit<'_>, terms: &[Candidate]) -> Self {
         let base = Column::BASE.map(|column| match column {
             Column::LeftWheel | Column::RightWheel | Column::Separation => LENGTH_SD,
-            Column::MountX | Column::MountY => MOUNT_SD_M,
-            Column::MountTheta => MOUNT_SD_RAD,
+            Column::SensorX | Column::SensorY => MOUNT_SD_M,
+            Column::SensorTheta => MOUNT_SD_RAD,
             Column::Latency | Column::Term(_) => LATENCY_SD_S,
         });
-        let of_terms = terms.iter().flat_map(Choice::parameters).map(|parameter| parameter.plausible);
+        let of_terms = terms.iter().flat_map(Candidate::parameters).map(|parameter| parameter.prior_sigma);
         let weights: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();
         Self { free: fit.columns.iter().map(|column| column.index()).collect(), prior: DVector::from_vec(weights) }
     }
 
     /// The normal equation of some columns with what is plausible of them.
-    fn matrix(&self, evidence: &Evidence, columns: &[usize]) -> DMatrix<f64> {
+    fn matrix(&self, equations: &NormalEquations, columns: &[usize]) -> DMatrix<f64> {
         DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-            evidence.information[(columns[i], columns[j])] + if i == j { self.prior[columns[i]] } else { 0.0 }
+            equations.information[(columns[i], columns[j])] + if i == j { self.prior[columns[i]] } else { 0.0 }
         })
     }
 
     /// Estimates of some columns from evidence, as steps from the model in force, and their covariance.
-    pub(crate) fn estimate(&self, evidence: &Evidence, columns: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let covariance = inverse(&self.matrix(evidence, columns), RIDGE)?;
-        let gradient = DVector::from_fn(columns.len(), |k, _| evidence.gradient[columns[k]]);
+    pub(crate) fn estimate(
+        &self,
+        equations: &NormalEquations,
+        columns: &[usize],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let covariance = inverse(&self.matrix(equations, columns), RIDGE)?;
+        let gradient = DVector::from_fn(columns.len(), |k, _| equations.gradient[columns[k]]);
         Some((-(&covariance * gradient), covariance))
     }
 
     /// The information on some columns with others at their best.
-    pub(crate) fn information(&self, evidence: &Evidence, own: &[usize], others: &[usize]) -> Option<DMatrix<f64>> {
-        let inverse = inverse(&self.matrix(evidence, others), RIDGE)?;
-        let cross = DMatrix::from_fn(own.len(), others.len(), |i, j| evidence.information[(own[i], others[j])]);
-        let raw = DMatrix::from_fn(own.len(), own.len(), |i, j| evidence.information[(own[i], own[j])]);
+    pub(crate) fn information(
+        &self,
+        equations: &NormalEquations,
+        own: &[usize],
+        others: &[usize],
+    ) -> Option<DMatrix<f64>> {
+        let inverse = inverse(&self.matrix(equations, others), RIDGE)?;
+        let cross = DMatrix::from_fn(own.len(), others.len(), |i, j| equations.information[(own[i], others[j])]);
+        let raw = DMatrix::from_fn(own.len(), own.len(), |i, j| equations.information[(own[i], own[j])]);
         Some(raw - &cross * inverse * cross.transpose())
     }
 
     /// Free columns and a candidate's.
-    pub(crate) fn with(&self, candidate: &Candidate) -> Vec<usize> {
-        self.free.iter().chain(&candidate.columns).copied().collect()
+    pub(crate) fn with(&self, rival_columns: &RivalColumns) -> Vec<usize> {
+        self.free.iter().chain(&rival_columns.columns).copied().collect()
     }
 }
 
 /// How well two names are told apart, of the name that is harder to tell from the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Apart {
+pub(crate) struct Grouping {
     /// √λ: in standard deviations.
     pub(crate) sigmas: f64,
     /// By how much the log of the odds exceeds what diagnosis asks before it drops a name, with even chances; where names must stand out, at most by how much they do.
@@ -108,11 +117,11 @@ pub(crate) struct Apart {
     certain: f64,
 }
 
-impl Apart {
-    pub(crate) fn margin(&self, sure: Sure) -> f64 {
-        match sure {
-            Sure::Certain => self.certain,
-            Sure::AsNot => self.even,
+impl Grouping {
+    pub(crate) fn margin(&self, confidence: Confidence) -> f64 {
+        match confidence {
+            Confidence::P95 => self.certain,
+            Confidence::P50 => self.even,
         }
     }
 
@@ -129,22 +138,22 @@ impl Apart {
 #[derive(Debug, Clone)]
 pub(crate) struct Rivals {
     pub(crate) frame: Frame,
-    pub(crate) candidates: Vec<Candidate>,
-    pub(crate) sizes: Vec<DVector<f64>>,
+    pub(crate) rival_columns: Vec<RivalColumns>,
+    pub(crate) estimates: Vec<DVector<f64>>,
     covariances: Vec<DMatrix<f64>>,
     /// By how much the log of the odds against nothing at all must speak for a name as well.
     stands_out: f64,
 }
 
 impl Rivals {
-    pub(crate) fn new(frame: Frame, candidates: Vec<Candidate>, before: &Evidence) -> Option<Self> {
-        let estimate = |candidate: &Candidate| {
-            let (step, covariance) = frame.estimate(before, &frame.with(candidate))?;
-            let (first, own) = (frame.free.len(), candidate.columns.len());
+    pub(crate) fn new(frame: Frame, rival_columns: Vec<RivalColumns>, before: &NormalEquations) -> Option<Self> {
+        let estimate = |rival_columns: &RivalColumns| {
+            let (step, covariance) = frame.estimate(before, &frame.with(rival_columns))?;
+            let (first, own) = (frame.free.len(), rival_columns.columns.len());
             Some((step.rows(first, own).into_owned(), covariance.view((first, first), (own, own)).into_owned()))
         };
-        let (sizes, covariances) = candidates.iter().map(estimate).collect::<Option<_>>()?;
-        Some(Self { frame, candidates, sizes, covariances, stands_out: f64::NEG_INFINITY })
+        let (estimates, covariances) = rival_columns.iter().map(estimate).collect::<Option<_>>()?;
+        Some(Self { frame, rival_columns, estimates, covariances, stands_out: f64::NEG_INFINITY })
     }
 
     /// The same names, which must stand out from nothing by so many standard deviations too.
@@ -154,16 +163,16 @@ impl Rivals {
 
     /// Every pair of names.
     pub(crate) fn pairs(&self) -> Vec<(usize, usize)> {
-        let n = self.candidates.len();
+        let n = self.rival_columns.len();
         (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect()
     }
 
     /// What evidence makes of a pair, whichever of the two is true.
-    pub(crate) fn apart(&self, evidence: &Evidence, (a, b): (usize, usize)) -> Option<Apart> {
+    pub(crate) fn apart(&self, equations: &NormalEquations, (a, b): (usize, usize)) -> Option<Grouping> {
         let one_way = |a: usize, b: usize| {
-            let (own, size) = (&self.candidates[a].columns, &self.sizes[a]);
-            let left = self.frame.information(evidence, own, &self.frame.with(&self.candidates[b]))?;
-            let alone = self.frame.information(evidence, own, &self.frame.free)?;
+            let (own, size) = (&self.rival_columns[a].columns, &self.estimates[a]);
+            let left = self.frame.information(equations, own, &self.frame.with(&self.rival_columns[b]))?;
+            let alone = self.frame.information(equations, own, &self.frame.free)?;
             // √λ = √(sᵀ L s) has the gradient L s / √λ.
             let odds = |information: &DMatrix<f64>| {
                 let gradient = information * size;
@@ -173,8 +182,8 @@ impl Rivals {
                 (root, 0.5 * lambda, if root > 0.0 { certain_log_odds(root, sigma) } else { 0.0 })
             };
             let ((sigmas, even, certain), (_, even_alone, certain_alone)) = (odds(&left), odds(&alone));
-            let asked = reach(even_alone);
-            Some(Apart {
+            let asked = log_odds_margin(even_alone);
+            Some(Grouping {
                 sigmas,
                 even: (even - asked).min(even_alone - self.stands_out),
                 certain: (certain - asked).min(certain_alone - self.stands_out),
@@ -185,19 +194,23 @@ impl Rivals {
 }
 
 /// Evidence with so many times a pair of runs added.
-pub(crate) fn with_runs(before: &Evidence, added: &[(&Evidence, f64)]) -> Evidence {
+pub(crate) fn with_runs(before: &NormalEquations, added: &[(&NormalEquations, f64)]) -> NormalEquations {
     let mut all = before.clone();
-    added.iter().for_each(|(evidence, times)| all.add(evidence, *times));
+    added.iter().for_each(|(equations, times)| all.add(equations, *times));
     all
 }
 
 /// The same with the runs of a plan's parts, each made up among the options.
-pub(crate) fn with_parts(before: &Evidence, parts: &[Part], options: &[(Manoeuvre, Evidence)]) -> Evidence {
-    let added: Vec<(&Evidence, f64)> = parts
+pub(crate) fn with_parts(
+    before: &NormalEquations,
+    parts: &[Part],
+    options: &[(Manoeuvre, NormalEquations)],
+) -> NormalEquations {
+    let added: Vec<(&NormalEquations, f64)> = parts
         .iter()
         .filter_map(|part| {
-            let (_, evidence) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
-            Some((evidence, f64::from(part.pairs)))
+            let (_, equations) = options.iter().find(|(manoeuvre, _)| *manoeuvre == part.manoeuvre)?;
+            Some((equations, f64::from(part.pairs)))
         })
         .collect();
     with_runs(before, &added)
@@ -208,9 +221,9 @@ pub(super) mod tests {
     use super::*;
     use crate::statistics::p_of_z;
 
-    /// Evidence of looks whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
-    pub(in crate::plan) fn evidence(slopes: &DMatrix<f64>, values: &DVector<f64>) -> Evidence {
-        Evidence {
+    /// Evidence of measurements whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
+    pub(in crate::plan) fn log_bayes_factor(slopes: &DMatrix<f64>, values: &DVector<f64>) -> NormalEquations {
+        NormalEquations {
             run: (0, 0),
             information: slopes.transpose() * slopes,
             gradient: -(slopes.transpose() * values),
@@ -221,45 +234,45 @@ pub(super) mod tests {
     }
 
     /// Of two names, columns 1 and 2, beside a nuisance, column 0.
-    pub(in crate::plan) fn rivals(before: &Evidence) -> Rivals {
-        let candidate = |column| Candidate {
-            choice: Choice::Effect { id: "slip_speed", shape: 0, at: None },
+    pub(in crate::plan) fn rivals(before: &NormalEquations) -> Rivals {
+        let rival_columns = |column| RivalColumns {
+            candidate: Candidate::Effect { id: "slip_speed", variant: 0, at: None },
             columns: vec![column],
         };
         let frame = Frame { free: vec![0], prior: DVector::from_element(3, 1e-9) };
-        Rivals::new(frame, vec![candidate(1), candidate(2)], before).expect("determined")
+        Rivals::new(frame, vec![rival_columns(1), rival_columns(2)], before).expect("determined")
     }
 
     /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
     #[test]
     fn what_another_name_can_say_as_well_tells_nothing() {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 10.0]));
+        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 10.0]));
         let rivals = rivals(&before);
         // Both names say 10, and nothing tells them apart.
-        assert!(rivals.sizes.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.sizes);
+        assert!(rivals.estimates.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.estimates);
         let apart = rivals.apart(&before, (0, 1)).expect("determined");
-        assert!(apart.sigmas < 1e-3 && apart.margin(Sure::AsNot) < 0.0, "{apart:?}");
+        assert!(apart.sigmas < 1e-3 && apart.margin(Confidence::P50) < 0.0, "{apart:?}");
         // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
-        let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
+        let new = log_bayes_factor(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
         let apart = rivals.apart(&after, (0, 1)).expect("determined");
         // To the size of the priors. Without the other name at its best both would leave 100 or more.
         assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
-        assert!((apart.margin(Sure::AsNot) - (25.0 - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((apart.margin(Confidence::P50) - (25.0 - 3.0)).abs() < 1e-3, "{apart:?}");
         // A size of 10 ± 1 makes √λ uncertain by a tenth.
         let certain = certain_log_odds(50_f64.sqrt(), 0.1 * 50_f64.sqrt());
-        assert!((apart.margin(Sure::Certain) - (certain - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((apart.margin(Confidence::P95) - (certain - 3.0)).abs() < 1e-3, "{apart:?}");
     }
 
     #[test]
     fn names_that_must_stand_out_are_told_only_where_they_do() {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-        let before = evidence(&old, &DVector::from_column_slice(&[0.3, 4.0]));
-        // Four looks see name 1 alone, and tell it from name 2: to 4² · (5 − 1) and 4² · (1 − 1/5) of λ.
-        let new = evidence(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
+        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 4.0]));
+        // Four measurements see name 1 alone, and tell it from name 2: to 4² · (5 − 1) and 4² · (1 − 1/5) of λ.
+        let new = log_bayes_factor(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
-        let margin = |rivals: &Rivals| rivals.apart(&after, (0, 1)).expect("determined").margin(Sure::AsNot);
+        let margin = |rivals: &Rivals| rivals.apart(&after, (0, 1)).expect("determined").margin(Confidence::P50);
         let plain = rivals(&before);
         assert!((margin(&plain) - (6.4 - 3.0)).abs() < 1e-3, "{}", margin(&plain));
         // Name 2 stands out as before, by 4 standard deviations.
@@ -279,8 +292,8 @@ pub(super) mod tests {
                 let (weight, root) = ((-0.5 * z * z).exp(), root + sigma * z);
                 // ½ r² + r e is below the bound where e is below this.
                 let error = (bound - 0.5 * root * root) / root;
-                let chance = if error > 0.0 { 1.0 - 0.5 * p_of_z(error) } else { 0.5 * p_of_z(error) };
-                below += weight * chance;
+                let relative_odds = if error > 0.0 { 1.0 - 0.5 * p_of_z(error) } else { 0.5 * p_of_z(error) };
+                below += weight * relative_odds;
                 all += weight;
             }
             let share = below / all;

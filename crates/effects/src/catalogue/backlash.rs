@@ -13,7 +13,7 @@ use crate::benchmark::{Benchmark, SizeLaw};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -45,7 +45,7 @@ impl PhysicalEffect for Backlash {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("width_m", &WIDTH_M, |width_m| Term { width_m, lead: Wheels::both(0.0) }))
+        Hypothesis::Terms(Variant::over("width_m", &WIDTH_M, |width_m| Term { width_m, lead: Wheels::both(0.0) }))
     }
 
     fn description() -> Description {
@@ -73,7 +73,7 @@ impl PhysicalEffect for Backlash {
     }
 
     /// A wheel whose gap was found negative has none.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (left_gap_m, right_gap_m) = (size(sizes, "left_gap_m")?, size(sizes, "right_gap_m")?);
         (left_gap_m > 0.0 || right_gap_m > 0.0)
             .then(|| Self { left_gap_m: left_gap_m.max(0.0), right_gap_m: right_gap_m.max(0.0) })
@@ -88,10 +88,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { seed_run: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, mut stream: Stream) {
+    fn seed_run(&mut self, mut stream: Stream) {
         // Where in its gap the wheel was left, nobody knows.
         self.lead_m = Wheels::from_sides(|side| stream.uniform_about_zero(self.half_gap_m[side]));
     }
@@ -121,8 +121,8 @@ impl ModelTerm for Term {
     /// Plausible: 2.6 mm, the upper end of what was derived.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "left_gap_m", unit: "m", plausible: 2.6e-3 },
-            TermParameter { name: "right_gap_m", unit: "m", plausible: 2.6e-3 },
+            TermParameter { name: "left_gap_m", unit: "m", prior_sigma: 2.6e-3 },
+            TermParameter { name: "right_gap_m", unit: "m", prior_sigma: 2.6e-3 },
         ]
     }
 
@@ -151,10 +151,10 @@ struct SpringyPlay {
 
 impl Forward for SpringyPlay {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { seed_run: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, _stream: Stream) {
+    fn seed_run(&mut self, _stream: Stream) {
         self.lead_m = Wheels::default();
     }
 

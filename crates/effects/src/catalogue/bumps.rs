@@ -1,7 +1,7 @@
 //! `bumps`: cables, sills and crumbs that one wheel drives over.
 //!
 //! Model: each wheel meets bumps as a Poisson process along its way; over a bump of height h a wheel of radius r rolls about its edge and loses
-//! 2(r acos(1−h/r) − √(2rh−h²)) of way. Signature: isolated spikes of e_dθ, kurtosis. Observability: many looks. Alias: `traction_loss`.
+//! 2(r acos(1−h/r) − √(2rh−h²)) of way. Signature: isolated spikes of e_dθ, kurtosis. Observability: many measurements. Alias: `traction_loss`.
 //! Reference: Borenstein & Feng 1995, whose test floor has ten cables of 9 to 10 mm; the loss is geometry of a rigid wheel.
 
 use kinematics::{Side, Wheels};
@@ -54,7 +54,7 @@ impl PhysicalEffect for Bumps {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { per_m: size(sizes, "per_m")?, height_m: size(sizes, "height_m")? })
     }
 
@@ -84,10 +84,10 @@ fn gap_m(stream: &mut Stream, per_m: f64) -> f64 {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, mut stream: Stream) {
+    fn seed_run(&mut self, mut stream: Stream) {
         self.ahead_m = Wheels::from_sides(|_| gap_m(&mut stream, self.size.per_m));
         self.stream = Some(stream);
     }
@@ -131,11 +131,11 @@ mod tests {
     fn wheels_meet_the_stated_number_each() {
         let size = Bumps { per_m: 2.0, height_m: 0.005 };
         let mut state = size.forward().expect("acts on the floor");
-        state.start_run(Address { seed: 4, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
-        let (mut met, way_m) = (Wheels::both(0.0), 5000.0);
+        state.seed_run(Address { seed: 4, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        let (mut met, distance_m) = (Wheels::both(0.0), 5000.0);
         for _ in 0..50_000 {
             let mut step = specimen_step();
-            step.travel_m = Wheels::both(-way_m / 50_000.0);
+            step.travel_m = Wheels::both(-distance_m / 50_000.0);
             let before_m = step.travel_m;
             state.floor(&mut step);
             let lost = lost_m(0.08, 0.005);
@@ -143,7 +143,7 @@ mod tests {
         }
         // A Poisson number of 10 000: five standard deviations are 500. A loss in the wrong direction would count negative.
         for side in Side::BOTH {
-            assert!((met[side] - 2.0 * way_m).abs() < 5.0 * (2.0 * way_m).sqrt(), "{met:?}");
+            assert!((met[side] - 2.0 * distance_m).abs() < 5.0 * (2.0 * distance_m).sqrt(), "{met:?}");
         }
     }
 }

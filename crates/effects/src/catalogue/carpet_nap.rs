@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, in_room, size};
+use crate::hypothesis::{Hypothesis, Variant, in_room, size};
 
 /// Pull of a carpet.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ impl PhysicalEffect for CarpetNap {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -49,7 +49,7 @@ impl PhysicalEffect for CarpetNap {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
             drift_x: size(sizes, "drift_x")?,
             drift_y: size(sizes, "drift_y")?,
@@ -70,12 +70,12 @@ impl Forward for State {
 
     fn floor(&mut self, step: &mut Step) {
         let CarpetNap { drift_x, drift_y, yaw_sin_rad_m, yaw_cos_rad_m } = self.size;
-        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right).abs();
+        let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right).abs();
         let half_rad = 0.5 * (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
         let (sin, cos) = (step.world_from_body.theta_rad + half_rad).sin_cos();
-        step.creep_m[0] += drift_x * way_m;
-        step.creep_m[1] += drift_y * way_m;
-        step.extra_turn_rad += (yaw_sin_rad_m * sin + yaw_cos_rad_m * cos) * sinc(half_rad) * way_m;
+        step.creep_m[0] += drift_x * distance_m;
+        step.creep_m[1] += drift_y * distance_m;
+        step.extra_turn_rad += (yaw_sin_rad_m * sin + yaw_cos_rad_m * cos) * sinc(half_rad) * distance_m;
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -91,22 +91,22 @@ impl ModelTerm for Term {
     /// Plausible: 1 cm/m, the upper end of what users report, and half a degree a metre.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "drift_x", unit: "1", plausible: 0.01 },
-            TermParameter { name: "drift_y", unit: "1", plausible: 0.01 },
-            TermParameter { name: "yaw_sin_rad_m", unit: "rad/m", plausible: 0.01 },
-            TermParameter { name: "yaw_cos_rad_m", unit: "rad/m", plausible: 0.01 },
+            TermParameter { name: "drift_x", unit: "1", prior_sigma: 0.01 },
+            TermParameter { name: "drift_y", unit: "1", prior_sigma: 0.01 },
+            TermParameter { name: "yaw_sin_rad_m", unit: "rad/m", prior_sigma: 0.01 },
+            TermParameter { name: "yaw_cos_rad_m", unit: "rad/m", prior_sigma: 0.01 },
         ]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let increment = interval.increment();
-        let way_m = increment.distance_m.abs();
+        let distance_m = increment.distance_m.abs();
         let heading_rad = interval.world_from_body.theta_rad + 0.5 * increment.turn_rad;
-        gradient[0] = in_room(interval, [way_m, 0.0]);
-        gradient[1] = in_room(interval, [0.0, way_m]);
+        gradient[0] = in_room(interval, [distance_m, 0.0]);
+        gradient[1] = in_room(interval, [0.0, distance_m]);
         let (sin, cos) = sin_cos(heading_rad);
-        gradient[2].theta_rad = way_m * sin;
-        gradient[3].theta_rad = way_m * cos;
+        gradient[2].theta_rad = distance_m * sin;
+        gradient[3].theta_rad = distance_m * cos;
     }
 }
 

@@ -13,7 +13,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the castor resists rolling aside";
@@ -42,7 +42,7 @@ impl PhysicalEffect for CastorDrag {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::along("castor_behind_m", &CASTOR_BEHIND_M, |castor_behind_m| {
+        Hypothesis::Terms(Variant::along("castor_behind_m", &CASTOR_BEHIND_M, |castor_behind_m| {
             Box::new(Term { castor_behind_m })
         }))
     }
@@ -58,7 +58,7 @@ impl PhysicalEffect for CastorDrag {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { drag_rad_m: size(sizes, "drag_rad_m")?, castor_behind_m: size(sizes, "castor_behind_m")? })
     }
 }
@@ -91,7 +91,7 @@ struct Term {
 impl ModelTerm for Term {
     /// Plausible: 3 % of a spin on wheels 0.4 m apart; the catalogue has no figure.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "drag_rad_m", unit: "rad/m", plausible: 0.15 }]
+        &[TermParameter { name: "drag_rad_m", unit: "rad/m", prior_sigma: 0.15 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

@@ -14,8 +14,8 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
-use crate::memory::{LastSide, Reversals, TURN_RAD};
+use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::motion_history::{Hysteresis, Reversals, TURN_RAD};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -45,7 +45,7 @@ impl PhysicalEffect for CastorKick {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::along("decay_m", &DECAY_M, |decay_m| Box::new(Term::new(decay_m))))
+        Hypothesis::Terms(Variant::along("decay_m", &DECAY_M, |decay_m| Box::new(Term::new(decay_m))))
     }
 
     fn description() -> Description {
@@ -63,7 +63,7 @@ impl PhysicalEffect for CastorKick {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { kick_rad: size(sizes, "kick_rad")?, decay_m: size(sizes, "decay_m")? })
     }
 }
@@ -72,18 +72,18 @@ impl PhysicalEffect for CastorKick {
 #[derive(Debug, Clone, Copy)]
 struct Flips {
     /// A turn makes it lean.
-    leans: LastSide,
+    leans: Hysteresis,
     reversals: Reversals,
 }
 
 impl Flips {
-    const NONE: Self = Self { leans: LastSide::beyond(TURN_RAD), reversals: Reversals::NONE };
+    const NONE: Self = Self { leans: Hysteresis::beyond(TURN_RAD), reversals: Reversals::NONE };
 
     /// The share of a kick that a way and a turn bring, with the sense of the last turn.
-    fn after(&mut self, way_m: f64, turn_rad: f64, decay_m: f64) -> f64 {
-        let to_m = self.reversals.after(way_m);
-        let left = |way_m: f64| (-way_m / decay_m).exp();
-        self.leans.after(turn_rad) * (left(to_m - way_m.abs()) - left(to_m))
+    fn after(&mut self, distance_m: f64, turn_rad: f64, decay_m: f64) -> f64 {
+        let to_m = self.reversals.after(distance_m);
+        let left = |distance_m: f64| (-distance_m / decay_m).exp();
+        self.leans.after(turn_rad) * (left(to_m - distance_m.abs()) - left(to_m))
     }
 }
 
@@ -94,17 +94,17 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, _stream: Stream) {
+    fn seed_run(&mut self, _stream: Stream) {
         self.flips = Flips::NONE;
     }
 
     fn floor(&mut self, step: &mut Step) {
-        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
+        let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right);
         let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
-        step.extra_turn_rad += self.size.kick_rad * self.flips.after(way_m, turn_rad, self.size.decay_m);
+        step.extra_turn_rad += self.size.kick_rad * self.flips.after(distance_m, turn_rad, self.size.decay_m);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -128,7 +128,7 @@ impl Term {
 impl ModelTerm for Term {
     /// Plausible: 2°, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "kick_rad", unit: "rad", plausible: 0.035 }]
+        &[TermParameter { name: "kick_rad", unit: "rad", prior_sigma: 0.035 }]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -155,22 +155,22 @@ const CASTOR_BEHIND_M: f64 = 0.15;
 
 impl Forward for RollingCastor {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, _stream: Stream) {
+    fn seed_run(&mut self, _stream: Stream) {
         self.psi_rad = 0.0;
     }
 
     /// A turn of the robot leaves the castor's direction in the room where it was; rolling takes it behind.
     fn floor(&mut self, step: &mut Step) {
-        let way_m = 0.5 * (step.travel_m.left + step.travel_m.right);
+        let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right);
         let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
         let before_rad = self.psi_rad;
         let aside_m = CASTOR_BEHIND_M * turn_rad;
-        self.psi_rad -= turn_rad + (aside_m * before_rad.cos() + way_m * before_rad.sin()) / self.trail_m;
+        self.psi_rad -= turn_rad + (aside_m * before_rad.cos() + distance_m * before_rad.sin()) / self.trail_m;
         // Only a flip drags the tail: rolling on behind the robot does not.
-        if way_m * before_rad.cos() < 0.0 {
+        if distance_m * before_rad.cos() < 0.0 {
             step.extra_turn_rad += self.gain * (before_rad - self.psi_rad);
         }
     }

@@ -4,14 +4,14 @@
 //! what is counted; where speeds are logged instead, a scale. Observability: a robot that moves late in long runs. Alias: `wheel_scale` where speeds are
 //! logged; `truth_latency` over short runs. Reference: resonators and timers, 0.01 to 3 %, as users report.
 
-use model_term::{Look, ModelTerm, TermParameter};
+use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "one clock runs fast";
@@ -35,7 +35,7 @@ impl PhysicalEffect for ClockRate {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -46,7 +46,7 @@ impl PhysicalEffect for ClockRate {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { rate: size(sizes, "rate")? })
     }
 }
@@ -71,12 +71,12 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 3 %, the upper end of what users report.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "rate", unit: "1", plausible: 0.03 }]
+        &[TermParameter { name: "rate", unit: "1", prior_sigma: 0.03 }]
     }
 
     /// What the counts say of the instant t by the robot's clock was true ρ t before it: the robot is seen farther on.
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        gradient[0] = Pose::new(look.t_s * look.twist.v_m_s, 0.0, look.t_s * look.twist.omega_rad_s);
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(measurement.t_s * measurement.twist.v_m_s, 0.0, measurement.t_s * measurement.twist.omega_rad_s);
     }
 }
 

@@ -62,7 +62,7 @@ impl PhysicalEffect for ContactPatchWheelbase {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let slow = |name| size(sizes, name).unwrap_or(0.0);
         let (slow_sigma_m, slow_length_m) = (slow("slow_sigma_m"), slow("slow_length_m"));
         Some(Self { sigma_m: size(sizes, "sigma_m")?, slow_sigma_m, slow_length_m })
@@ -78,10 +78,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, start_motion: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, start_motion: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, mut stream: Stream) {
+    fn seed_run(&mut self, mut stream: Stream) {
         self.slow_m = self.size.slow_sigma_m * stream.normal();
         self.stream = Some(stream);
     }
@@ -118,7 +118,7 @@ mod tests {
     fn paper_eq_11_the_wheelbase_is_normal_from_motion_to_motion() {
         let size = ContactPatchWheelbase { sigma_m: 1e-3, slow_sigma_m: 0.0, slow_length_m: 0.0 };
         let mut state = size.forward().expect("acts in steps");
-        state.start_run(Address { seed: 5, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        state.seed_run(Address { seed: 5, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         let (n, mut sum, mut squares) = (20_000, 0.0, 0.0);
         for _ in 0..n {
             state.start_motion();
@@ -144,7 +144,7 @@ mod tests {
             let mut state = size.forward().expect("acts in steps");
             let (runs, mut squares, mut products) = (4000_u32, 0.0, 0.0);
             for run in 0..runs {
-                state.start_run(
+                state.seed_run(
                     Address { seed: 6, point: 0, trial: u64::from(run), run: 0 }.stream(StreamName::new("test")),
                 );
                 let excess = |state: &mut Box<dyn Forward>, travel_m: f64| {

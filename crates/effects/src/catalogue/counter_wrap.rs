@@ -10,7 +10,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, size};
 
 /// Width of the recorded counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ impl PhysicalEffect for CounterWrap {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -41,7 +41,7 @@ impl PhysicalEffect for CounterWrap {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         Some(Self { bits: size(sizes, "bits")? as u32 })
     }
@@ -63,7 +63,7 @@ impl Forward for State {
 }
 
 /// The counts unwrapped, for each width whose wrapping some run's counts show.
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let mut shown: Vec<u8> = Vec::new();
     for run in &dataset.runs {
         if let WheelLog::Ticks(ticks) = &run.odometry.wheels {
@@ -72,10 +72,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     }
     shown.sort_unstable();
     shown.dedup();
-    let without = |bits: u8| Rewriting {
+    let without = |bits: u8| RecordCorrection {
         sizes: vec![("bits", f64::from(bits))],
         sentence: format!("the log keeps {bits} bits of the counters, which wrap"),
-        evident: true,
+        visible_in_log: true,
         records: rewrite_wheels(
             dataset,
             |wheels| {

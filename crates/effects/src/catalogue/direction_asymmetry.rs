@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "forward and backward metres count differently";
@@ -41,7 +41,7 @@ impl PhysicalEffect for DirectionAsymmetry {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -54,7 +54,7 @@ impl PhysicalEffect for DirectionAsymmetry {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { left_asymmetry: size(sizes, "left_asymmetry")?, right_asymmetry: size(sizes, "right_asymmetry")? })
     }
 }
@@ -80,8 +80,8 @@ impl ModelTerm for Term {
     /// Plausible: 0.5 %, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "left_asymmetry", unit: "1", plausible: 0.005 },
-            TermParameter { name: "right_asymmetry", unit: "1", plausible: 0.005 },
+            TermParameter { name: "left_asymmetry", unit: "1", prior_sigma: 0.005 },
+            TermParameter { name: "right_asymmetry", unit: "1", prior_sigma: 0.005 },
         ]
     }
 

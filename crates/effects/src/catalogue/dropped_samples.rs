@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
 use crate::stream::Stream;
 
 /// Rows lost with their counts.
@@ -35,7 +35,7 @@ impl PhysicalEffect for DroppedSamples {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -46,7 +46,7 @@ impl PhysicalEffect for DroppedSamples {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { probability: size(sizes, "probability")? })
     }
 }
@@ -60,10 +60,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, readout: true, ..Hooks::NONE }
+        Hooks { seed_run: true, readout: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         *self = Self { size: self.size, stream: Some(stream), last: None, lost: Wheels::both(0) };
     }
 
@@ -143,7 +143,7 @@ fn fill(odometry: &mut Odometry) -> Missing {
     missing
 }
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let mut records = dataset.clone();
     let (mut missing, mut rows) = (Missing::default(), 0.0);
     for run in &mut records.runs {
@@ -158,10 +158,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     if missing.lost == 0 {
         return Vec::new();
     }
-    vec![Rewriting {
+    vec![RecordCorrection {
         sizes: vec![("probability", missing.rows / (missing.rows + rows))],
         sentence: format!("{} rows are missing, and their counts with them", missing.rows),
-        evident: missing.lost >= EVIDENT && missing.lost > missing.kept,
+        visible_in_log: missing.lost >= EVIDENT && missing.lost > missing.kept,
         records,
     }]
 }

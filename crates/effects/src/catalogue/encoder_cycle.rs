@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Variant, size};
 
 /// Cycles a turn that are tried; one a turn is an eccentric wheel to any data.
 const CYCLES: [f64; 11] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0];
@@ -60,7 +60,7 @@ impl PhysicalEffect for EncoderCycle {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::over("cycles", &CYCLES, |cycles| Term { cycles, last: Wheels::both(LastAngle::NONE) }))
+        Hypothesis::Terms(Variant::over("cycles", &CYCLES, |cycles| Term { cycles, last: Wheels::both(LastAngle::NONE) }))
     }
 
     fn description() -> Description {
@@ -74,7 +74,7 @@ impl PhysicalEffect for EncoderCycle {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (left_sin, left_cos) = (size(sizes, "left_sin_rad")?, size(sizes, "left_cos_rad")?);
         let (right_sin, right_cos) = (size(sizes, "right_sin_rad")?, size(sizes, "right_cos_rad")?);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
@@ -123,10 +123,10 @@ impl ModelTerm for Term {
     /// Plausible: a disc 0.1 mm off its axis at a radius of 10 mm, on the wheel.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "left_sin_rad", unit: "rad", plausible: 0.01 },
-            TermParameter { name: "left_cos_rad", unit: "rad", plausible: 0.01 },
-            TermParameter { name: "right_sin_rad", unit: "rad", plausible: 0.01 },
-            TermParameter { name: "right_cos_rad", unit: "rad", plausible: 0.01 },
+            TermParameter { name: "left_sin_rad", unit: "rad", prior_sigma: 0.01 },
+            TermParameter { name: "left_cos_rad", unit: "rad", prior_sigma: 0.01 },
+            TermParameter { name: "right_sin_rad", unit: "rad", prior_sigma: 0.01 },
+            TermParameter { name: "right_cos_rad", unit: "rad", prior_sigma: 0.01 },
         ]
     }
 

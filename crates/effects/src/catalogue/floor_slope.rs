@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, in_room, size};
+use crate::hypothesis::{Hypothesis, Variant, in_room, size};
 
 /// Creep down a slope.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ impl PhysicalEffect for FloorSlope {
     }
 
     fn hypothesis() -> Hypothesis {
-        let by = |way| Shape { held: Vec::new(), term: Box::new(Term { way }), at: None };
+        let by = |way| Variant { held: Vec::new(), term: Box::new(Term { way }), at: None };
         Hypothesis::Terms(vec![by(false), by(true)])
     }
 
@@ -51,7 +51,7 @@ impl PhysicalEffect for FloorSlope {
     }
 
     /// Creep with time or with the way, by which of them is named.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let pair = |x, y| size(sizes, x).zip(size(sizes, y));
         let (creep, slide) = (pair("creep_x_m_s", "creep_y_m_s"), pair("slide_x", "slide_y"));
         let ((creep_x_m_s, creep_y_m_s), (slide_x, slide_y)) = match (creep, slide) {
@@ -97,13 +97,13 @@ impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
         if self.way {
             &[
-                TermParameter { name: "slide_x", unit: "1", plausible: 1e-3 },
-                TermParameter { name: "slide_y", unit: "1", plausible: 1e-3 },
+                TermParameter { name: "slide_x", unit: "1", prior_sigma: 1e-3 },
+                TermParameter { name: "slide_y", unit: "1", prior_sigma: 1e-3 },
             ]
         } else {
             &[
-                TermParameter { name: "creep_x_m_s", unit: "m/s", plausible: 5e-4 },
-                TermParameter { name: "creep_y_m_s", unit: "m/s", plausible: 5e-4 },
+                TermParameter { name: "creep_x_m_s", unit: "m/s", prior_sigma: 5e-4 },
+                TermParameter { name: "creep_y_m_s", unit: "m/s", prior_sigma: 5e-4 },
             ]
         }
     }

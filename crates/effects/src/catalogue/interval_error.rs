@@ -2,7 +2,7 @@
 //!
 //! Model: a row that is due at t is stamped t + η with η uniform, and read at t + (1 − σ) η: a share σ of the stamps' irregularity is false. Signature: an
 //! interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω); where speeds are logged and not counts, by −σξ(v, 0, ω), a negative share.
-//! Observability: a moving robot and an irregular log; looks between the rows blur it. Alias: wheel noise, but for the slope against ξ.
+//! Observability: a moving robot and an irregular log; measurements between the rows blur it. Alias: wheel noise, but for the slope against ξ.
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes; milliseconds.
 
 use std::collections::VecDeque;
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, Needs};
 use crate::description::{Description, Excitation, Told};
-use crate::beat::Beat;
+use crate::sampling_period::SamplingPeriodEstimator;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 use crate::stream::Stream;
 
 /// Irregular stamps.
@@ -47,7 +47,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term::default()))
+        Hypothesis::Terms(Variant::plain(Term::default()))
     }
 
     fn description() -> Description {
@@ -66,7 +66,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
             share: size(sizes, "share")?.min(1.0),
             jitter_s: size(sizes, "jitter_s").unwrap_or(Self::USUAL_JITTER_S),
@@ -85,10 +85,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, clock: true, ..Hooks::NONE }
+        Hooks { seed_run: true, clock: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
     }
 
@@ -103,7 +103,7 @@ impl Forward for State {
 /// What irregular stamps make of a run's rows.
 #[derive(Clone, Default)]
 struct Term {
-    beat: Beat,
+    sampling_period: SamplingPeriodEstimator,
     /// What its lateness makes of the wheels' ways at the last row, for a share of one.
     off_m: Wheels<f64>,
     /// The logged interval whose parts come in.
@@ -148,7 +148,7 @@ impl Term {
 impl ModelTerm for Term {
     /// Plausible: all of it.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "share", unit: "1", plausible: 1.0 }]
+        &[TermParameter { name: "share", unit: "1", prior_sigma: 1.0 }]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -164,9 +164,9 @@ impl ModelTerm for Term {
                     self.recent.pop_front();
                 }
             }
-            self.beat.next_row(from_s, row_s);
+            self.sampling_period.next_row(from_s, row_s);
             // What a late stamp makes of a way is gone with the next one: only the speed then and the row count.
-            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.beat.late_s);
+            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.sampling_period.late_s);
             let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
             self.row = Some(Row { end_s: row_s, length_s: row_s - from_s, gained_m, travel_m: Wheels::both(0.0) });
         }
@@ -188,7 +188,7 @@ mod tests {
     fn a_false_share_of_the_stamp_is_not_in_the_reading() {
         let size = IntervalError { share: 0.25, jitter_s: 0.004 };
         let mut state = size.forward().expect("acts on the clock");
-        state.start_run(Address { seed: 1, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        state.seed_run(Address { seed: 1, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         for row in 0..1000 {
             let due_s = f64::from(row);
             let mut sample = SampleClock { stamp_s: due_s, read_s: Wheels::both(due_s) };

@@ -12,7 +12,7 @@ use crate::benchmark::{Benchmark, FloorForm, contact_twist};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the robot slides outwards in bends";
@@ -35,7 +35,7 @@ impl PhysicalEffect for LateralSkid {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -58,7 +58,7 @@ impl PhysicalEffect for LateralSkid {
     }
 
     /// A robot slides out of its bend: found negative it is something else.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let skid_s = size(sizes, "skid_s")?;
         (skid_s >= 0.0).then_some(Self { skid_s })
     }
@@ -93,7 +93,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 10 ms, the upper end of what tyres give.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "skid_s", unit: "s", plausible: 0.01 }]
+        &[TermParameter { name: "skid_s", unit: "s", prior_sigma: 0.01 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

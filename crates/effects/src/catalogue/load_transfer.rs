@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "in bends the outer tyre is pressed flatter";
@@ -34,7 +34,7 @@ impl PhysicalEffect for LoadTransfer {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -48,7 +48,7 @@ impl PhysicalEffect for LoadTransfer {
     }
 
     /// The tyre that carries more is pressed flatter: found negative it is something else.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let compression_s2_m = size(sizes, "compression_s2_m")?;
         (compression_s2_m >= 0.0).then_some(Self { compression_s2_m })
     }
@@ -82,7 +82,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 0.2 % at 0.5 m/s², derived for a soft tyre.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "compression_s2_m", unit: "s²/m", plausible: 0.004 }]
+        &[TermParameter { name: "compression_s2_m", unit: "s²/m", prior_sigma: 0.004 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -106,10 +106,10 @@ mod tests {
             State { size: LoadTransfer { compression_s2_m: 0.004 } }.wheel(&mut step);
             step.radius_m
         };
-        let bend = radius_m(0.3, 0.5);
+        let curvature = radius_m(0.3, 0.5);
         // v ω = 0.4 · 0.2/0.363 m/s².
-        assert!((bend.right / 0.08 - (1.0 - 0.004 * 0.08 / 0.363)).abs() < 1e-15);
-        assert!((bend.left / 0.08 - (1.0 + 0.004 * 0.08 / 0.363)).abs() < 1e-15);
+        assert!((curvature.right / 0.08 - (1.0 - 0.004 * 0.08 / 0.363)).abs() < 1e-15);
+        assert!((curvature.left / 0.08 - (1.0 + 0.004 * 0.08 / 0.363)).abs() < 1e-15);
         assert_eq!([radius_m(0.4, 0.4), radius_m(-0.4, 0.4)], [specimen_step().radius_m; 2]);
     }
 }

@@ -14,7 +14,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -45,7 +45,7 @@ impl PhysicalEffect for LowSpeedTruncation {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -62,7 +62,7 @@ impl PhysicalEffect for LowSpeedTruncation {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { loss_m_s: size(sizes, "loss_m_s")?, cycle_s: size(sizes, "cycle_s").unwrap_or(USUAL_CYCLE_S) })
     }
 }
@@ -77,10 +77,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, encoder: true, readout: true, ..Hooks::NONE }
+        Hooks { seed_run: true, encoder: true, readout: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
         self.cycle_ends_s = self.size.cycle_s;
         self.in_cycle_m = Wheels::both(0.0);
@@ -96,15 +96,15 @@ impl Forward for State {
         // Cycles end between the engine's steps too: way by whole steps would make few fractions, the same ones over and over.
         while self.cycle_ends_s <= end_s {
             let part = (self.cycle_ends_s - from_s) / step.dt_s;
-            let in_cycle_m = self.in_cycle_m.zip_with(step_m, |way_m, step_m| way_m + part * step_m);
-            let fraction_m = |way_m: f64| if unit_m > 0.0 { way_m % unit_m } else { 0.0 };
-            self.lost_m = self.lost_m.zip_with(in_cycle_m, |lost_m, way_m| lost_m + fraction_m(way_m));
+            let in_cycle_m = self.in_cycle_m.zip_with(step_m, |distance_m, step_m| distance_m + part * step_m);
+            let fraction_m = |distance_m: f64| if unit_m > 0.0 { distance_m % unit_m } else { 0.0 };
+            self.lost_m = self.lost_m.zip_with(in_cycle_m, |lost_m, distance_m| lost_m + fraction_m(distance_m));
             self.in_cycle_m = Wheels::both(0.0);
             from_s = self.cycle_ends_s;
             self.cycle_ends_s += self.size.cycle_s * (0.5 + stream.uniform());
         }
         let rest = (end_s - from_s) / step.dt_s;
-        self.in_cycle_m = self.in_cycle_m.zip_with(step_m, |way_m, step_m| way_m + rest * step_m);
+        self.in_cycle_m = self.in_cycle_m.zip_with(step_m, |distance_m, step_m| distance_m + rest * step_m);
     }
 
     fn readout(&mut self, readout: &mut Readout) {
@@ -126,7 +126,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: half a unit of 0.1 mm in a cycle of 10 ms; users give no figures.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "loss_m_s", unit: "m/s", plausible: 0.005 }]
+        &[TermParameter { name: "loss_m_s", unit: "m/s", prior_sigma: 0.005 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -146,7 +146,7 @@ mod tests {
         for sense in [-1.0, 1.0] {
             let size = LowSpeedTruncation { loss_m_s: 2e-3, cycle_s: 0.02 };
             let mut state = size.forward().expect("acts on the record");
-            state.start_run(Address { seed: 7, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+            state.seed_run(Address { seed: 7, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
             let (steps, dt_s) = (100_000, 1e-3); // 5000 cycles
             for k in 0..steps {
                 let mut step = specimen_step();

@@ -12,7 +12,7 @@ use crate::benchmark::{Benchmark, SizeLaw};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "counts are lost at high speed";
@@ -50,7 +50,7 @@ impl PhysicalEffect for MissedCounts {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::along("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Box::new(Term { hinge_m_s })))
+        Hypothesis::Terms(Variant::along("hinge_speed_m_s", &HINGE_M_S, |hinge_m_s| Box::new(Term { hinge_m_s })))
     }
 
     fn description() -> Description {
@@ -82,7 +82,7 @@ impl PhysicalEffect for MissedCounts {
     }
 
     /// A counter whose lost share was found negative loses none.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (left, right) = (size(sizes, "left_lost_share")?, size(sizes, "right_lost_share")?);
         let hinge_speed_m_s = size(sizes, "hinge_speed_m_s")?;
         (left > 0.0 || right > 0.0).then(|| Self {
@@ -127,8 +127,8 @@ impl ModelTerm for Term {
     /// Plausible: 2 % above the hinge, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "left_lost_share", unit: "1", plausible: 0.02 },
-            TermParameter { name: "right_lost_share", unit: "1", plausible: 0.02 },
+            TermParameter { name: "left_lost_share", unit: "1", prior_sigma: 0.02 },
+            TermParameter { name: "right_lost_share", unit: "1", prior_sigma: 0.02 },
         ]
     }
 

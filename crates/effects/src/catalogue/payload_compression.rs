@@ -13,7 +13,7 @@ use crate::benchmark::{Benchmark, HostRobot, NamedSize, Needs};
 use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// The run's covariate that says what the robot carries; a run without it carries nothing.
 const PAYLOAD: &str = "payload_kg";
@@ -55,7 +55,7 @@ impl PhysicalEffect for PayloadCompression {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -71,13 +71,13 @@ impl PhysicalEffect for PayloadCompression {
     }
 
     /// Unloaded: what the runs carry is the experiment's.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (common_per_kg, mismatch_per_kg) = (size(sizes, "common_per_kg")?, size(sizes, "mismatch_per_kg")?);
         Some(Self { common_per_kg, mismatch_per_kg, payload_kg: vec![size(sizes, PAYLOAD).unwrap_or(0.0)] })
     }
 
     fn at_scale(sizes: &[NamedSize], _: f64, robot: &HostRobot) -> Option<Self> {
-        Some(Self { payload_kg: robot.payload_kg.clone(), ..Self::of_sizes(sizes)? })
+        Some(Self { payload_kg: robot.payload_kg.clone(), ..Self::from_estimates(sizes)? })
     }
 
     fn harmless(robot: &HostRobot) -> Option<Self> {
@@ -94,10 +94,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { on_run_start: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         let PayloadCompression { common_per_kg, mismatch_per_kg, payload_kg } = &self.size;
         let payload_kg = payload_kg[run.number as usize % payload_kg.len()];
         if payload_kg > 0.0 {
@@ -119,8 +119,8 @@ impl ModelTerm for Term {
     /// Plausible: 1 % under 10 kg, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "common_per_kg", unit: "1/kg", plausible: 1e-3 },
-            TermParameter { name: "mismatch_per_kg", unit: "1/kg", plausible: 1e-3 },
+            TermParameter { name: "common_per_kg", unit: "1/kg", prior_sigma: 1e-3 },
+            TermParameter { name: "mismatch_per_kg", unit: "1/kg", prior_sigma: 1e-3 },
         ]
     }
 
@@ -144,7 +144,7 @@ mod tests {
         let mut state = size.forward().expect("acts on wheels");
         for (number, payload_kg) in [(0, 0.0), (1, 5.0), (2, 0.0), (3, 5.0)] {
             let mut info = RunInfo::default();
-            state.begin_run(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
+            state.on_run_start(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
             assert_eq!(info.covariates.get(PAYLOAD).copied().unwrap_or(0.0), payload_kg);
             let mut step = specimen_step();
             state.wheel(&mut step);

@@ -37,7 +37,7 @@ impl PhysicalEffect for Quantization {
         Description::of("the log keeps whole ticks of several counts each")
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         Some(Self { counts_per_tick: size(sizes, "counts_per_tick")? as u32 })
     }

@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, size};
 
 /// Counters that run the other way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ impl PhysicalEffect for ReversedWheel {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -49,7 +49,7 @@ impl PhysicalEffect for ReversedWheel {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { left: size(sizes, "left")? != 0.0, right: size(sizes, "right")? != 0.0 })
     }
 }
@@ -73,7 +73,7 @@ impl Forward for State {
     }
 }
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let forms = [
         (Wheels { left: true, right: false }, "the left counter runs backward"),
         (Wheels { left: false, right: true }, "the right counter runs backward"),
@@ -92,10 +92,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
         };
         let twist = |twist| by_wheels(&dataset.robot, twist, |speed_m_s| speed_m_s.zip_with(sign, |v, sign| sign * v));
         let flag = |reversed: bool| f64::from(u8::from(reversed));
-        Rewriting {
+        RecordCorrection {
             sizes: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
             sentence: sentence.to_owned(),
-            evident: false,
+            visible_in_log: false,
             records: rewrite_wheels(dataset, turned, twist),
         }
     };

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// Delay of the right reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ impl PhysicalEffect for SamplingSkew {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -43,7 +43,7 @@ impl PhysicalEffect for SamplingSkew {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { right_delay_s: size(sizes, "right_delay_s")? })
     }
 }
@@ -68,7 +68,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 2 ms, one sample time of a slow controller.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "right_delay_s", unit: "s", plausible: 2e-3 }]
+        &[TermParameter { name: "right_delay_s", unit: "s", prior_sigma: 2e-3 }]
     }
 
     /// Of the right wheel's counts, its delay times the speed gained since the interval before came too early.

@@ -12,7 +12,7 @@ use crate::benchmark::{Benchmark, FloorForm};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the ground speed lags behind the wheels'";
@@ -35,7 +35,7 @@ impl PhysicalEffect for SlipAcceleration {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -54,7 +54,7 @@ impl PhysicalEffect for SlipAcceleration {
     }
 
     /// The ground lags behind the wheel, and does not lead: found negative it is something else.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let kappa_s = size(sizes, "kappa_s")?;
         (kappa_s >= 0.0).then_some(Self { kappa_s })
     }
@@ -85,7 +85,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 10 ms, the upper end of what slip stiffness gives.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "kappa_s", unit: "s", plausible: 0.01 }]
+        &[TermParameter { name: "kappa_s", unit: "s", prior_sigma: 0.01 }]
     }
 
     /// The change of the mean speeds from the interval before: summed over a start and a stop it is nothing, exactly.

@@ -12,7 +12,7 @@ use crate::benchmark::{Benchmark, FloorForm};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the wheels lose distance in proportion to their speed";
@@ -35,7 +35,7 @@ impl PhysicalEffect for SlipSpeed {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -57,7 +57,7 @@ impl PhysicalEffect for SlipSpeed {
     }
 
     /// Contacts slip back, not ahead: found negative it is something else.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let slip_s_m = size(sizes, "slip_s_m")?;
         (slip_s_m >= 0.0).then_some(Self { slip_s_m })
     }
@@ -88,7 +88,7 @@ struct Term;
 impl ModelTerm for Term {
     fn parameters(&self) -> &'static [TermParameter] {
         // Plausible: 1 % at 0.5 m/s, the upper end of the rule of thumb.
-        &[TermParameter { name: "slip_s_m", unit: "s/m", plausible: 0.02 }]
+        &[TermParameter { name: "slip_s_m", unit: "s/m", prior_sigma: 0.02 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

@@ -3,7 +3,7 @@
 //! Model: below a speed the contact sticks while the tread goes on, until the wind-up reaches a breakaway way, uniform between nothing and twice its mean;
 //! then all of it is let go at once, as it is when the wheel becomes faster. Signature: tails at low speed that do not add up; a creeping contact, and one at
 //! rest after a creep, is on average two thirds of the mean breakaway behind its tread. Observability: looks at a creeping robot, or at rest and on the way.
-//! Alias: quantization; `backlash` and `truth_latency` where looks are few. Reference: Coulomb friction on a compliant contact, Armstrong-Hélouvry et al.
+//! Alias: quantization; `backlash` and `truth_latency` where measurements are few. Reference: Coulomb friction on a compliant contact, Armstrong-Hélouvry et al.
 //! 1994; the mean age of a renewal process, Cox 1962.
 
 use dataset::RunInfo;
@@ -15,7 +15,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, Sign, size};
+use crate::hypothesis::{Hypothesis, Variant, Sign, size};
 use crate::stream::Stream;
 
 /// Scales of the distance by which a contact winds up, metres: from what no instrument shows to a sill.
@@ -49,7 +49,7 @@ impl PhysicalEffect for StickSlip {
 
     fn hypothesis() -> Hypothesis {
         let terms =
-            Shape::along("stick_speed_m_s", &STICK_SPEEDS_M_S, |stick_speed_m_s| Box::new(Term::new(stick_speed_m_s)));
+            Variant::along("stick_speed_m_s", &STICK_SPEEDS_M_S, |stick_speed_m_s| Box::new(Term::new(stick_speed_m_s)));
         Hypothesis::TermsAndScatter(terms, &[Sign::TailsAtLowSpeed])
     }
 
@@ -63,7 +63,7 @@ impl PhysicalEffect for StickSlip {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { stick_speed_m_s: size(sizes, "stick_speed_m_s")?, breakaway_m: size(sizes, "breakaway_m")? })
     }
 }
@@ -79,10 +79,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, floor: true, ..Hooks::NONE }
+        Hooks { seed_run: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, mut stream: Stream) {
+    fn seed_run(&mut self, mut stream: Stream) {
         self.wound_m = Wheels::both(0.0);
         self.holds_m = Wheels::from_sides(|_| 2.0 * self.size.breakaway_m * stream.uniform());
         self.stream = Some(stream);
@@ -152,7 +152,7 @@ impl Term {
 impl ModelTerm for Term {
     /// Plausible: a millimetre, what a soft tyre gives way; no one has measured it.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "breakaway_m", unit: "m", plausible: USUAL_BREAKAWAY_M }]
+        &[TermParameter { name: "breakaway_m", unit: "m", prior_sigma: USUAL_BREAKAWAY_M }]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn a_creeping_wheel_jumps_and_nothing_is_lost_in_the_end() {
         let mut state = StickSlip { stick_speed_m_s: 0.02, breakaway_m: 2e-3 }.forward().expect("acts on the floor");
-        state.start_run(Address { seed: 2, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        state.seed_run(Address { seed: 2, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         let (mut tread_m, mut ground_m, mut most_m, mut at_rest) = (0.0, 0.0, 0.0_f64, 0);
         for speed_m_s in [0.01, 0.1] {
             for _ in 0..5000 {
@@ -209,7 +209,7 @@ mod tests {
             let mut wound = Vec::new();
             for run in 0..2000 {
                 let mut state = StickSlip { stick_speed_m_s, breakaway_m }.forward().expect("acts on the floor");
-                state.start_run(Address { seed: 3, point: 0, trial: 0, run }.stream(StreamName::new("test")));
+                state.seed_run(Address { seed: 3, point: 0, trial: 0, run }.stream(StreamName::new("test")));
                 let mut behind_m = 0.0;
                 for way in ways {
                     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some hundred steps

@@ -11,7 +11,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, by_wheels, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, size};
 
 /// Columns that have changed places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ impl PhysicalEffect for SwappedWheels {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -42,7 +42,7 @@ impl PhysicalEffect for SwappedWheels {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { swapped: size(sizes, "swapped")? != 0.0 })
     }
 }
@@ -60,7 +60,7 @@ impl Forward for State {
     }
 }
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let changed = |wheels: &mut WheelLog| match wheels {
         WheelLog::Ticks(Wheels { left, right }) => std::mem::swap(left, right),
         WheelLog::Angles(Wheels { left, right }) => std::mem::swap(left, right),
@@ -68,10 +68,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
     };
     let turned =
         |twist: Twist| by_wheels(&dataset.robot, twist, |Wheels { left, right }| Wheels { left: right, right: left });
-    vec![Rewriting {
+    vec![RecordCorrection {
         sizes: vec![("swapped", 1.0)],
         sentence: "the left and the right counter are swapped".to_owned(),
-        evident: false,
+        visible_in_log: false,
         records: rewrite_wheels(dataset, changed, turned),
     }]
 }

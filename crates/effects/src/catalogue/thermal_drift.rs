@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the scale drifts with the time of the session";
@@ -43,7 +43,7 @@ impl PhysicalEffect for ThermalDrift {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::along("tau_s", &TAU_S, |tau_s| Box::new(Term { tau_s })))
+        Hypothesis::Terms(Variant::along("tau_s", &TAU_S, |tau_s| Box::new(Term { tau_s })))
     }
 
     fn description() -> Description {
@@ -63,7 +63,7 @@ impl PhysicalEffect for ThermalDrift {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { growth: size(sizes, "growth")?, tau_s: size(sizes, "tau_s")? })
     }
 }
@@ -75,10 +75,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { on_run_start: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         self.session_s = run.session_s;
     }
 
@@ -105,7 +105,7 @@ struct Term {
 impl ModelTerm for Term {
     /// Plausible: 0.2 %, derived for rubber.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "growth", unit: "1", plausible: 0.002 }]
+        &[TermParameter { name: "growth", unit: "1", prior_sigma: 0.002 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -125,10 +125,10 @@ struct Warming {
 
 impl Forward for Warming {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { on_run_start: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         self.session_s = run.session_s;
     }
 
@@ -149,7 +149,7 @@ mod tests {
     fn growth_comes_with_the_sessions_time_however_it_is_cut() {
         let mut state = State { size: ThermalDrift { growth: 0.002, tau_s: 600.0 }, session_s: 0.0 };
         let mut info = RunInfo::default();
-        state.begin_run(&mut RunStart { number: 3, session_s: 540.0, session_m: 0.0, info: &mut info });
+        state.on_run_start(&mut RunStart { number: 3, session_s: 540.0, session_m: 0.0, info: &mut info });
         let mut mean_m = |from_s: f64, dt_s: f64| {
             let mut step = specimen_step();
             (step.t_s, step.dt_s) = (from_s, dt_s);

@@ -11,12 +11,12 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Rewriting, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
 
 /// Factors between units of time that people use.
 const FACTORS: [f64; 6] = [1e3, 1e6, 1e9, 1e-3, 1e-6, 1e-9];
 
-/// How far from a factor a ratio of two spans may be: looks need not begin and end with the log.
+/// How far from a factor a ratio of two spans may be: measurements need not begin and end with the log.
 const WITHIN: f64 = 4.0;
 
 /// The log's unit of time.
@@ -37,7 +37,7 @@ impl PhysicalEffect for TimeUnit {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -47,7 +47,7 @@ impl PhysicalEffect for TimeUnit {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { factor: size(sizes, "factor")? })
     }
 }
@@ -74,7 +74,7 @@ fn seen_s(run: &Run) -> impl Iterator<Item = f64> {
     poses.chain(points).chain(ends).chain(run.wheel_reference.iter().map(|speed| speed.t_s))
 }
 
-/// The log's span over that of the looks, by the middle run.
+/// The log's span over that of the measurements, by the middle run.
 fn ratio_of_spans(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
         let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
@@ -92,7 +92,7 @@ const USUAL_M_S: f64 = 0.3;
 fn off_usual(dataset: &Dataset) -> f64 {
     let robot = &dataset.robot;
     let m_per_rad = 0.25 * (robot.left_wheel_diameter_m + robot.right_wheel_diameter_m);
-    let (mut way_m, mut time_s) = (0.0, 0.0);
+    let (mut distance_m, mut time_s) = (0.0, 0.0);
     for Odometry { t_s, wheels, .. } in dataset.runs.iter().map(|run| &run.odometry) {
         let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
         #[allow(clippy::cast_precision_loss)] // far under 2⁵³ counts
@@ -110,21 +110,21 @@ fn off_usual(dataset: &Dataset) -> f64 {
             // Speeds are logged: the same whatever the unit of time.
             WheelLog::Twist { .. } => return 0.0,
         };
-        way_m += m_per_rad * turned_rad;
+        distance_m += m_per_rad * turned_rad;
         time_s += length_s;
     }
-    if way_m > 0.0 && time_s > 0.0 { (way_m / time_s / USUAL_M_S).ln().abs() } else { 0.0 }
+    if distance_m > 0.0 && time_s > 0.0 { (distance_m / time_s / USUAL_M_S).ln().abs() } else { 0.0 }
 }
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let Some(ratio) = ratio_of_spans(dataset) else { return Vec::new() };
     let near = |factor: &f64| ratio / factor < WITHIN && factor / ratio < WITHIN;
     let Some(factor) = FACTORS.into_iter().find(near) else { return Vec::new() };
-    let (mut log, mut looks) = (dataset.clone(), dataset.clone());
+    let (mut log, mut measurements) = (dataset.clone(), dataset.clone());
     for run in &mut log.runs {
         run.odometry.t_s.iter_mut().for_each(|t_s| *t_s /= factor);
     }
-    for run in &mut looks.runs {
+    for run in &mut measurements.runs {
         run.truth.iter_mut().for_each(|sample| sample.t_s *= factor);
         run.point_readings.iter_mut().for_each(|reading| reading.t_s *= factor);
         run.wheel_reference.iter_mut().for_each(|speed| speed.t_s *= factor);
@@ -132,15 +132,15 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
             (seen.t0_s, seen.t1_s) = (seen.t0_s * factor, seen.t1_s * factor);
         }
     }
-    let mut forms = [(log, factor, "the log's"), (looks, factor.recip(), "the instrument's")];
+    let mut forms = [(log, factor, "the log's"), (measurements, factor.recip(), "the instrument's")];
     // Which of the two is in seconds, the ratio does not say; the speed does.
     forms.sort_by(|a, b| off_usual(&a.0).total_cmp(&off_usual(&b.0)));
     forms
         .into_iter()
-        .map(|(records, factor, whose)| Rewriting {
+        .map(|(records, factor, whose)| RecordCorrection {
             sizes: vec![("factor", factor)],
             sentence: format!("{whose} times are off by a factor of {factor:e}"),
-            evident: true,
+            visible_in_log: true,
             records,
         })
         .collect()

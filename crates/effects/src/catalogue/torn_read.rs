@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
 use crate::stream::Stream;
 
 /// Steps of torn bytes, counts.
@@ -41,7 +41,7 @@ impl PhysicalEffect for TornRead {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -53,7 +53,7 @@ impl PhysicalEffect for TornRead {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         let jump_counts = size(sizes, "jump_counts")? as u32;
         Some(Self { probability: size(sizes, "probability")?, jump_counts })
@@ -67,10 +67,10 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, readout: true, ..Hooks::NONE }
+        Hooks { seed_run: true, readout: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
     }
 
@@ -157,7 +157,7 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
     Mended { samples: mended, plainly: if usual < step / PLAINLY { mended } else { 0 } }
 }
 
-/// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that jitter make some that look alike.
+/// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that jitter make some that measurement alike.
 const PLAINLY: f64 = 64.0;
 
 /// Samples put back.
@@ -213,7 +213,7 @@ fn undone(jumps: &[f64]) -> Option<usize> {
 /// Jumps of just a torn byte that are undone at once: one may be an accident, two are none.
 const EVIDENT: usize = 2;
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let without = |jump: i64| {
         let (mut mended, mut plainly, mut samples) = (0, 0, 0);
         let mut records = dataset.clone();
@@ -228,10 +228,10 @@ fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
             }
         }
         #[allow(clippy::cast_precision_loss)]
-        (mended > 0).then(|| Rewriting {
+        (mended > 0).then(|| RecordCorrection {
             sizes: vec![("probability", mended as f64 / samples as f64), ("jump_counts", jump as f64)],
             sentence: format!("{mended} counts were torn while they were read, off by {jump}"),
-            evident: plainly >= EVIDENT,
+            visible_in_log: plainly >= EVIDENT,
             records,
         })
     };

@@ -3,7 +3,7 @@
 //! Model: the contact sticks while the acceleration stays under μ_s g; then it slides with Stribeck friction
 //! μ(u) = μ_k + (μ_s − μ_k) exp(−|u|/u_s) of the sliding speed u, until the speeds meet. Signature: a one-sided heavy tail of e_dx above some |a|; where many
 //! starts and stops are as hard, a mean: ground lost at starts and gained at stops, by the wheel that is accelerated harder than the floor holds.
-//! Observability: hard starts and stops. Alias: `bumps`; `slip_acceleration` and `truth_latency` where looks are few or the floor holds nearly all: a wheel under
+//! Observability: hard starts and stops. Alias: `bumps`; `slip_acceleration` and `truth_latency` where measurements are few or the floor holds nearly all: a wheel under
 //! control trembles, so that the ground lags as by a delay until the floor gives way. Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
 
 use dataset::RunInfo;
@@ -15,7 +15,7 @@ use crate::benchmark::{Benchmark, HostRobot, NamedSize};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, Sign, size};
+use crate::hypothesis::{Hypothesis, Variant, Sign, size};
 
 /// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it
 /// should, to one that holds nearly nothing.
@@ -59,8 +59,8 @@ impl PhysicalEffect for TractionLoss {
     }
 
     fn hypothesis() -> Hypothesis {
-        let terms = Shape::along("holds_m_s2", &HOLDS_M_S2, |holds_m_s2| Box::new(Term::new(holds_m_s2)));
-        Hypothesis::TermsAndScatter(terms, &[Sign::WayJumps, Sign::HeadingJumps])
+        let terms = Variant::along("holds_m_s2", &HOLDS_M_S2, |holds_m_s2| Box::new(Term::new(holds_m_s2)));
+        Hypothesis::TermsAndScatter(terms, &[Sign::DistanceJumps, Sign::HeadingJumps])
     }
 
     fn description() -> Description {
@@ -79,7 +79,7 @@ impl PhysicalEffect for TractionLoss {
     }
 
     /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's sliding there is beyond it.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         if let Some((sliding, holds_m_s2)) = size(sizes, "sliding").zip(size(sizes, "holds_m_s2")) {
             return (sliding >= 0.0).then(|| Self::sliding(sliding, holds_m_s2));
         }
@@ -280,7 +280,7 @@ impl Term {
 impl ModelTerm for Term {
     /// Plausible: what a usual floor loses (u_s = 0.05 m/s) under a tread that trembles by 0.01 m/s.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "sliding", unit: "1", plausible: 1.0 }]
+        &[TermParameter { name: "sliding", unit: "1", prior_sigma: 1.0 }]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -361,12 +361,12 @@ mod tests {
     }
 
     /// Way lost in each row of a start to 0.3 m/s and a stop at 0.6 m/s², by a floor that holds a little less, by terms of several shapes, and by a delay last.
-    fn rows_lost_m(holds_m_s2: f64, shapes: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn rows_lost_m(holds_m_s2: f64, variants: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (acceleration_m_s2, cruise_m_s, stops_s) = (0.6, 0.3, 1.5);
         let mut floor = TractionLoss::usual(holds_m_s2).forward().expect("acts");
-        let mut terms: Vec<Term> = shapes.iter().map(|shape| Term::new(*shape)).collect();
+        let mut terms: Vec<Term> = variants.iter().map(|shape| Term::new(*shape)).collect();
         let run = RunInfo::default();
-        let (mut truth, mut said, mut delay) = (Vec::new(), vec![Vec::new(); shapes.len()], Vec::new());
+        let (mut truth, mut said, mut delay) = (Vec::new(), vec![Vec::new(); variants.len()], Vec::new());
         let (dt_s, steps, length_s) = (1e-3, 25_u32, 0.025);
         let mut previous_m = 0.0;
         for row in 0..90 {
@@ -438,11 +438,11 @@ mod tests {
     #[test]
     fn rows_of_the_log_show_what_a_floor_loses_that_holds_a_little_less_than_is_asked() {
         for holds_m_s2 in [0.599, 0.58, 0.55, 0.5] {
-            let shapes = [0.92, 0.96, 1.0].map(|near| near * holds_m_s2);
-            let (truth, said) = rows_lost_m(holds_m_s2, &shapes);
+            let variants = [0.92, 0.96, 1.0].map(|near| near * holds_m_s2);
+            let (truth, said) = rows_lost_m(holds_m_s2, &variants);
             let all: Vec<(f64, f64)> = said.iter().map(|said| left_by(&truth, said)).collect();
-            let [shapes @ .., (by_delay, _)] = &all[..] else { panic!("shapes and a delay") };
-            for (left, size) in shapes {
+            let [variants @ .., (by_delay, _)] = &all[..] else { panic!("shapes and a delay") };
+            for (left, size) in variants {
                 assert!(*left < 0.01 && *left < 0.5 * by_delay, "{holds_m_s2}: {all:?}");
                 assert!((0.4..1.3).contains(size), "{holds_m_s2}: {all:?}");
             }
@@ -452,12 +452,12 @@ mod tests {
     #[test]
     fn a_found_size_says_a_floor_that_holds_so_much_more_or_less() {
         let holds_m_s2 = |sliding: f64| {
-            let floor = TractionLoss::of_sizes(&[("sliding", sliding), ("holds_m_s2", 0.5)]).expect("a floor");
+            let floor = TractionLoss::from_estimates(&[("sliding", sliding), ("holds_m_s2", 0.5)]).expect("a floor");
             floor.check().expect("physical");
             floor.static_friction * GRAVITY_M_S2
         };
         assert!((holds_m_s2(1.0) - 0.5).abs() < 1e-12);
         assert!(holds_m_s2(0.5) > 0.5 && holds_m_s2(2.0) < 0.5 && holds_m_s2(0.0).is_finite());
-        assert_eq!(TractionLoss::of_sizes(&[("sliding", -0.1), ("holds_m_s2", 0.5)]), None);
+        assert_eq!(TractionLoss::from_estimates(&[("sliding", -0.1), ("holds_m_s2", 0.5)]), None);
     }
 }

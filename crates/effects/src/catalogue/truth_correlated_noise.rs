@@ -1,7 +1,7 @@
 //! `truth_correlated_noise`: the outside instrument's errors resemble those of a moment before.
 //!
-//! Model: a Gauss–Markov process in time beside each coordinate, corr = e^{−Δt/τ}, stationary from the first look on.
-//! Signature: residuals that are correlated with no cause in the wheels. Observability: looks closer than τ. Alias: any slow effect, over one run.
+//! Model: a Gauss–Markov process in time beside each coordinate, corr = e^{−Δt/τ}, stationary from the first measurement on.
+//! Signature: residuals that are correlated with no cause in the wheels. Observability: measurements closer than τ. Alias: any slow effect, over one run.
 //! Reference: Ornstein & Uhlenbeck 1930; filters inside trackers, thermal drift of cameras, scan matching against the same wall.
 
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::benchmark::Benchmark;
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Sighting};
+use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Sign, size};
 use crate::stream::Stream;
 
@@ -37,7 +37,7 @@ impl PhysicalEffect for TruthCorrelatedNoise {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Scatter(&[Sign::CorrelatedLooks])
+        Hypothesis::Scatter(&[Sign::AutocorrelatedErrors])
     }
 
     fn description() -> Description {
@@ -50,7 +50,7 @@ impl PhysicalEffect for TruthCorrelatedNoise {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (sigma_xy_m, sigma_theta_rad) = (size(sizes, "sigma_xy_m")?, size(sizes, "sigma_theta_rad")?);
         Some(Self { sigma_xy_m, sigma_theta_rad, tau_s: size(sizes, "tau_s")? })
     }
@@ -66,25 +66,25 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, instrument: true, ..Hooks::NONE }
+        Hooks { seed_run: true, instrument: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, mut stream: Stream) {
+    fn seed_run(&mut self, mut stream: Stream) {
         self.error = std::array::from_fn(|_| stream.normal());
         self.at_s = 0.0;
         self.stream = Some(stream);
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
+    fn instrument(&mut self, reading: &mut PoseReading) {
         let Some(stream) = &mut self.stream else { return };
-        let kept = (-(sighting.t_s - self.at_s).abs() / self.size.tau_s).exp();
+        let kept = (-(reading.t_s - self.at_s).abs() / self.size.tau_s).exp();
         let fresh = (1.0 - kept * kept).sqrt();
         self.error = self.error.map(|error| kept * error + fresh * stream.normal());
-        self.at_s = sighting.t_s;
+        self.at_s = reading.t_s;
         let [x, y, theta] = self.error;
-        sighting.world_from_body.x_m += self.size.sigma_xy_m * x;
-        sighting.world_from_body.y_m += self.size.sigma_xy_m * y;
-        sighting.world_from_body.theta_rad += self.size.sigma_theta_rad * theta;
+        reading.world_from_body.x_m += self.size.sigma_xy_m * x;
+        reading.world_from_body.y_m += self.size.sigma_xy_m * y;
+        reading.world_from_body.theta_rad += self.size.sigma_theta_rad * theta;
     }
 }
 
@@ -97,21 +97,21 @@ mod tests {
     #[test]
     fn errors_have_the_stated_size_and_memory_however_often_one_looks() {
         let size = TruthCorrelatedNoise { sigma_xy_m: 0.01, sigma_theta_rad: 0.02, tau_s: 2.0 };
-        for looks in [1_u32, 8] {
+        for measurements in [1_u32, 8] {
             let (n, mut squares, mut products, mut thetas) = (4000_u32, 0.0, 0.0, 0.0);
             for run in 0..n {
                 let mut state = size.forward().expect("acts on sightings");
                 let address = Address { seed: 3, point: 0, trial: u64::from(run), run: 0 };
-                state.start_run(address.stream(StreamName::new("test")));
+                state.seed_run(address.stream(StreamName::new("test")));
                 let mut see = |t_s: f64| {
-                    let mut sighting = Sighting { t_s, world_from_body: Pose::IDENTITY };
-                    state.instrument(&mut sighting);
-                    sighting.world_from_body
+                    let mut reading = PoseReading { t_s, world_from_body: Pose::IDENTITY };
+                    state.instrument(&mut reading);
+                    reading.world_from_body
                 };
                 let before = see(0.0);
                 let mut after = before;
-                for look in 1..=looks {
-                    after = see(2.0 * f64::from(look) / f64::from(looks));
+                for measurement in 1..=measurements {
+                    after = see(2.0 * f64::from(measurement) / f64::from(measurements));
                 }
                 squares += (after.x_m / 0.01).powi(2);
                 thetas += (after.theta_rad / 0.02).powi(2);
@@ -121,7 +121,7 @@ mod tests {
             // Five standard errors of a variance, √(2/n), and at most that of a covariance; one τ apart the correlation is 1/e.
             let allowed = 5.0 * (2.0 / n).sqrt();
             for (moment, expected) in [(squares, 1.0), (thetas, 1.0), (products, (-1.0_f64).exp())] {
-                assert!((moment / n - expected).abs() < allowed, "{looks}: {}", moment / n);
+                assert!((moment / n - expected).abs() < allowed, "{measurements}: {}", moment / n);
             }
         }
     }

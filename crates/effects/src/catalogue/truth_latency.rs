@@ -4,14 +4,14 @@
 //! constant speed. Observability: starts, stops and reversals. Alias: `slip_acceleration`, exactly: the same lag of both wheels is a time shift.
 //! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100 ms, in published logs up to 0.3 s.
 
-use model_term::{Look, ModelTerm, TermParameter};
+use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Sighting};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::forward::{Forward, Hooks, PoseReading};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's measurements are late";
@@ -34,7 +34,7 @@ impl PhysicalEffect for TruthLatency {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -46,7 +46,7 @@ impl PhysicalEffect for TruthLatency {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { delay_s: size(sizes, "delay_s")? })
     }
 }
@@ -60,8 +60,8 @@ impl Forward for State {
         Hooks { instrument: true, ..Hooks::NONE }
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
-        sighting.t_s += self.size.delay_s;
+    fn instrument(&mut self, reading: &mut PoseReading) {
+        reading.t_s += self.size.delay_s;
     }
 }
 
@@ -71,11 +71,11 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 100 ms, the upper end of the rule of thumb; three times that has been published.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "delay_s", unit: "s", plausible: 0.1 }]
+        &[TermParameter { name: "delay_s", unit: "s", prior_sigma: 0.1 }]
     }
 
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
-        gradient[0] = Pose::new(-look.twist.v_m_s, 0.0, -look.twist.omega_rad_s);
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(-measurement.twist.v_m_s, 0.0, -measurement.twist.omega_rad_s);
     }
 }
 
@@ -88,12 +88,12 @@ mod tests {
     #[test]
     fn a_late_stamp_shows_the_robot_behind() {
         let mut state = State { size: TruthLatency { delay_s: 0.05 } };
-        let mut sighting = Sighting { t_s: 1.0, world_from_body: Pose::IDENTITY };
-        state.instrument(&mut sighting);
-        assert_eq!(sighting, Sighting { t_s: 1.05, world_from_body: Pose::IDENTITY });
+        let mut reading = PoseReading { t_s: 1.0, world_from_body: Pose::IDENTITY };
+        state.instrument(&mut reading);
+        assert_eq!(reading, PoseReading { t_s: 1.05, world_from_body: Pose::IDENTITY });
         let (run, twist) = (RunInfo::default(), Twist { v_m_s: 0.4, omega_rad_s: -0.2 });
         let mut gradient = [Pose::IDENTITY];
-        Term.sight(&Look { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
+        Term.measurement(&Measurement { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
         assert_eq!(gradient, [Pose::new(-0.4, 0.0, 0.2)]);
     }
 }

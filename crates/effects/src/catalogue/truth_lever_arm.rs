@@ -4,14 +4,14 @@
 //! Observability: turns; a robot that only drives straight shows nothing, since where it starts is not known beforehand. Alias: `lateral_skid` at one
 //! speed. Reference: Censi et al. 2013, the sensor's place on the robot.
 
-use model_term::{Look, ModelTerm, TermParameter};
+use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Sighting};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::forward::{Forward, Hooks, PoseReading};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's marker is not over the axle's centre";
@@ -37,7 +37,7 @@ impl PhysicalEffect for TruthLeverArm {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -50,7 +50,7 @@ impl PhysicalEffect for TruthLeverArm {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { lever_x_m: size(sizes, "lever_x_m")?, lever_y_m: size(sizes, "lever_y_m")? })
     }
 }
@@ -64,9 +64,9 @@ impl Forward for State {
         Hooks { instrument: true, ..Hooks::NONE }
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
+    fn instrument(&mut self, reading: &mut PoseReading) {
         let body_from_point = Pose::new(self.size.lever_x_m, self.size.lever_y_m, 0.0);
-        sighting.world_from_body = sighting.world_from_body * body_from_point;
+        reading.world_from_body = reading.world_from_body * body_from_point;
     }
 }
 
@@ -77,12 +77,12 @@ impl ModelTerm for Term {
     /// Plausible: centimetres (a rule of thumb).
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "lever_x_m", unit: "m", plausible: 0.05 },
-            TermParameter { name: "lever_y_m", unit: "m", plausible: 0.05 },
+            TermParameter { name: "lever_x_m", unit: "m", prior_sigma: 0.05 },
+            TermParameter { name: "lever_y_m", unit: "m", prior_sigma: 0.05 },
         ]
     }
 
-    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
+    fn measurement(&mut self, _look: &Measurement<'_>, gradient: &mut [Pose]) {
         gradient[0].x_m = 1.0;
         gradient[1].y_m = 1.0;
     }
@@ -96,9 +96,9 @@ mod tests {
     #[test]
     fn the_point_turns_with_the_robot() {
         let mut state = State { size: TruthLeverArm { lever_x_m: 0.1, lever_y_m: 0.02 } };
-        let mut sighting = Sighting { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, FRAC_PI_2) };
-        state.instrument(&mut sighting);
-        let seen = sighting.world_from_body;
+        let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, FRAC_PI_2) };
+        state.instrument(&mut reading);
+        let seen = reading.world_from_body;
         assert!((seen.x_m - 0.98).abs() < 1e-15 && (seen.y_m - 2.1).abs() < 1e-15, "{seen:?}");
         assert_eq!(seen.theta_rad, FRAC_PI_2);
     }

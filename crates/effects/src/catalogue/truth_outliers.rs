@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::benchmark::Benchmark;
 use crate::description::{Description, IsolatedError, Told};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Sighting};
+use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Sign, size};
 use crate::stream::Stream;
 
@@ -45,7 +45,7 @@ impl PhysicalEffect for TruthOutliers {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Scatter(&[Sign::IsolatedLooks])
+        Hypothesis::Scatter(&[Sign::IsolatedErrors])
     }
 
     fn description() -> Description {
@@ -59,7 +59,7 @@ impl PhysicalEffect for TruthOutliers {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (jump_m, jump_rad) = (size(sizes, "jump_m")?, size(sizes, "jump_rad")?);
         Some(Self { probability: size(sizes, "probability")?, jump_m, jump_rad })
     }
@@ -72,21 +72,21 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_run: true, instrument: true, ..Hooks::NONE }
+        Hooks { seed_run: true, instrument: true, ..Hooks::NONE }
     }
 
-    fn start_run(&mut self, stream: Stream) {
+    fn seed_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
+    fn instrument(&mut self, reading: &mut PoseReading) {
         let Some(stream) = &mut self.stream else { return };
         // Drawn for every sighting: at a larger probability the same sightings jump as at a smaller one, by the same, and others too.
         let (chance, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
         if chance < self.size.probability {
-            sighting.world_from_body.x_m += self.size.jump_m * jump[0];
-            sighting.world_from_body.y_m += self.size.jump_m * jump[1];
-            sighting.world_from_body.theta_rad += self.size.jump_rad * jump[2];
+            reading.world_from_body.x_m += self.size.jump_m * jump[0];
+            reading.world_from_body.y_m += self.size.jump_m * jump[1];
+            reading.world_from_body.theta_rad += self.size.jump_rad * jump[2];
         }
     }
 }
@@ -100,14 +100,14 @@ mod tests {
     const HERE: Pose = Pose::new(1.0, -2.0, 0.5);
 
     /// How far each of `n` sightings of one run is displaced.
-    fn displaced(size: TruthOutliers, n: u32) -> Vec<Pose> {
+    fn mahalanobis_distance(size: TruthOutliers, n: u32) -> Vec<Pose> {
         let mut state = size.forward().expect("acts on sightings");
-        state.start_run(Address { seed: 8, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
+        state.seed_run(Address { seed: 8, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         (0..n)
             .map(|k| {
-                let mut sighting = Sighting { t_s: f64::from(k), world_from_body: HERE };
-                state.instrument(&mut sighting);
-                let seen = sighting.world_from_body;
+                let mut reading = PoseReading { t_s: f64::from(k), world_from_body: HERE };
+                state.instrument(&mut reading);
+                let seen = reading.world_from_body;
                 Pose::new(seen.x_m - HERE.x_m, seen.y_m - HERE.y_m, seen.theta_rad - HERE.theta_rad)
             })
             .collect()
@@ -117,11 +117,11 @@ mod tests {
     fn the_stated_share_of_sightings_jumps_by_the_stated_sizes() {
         let size = TruthOutliers { probability: 0.2, jump_m: 0.03, jump_rad: 0.1 };
         let n = 40_000;
-        let all = displaced(size, n);
+        let all = mahalanobis_distance(size, n);
         let jumped: Vec<&Pose> = all.iter().filter(|pose| **pose != Pose::IDENTITY).collect();
         #[allow(clippy::cast_precision_loss)]
         let (share, m) = (jumped.len() as f64 / f64::from(n), jumped.len() as f64);
-        // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven numbers raise a false alarm once in 2e5 seeds.
+        // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven numbers raise a false positive once in 2e5 seeds.
         // Rejected: an isotropic jump of that *length* (half the variance) and a heading that jumps together with x.
         assert!((share - 0.2).abs() < 5.0 * (0.2_f64 * 0.8 / f64::from(n)).sqrt());
         let moment = |of: &dyn Fn(&Pose) -> f64| jumped.iter().map(|pose| of(pose)).sum::<f64>() / m;
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn a_jump_is_undone_in_the_next_sighting() {
-        let all = displaced(TruthOutliers { probability: 0.1, jump_m: 0.03, jump_rad: 0.0 }, 200);
+        let all = mahalanobis_distance(TruthOutliers { probability: 0.1, jump_m: 0.03, jump_rad: 0.0 }, 200);
         let jumped = |pose: &Pose| *pose != Pose::IDENTITY;
         assert!(all.windows(2).any(|pair| jumped(&pair[0]) && !jumped(&pair[1])));
     }
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn more_outliers_are_the_same_ones_and_others() {
         let [few, many] =
-            [0.05, 0.3].map(|probability| displaced(TruthOutliers { probability, jump_m: 0.03, jump_rad: 0.1 }, 500));
+            [0.05, 0.3].map(|probability| mahalanobis_distance(TruthOutliers { probability, jump_m: 0.03, jump_rad: 0.1 }, 500));
         let jumped = |poses: &[Pose]| poses.iter().filter(|pose| **pose != Pose::IDENTITY).count();
         assert!(jumped(&few) > 0 && jumped(&many) > jumped(&few));
         for (few, many) in few.iter().zip(&many).filter(|(few, _)| **few != Pose::IDENTITY) {

@@ -4,14 +4,14 @@
 //! Observability: any straight way, forward or backward. Alias: equal toe of both wheels is the same thing, on every path: no data tells them apart;
 //! `lateral_skid` at one yaw rate. Reference: Censi et al. 2013, the sensor's orientation on the robot.
 
-use model_term::{Look, ModelTerm, TermParameter};
+use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Sighting};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::forward::{Forward, Hooks, PoseReading};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's frame is turned on the robot";
@@ -34,7 +34,7 @@ impl PhysicalEffect for TruthYaw {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -47,7 +47,7 @@ impl PhysicalEffect for TruthYaw {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { yaw_rad: size(sizes, "yaw_rad")? })
     }
 }
@@ -61,8 +61,8 @@ impl Forward for State {
         Hooks { instrument: true, ..Hooks::NONE }
     }
 
-    fn instrument(&mut self, sighting: &mut Sighting) {
-        sighting.world_from_body.theta_rad += self.size.yaw_rad;
+    fn instrument(&mut self, reading: &mut PoseReading) {
+        reading.world_from_body.theta_rad += self.size.yaw_rad;
     }
 }
 
@@ -72,10 +72,10 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 2°, the upper end of what mounting by eye leaves.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "yaw_rad", unit: "rad", plausible: 0.035 }]
+        &[TermParameter { name: "yaw_rad", unit: "rad", prior_sigma: 0.035 }]
     }
 
-    fn sight(&mut self, _look: &Look<'_>, gradient: &mut [Pose]) {
+    fn measurement(&mut self, _look: &Measurement<'_>, gradient: &mut [Pose]) {
         gradient[0].theta_rad = 1.0;
     }
 }
@@ -87,8 +87,8 @@ mod tests {
     #[test]
     fn only_the_heading_is_seen_turned() {
         let mut state = State { size: TruthYaw { yaw_rad: -0.02 } };
-        let mut sighting = Sighting { t_s: 1.0, world_from_body: Pose::new(1.0, 2.0, 0.5) };
-        state.instrument(&mut sighting);
-        assert_eq!(sighting.world_from_body, Pose::new(1.0, 2.0, 0.48));
+        let mut reading = PoseReading { t_s: 1.0, world_from_body: Pose::new(1.0, 2.0, 0.5) };
+        state.instrument(&mut reading);
+        assert_eq!(reading.world_from_body, Pose::new(1.0, 2.0, 0.48));
     }
 }

@@ -12,7 +12,7 @@ use crate::benchmark::{Benchmark, FloorForm, contact_twist};
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "the faster the robot turns, the farther apart its wheels act";
@@ -35,7 +35,7 @@ impl PhysicalEffect for TurnRateWheelbase {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -54,7 +54,7 @@ impl PhysicalEffect for TurnRateWheelbase {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { beta_s: size(sizes, "beta_s")? })
     }
 }
@@ -85,7 +85,7 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 3 % at 1 rad/s, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "beta_s", unit: "s", plausible: 0.03 }]
+        &[TermParameter { name: "beta_s", unit: "s", prior_sigma: 0.03 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

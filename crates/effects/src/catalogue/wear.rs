@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, Excitation, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Shape, size};
+use crate::hypothesis::{Hypothesis, Variant, size};
 
 /// Loss of radius with the way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,11 +27,11 @@ impl PhysicalEffect for Wear {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, way_m: 0.0 }))
+        Some(Box::new(State { size: *self, distance_m: 0.0 }))
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -43,7 +43,7 @@ impl PhysicalEffect for Wear {
     }
 
     /// A tread wears off: found negative it is something else.
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let loss_per_m = size(sizes, "loss_per_m")?;
         (loss_per_m >= 0.0).then_some(Self { loss_per_m })
     }
@@ -51,24 +51,24 @@ impl PhysicalEffect for Wear {
 
 struct State {
     size: Wear,
-    way_m: f64,
+    distance_m: f64,
 }
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { begin_run: true, wheel: true, ..Hooks::NONE }
+        Hooks { on_run_start: true, wheel: true, ..Hooks::NONE }
     }
 
-    fn begin_run(&mut self, run: &mut RunStart<'_>) {
-        self.way_m = run.session_m;
+    fn on_run_start(&mut self, run: &mut RunStart<'_>) {
+        self.distance_m = run.session_m;
     }
 
     /// Linear in the way, so the middle of the step is its mean.
     fn wheel(&mut self, step: &mut Step) {
         let rolled_m = step.wheel_rad.zip_with(step.radius_m, |rad, radius_m| rad * radius_m);
         let ahead_m = 0.5 * (rolled_m.left + rolled_m.right).abs();
-        let left_over = 1.0 - self.size.loss_per_m * (self.way_m + 0.5 * ahead_m);
-        self.way_m += ahead_m;
+        let left_over = 1.0 - self.size.loss_per_m * (self.distance_m + 0.5 * ahead_m);
+        self.distance_m += ahead_m;
         step.radius_m = step.radius_m.map(|radius_m| radius_m * left_over);
     }
 }
@@ -79,13 +79,13 @@ struct Term;
 impl ModelTerm for Term {
     /// Plausible: 1 mm of a 100 mm radius in 10 km; the catalogue calls it negligible within a session.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "loss_per_m", unit: "1/m", plausible: 1e-6 }]
+        &[TermParameter { name: "loss_per_m", unit: "1/m", prior_sigma: 1e-6 }]
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let way_m = interval.session_m + 0.5 * interval.increment().distance_m.abs();
+        let distance_m = interval.session_m + 0.5 * interval.increment().distance_m.abs();
         let Wheels { left, right } = interval.travel_m;
-        gradient[0] = interval.change(Wheels { left: -left * way_m, right: -right * way_m });
+        gradient[0] = interval.change(Wheels { left: -left * distance_m, right: -right * distance_m });
     }
 }
 
@@ -97,9 +97,9 @@ mod tests {
 
     #[test]
     fn the_way_counts_in_both_directions_and_over_runs() {
-        let mut state = State { size: Wear { loss_per_m: 1e-3 }, way_m: 0.0 };
+        let mut state = State { size: Wear { loss_per_m: 1e-3 }, distance_m: 0.0 };
         let mut info = RunInfo::default();
-        state.begin_run(&mut RunStart { number: 1, session_s: 0.0, session_m: 10.0, info: &mut info });
+        state.on_run_start(&mut RunStart { number: 1, session_s: 0.0, session_m: 10.0, info: &mut info });
         for (turned_m, factor) in [(2.0, 1.0 - 1e-3 * 11.0), (-2.0, 1.0 - 1e-3 * 13.0)] {
             let mut step = specimen_step();
             step.wheel_rad = Wheels::both(turned_m / 0.08);

@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, Told};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, LastAngle, Shape, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Variant, size};
 
 /// What it is, in one line.
 const MEANING: &str = "a wheel is not round or not centred";
@@ -53,7 +53,7 @@ impl PhysicalEffect for WheelEccentricity {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Shape::plain(Term { last: Wheels::both(LastAngle::NONE) }))
+        Hypothesis::Terms(Variant::plain(Term { last: Wheels::both(LastAngle::NONE) }))
     }
 
     fn description() -> Description {
@@ -77,7 +77,7 @@ impl PhysicalEffect for WheelEccentricity {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (left_sin, left_cos) = (size(sizes, "left_sin")?, size(sizes, "left_cos")?);
         let (right_sin, right_cos) = (size(sizes, "right_sin")?, size(sizes, "right_cos")?);
         Some(Self {
@@ -122,10 +122,10 @@ impl ModelTerm for Term {
     /// Plausible: 1 %, the upper end of the rule of thumb.
     fn parameters(&self) -> &'static [TermParameter] {
         &[
-            TermParameter { name: "left_sin", unit: "1", plausible: 0.01 },
-            TermParameter { name: "left_cos", unit: "1", plausible: 0.01 },
-            TermParameter { name: "right_sin", unit: "1", plausible: 0.01 },
-            TermParameter { name: "right_cos", unit: "1", plausible: 0.01 },
+            TermParameter { name: "left_sin", unit: "1", prior_sigma: 0.01 },
+            TermParameter { name: "left_cos", unit: "1", prior_sigma: 0.01 },
+            TermParameter { name: "right_sin", unit: "1", prior_sigma: 0.01 },
+            TermParameter { name: "right_cos", unit: "1", prior_sigma: 0.01 },
         ]
     }
 

@@ -41,7 +41,7 @@ impl PhysicalEffect for WheelMismatch {
         Description::of("the wheels differ in diameter")
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { right_over_left: size(sizes, "right_over_left")? })
     }
 }

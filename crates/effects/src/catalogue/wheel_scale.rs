@@ -38,7 +38,7 @@ impl PhysicalEffect for WheelScale {
         Description::of("both wheels are larger or smaller than believed, by one factor")
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { scale: size(sizes, "scale")? })
     }
 }

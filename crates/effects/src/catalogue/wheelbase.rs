@@ -36,7 +36,7 @@ impl PhysicalEffect for Wheelbase {
         Description::of("the wheels act farther apart or closer together than believed")
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { ratio: size(sizes, "ratio")? })
     }
 }

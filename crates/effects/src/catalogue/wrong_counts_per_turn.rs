@@ -14,7 +14,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, Rewriting, median, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, rewrite_wheels, size};
 
 /// Factors by which people err.
 const FACTORS: [(f64, &str); 14] = [
@@ -64,7 +64,7 @@ impl PhysicalEffect for WrongCountsPerTurn {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Records(rewritings)
+        Hypothesis::Records(corrections)
     }
 
     fn description() -> Description {
@@ -79,7 +79,7 @@ impl PhysicalEffect for WrongCountsPerTurn {
         }
     }
 
-    fn of_sizes(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         Some(Self { factor: size(sizes, "factor")? })
     }
 }
@@ -100,7 +100,7 @@ impl Forward for State {
     }
 }
 
-/// Counted over seen amounts between looks that are far enough apart: of the way, and of the turn.
+/// Counted over seen amounts between measurements that are far enough apart: of the way, and of the turn.
 fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
     let geometry = dataset.robot.geometry().ok()?;
     // The way and the turn by the counts at every row; ways of single wheels add up where the robot spins, so both are signed sums.
@@ -177,20 +177,20 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
     (factor.ln().abs() > INNOCENT.ln_1p()).then_some(factor)
 }
 
-/// With fewer looks a run, what lies between two of them is no way that could be measured: paths turn, and may lead back.
+/// With fewer measurements a run, what lies between two of them is no way that could be measured: paths turn, and may lead back.
 const WAYS_SEEN: usize = 4;
 
 /// Whether the runs are seen at their ends alone.
 fn is_seen_at_ends(dataset: &Dataset) -> bool {
-    let looks = |run: &RunView<'_>| seen(run).iter().map(Vec::len).sum::<usize>();
+    let measurements = |run: &RunView<'_>| seen(run).iter().map(Vec::len).sum::<usize>();
     let session = dataset.session();
-    let (runs, looks) = session
+    let (runs, measurements) = session
         .runs
         .iter()
-        .map(looks)
-        .filter(|looks| *looks > 0)
+        .map(measurements)
+        .filter(|measurements| *measurements > 0)
         .fold((0, 0), |(runs, all), own| (runs + 1, all + own));
-    looks < WAYS_SEEN * runs
+    measurements < WAYS_SEEN * runs
 }
 
 /// The factors that may be: that of the ways that were seen and, where hardly any was, all that people err by.
@@ -205,11 +205,11 @@ fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
     of_ways.into_iter().chain(others).collect()
 }
 
-fn rewritings(dataset: &Dataset) -> Vec<Rewriting> {
-    factors(dataset).into_iter().map(|(factor, reason)| rewriting(dataset, factor, reason)).collect()
+fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
+    factors(dataset).into_iter().map(|(factor, reason)| correction(dataset, factor, reason)).collect()
 }
 
-fn rewriting(dataset: &Dataset, factor: f64, reason: &str) -> Rewriting {
+fn correction(dataset: &Dataset, factor: f64, reason: &str) -> RecordCorrection {
     let scaled = |wheels: &mut WheelLog| {
         if let WheelLog::Angles(Wheels { left, right }) = wheels {
             left.iter_mut().chain(right).for_each(|angle| *angle /= factor);
@@ -220,10 +220,10 @@ fn rewriting(dataset: &Dataset, factor: f64, reason: &str) -> Rewriting {
     if let Some(ticks_per_rev) = &mut records.robot.ticks_per_rev {
         *ticks_per_rev *= factor;
     }
-    Rewriting {
+    RecordCorrection {
         sizes: vec![("factor", factor)],
         sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
-        evident: false,
+        visible_in_log: false,
         records,
     }
 }

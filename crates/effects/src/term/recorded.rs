@@ -2,13 +2,13 @@
 
 use dataset::RunInfo;
 use kinematics::{Increment, Pose, Wheels};
-use model_term::{Interval, Look, ModelTerm, TermParameter};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 
 use super::sparse::{Sparse, on_channel, parameter, seen};
-use crate::covariate::Moment;
-use crate::memory::{Memory, Remembered};
+use crate::covariate::KinematicSample;
+use crate::motion_history::{MotionHistory, MotionHistoryTracker};
 
-/// The hypothesis face in a run.
+/// The estimation model in a run.
 #[derive(Clone)]
 pub(super) struct Recorded {
     of: Sparse,
@@ -19,7 +19,7 @@ pub(super) struct Recorded {
 /// What moments need to know of the intervals before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Past {
-    memory: Memory,
+    memory: MotionHistoryTracker,
     row: Option<Row>,
 }
 
@@ -32,16 +32,16 @@ struct Row {
 }
 
 impl Past {
-    pub(super) const NONE: Self = Self { memory: Memory::NONE, row: None };
+    pub(super) const NONE: Self = Self { memory: MotionHistoryTracker::NONE, row: None };
 
     /// The middle of an interval that takes time.
-    pub(super) fn moment<'i>(&mut self, interval: &Interval<'i>) -> Moment<'i> {
+    pub(super) fn moment<'i>(&mut self, interval: &Interval<'i>) -> KinematicSample<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
         let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
         let wheel_m_s = interval.speed_m_s();
         let [from_s, to_s] = interval.row_s;
         let row = match self.row {
-            // A look between two rows cuts an interval: its speed changed where its row began, and not at the look.
+            // A measurement between two rows cuts an interval: its speed changed where its row began, and not at the measurement.
             Some(row) if row.end_s == to_s => row,
             before => {
                 let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
@@ -53,9 +53,9 @@ impl Past {
         self.row = Some(row);
         let wheel_m_s2 = row.wheel_m_s2;
         let Wheels { left, right } = wheel_m_s2;
-        let Remembered { since_reversal_m, wheel_since_reversal_m, last_turn } =
+        let MotionHistory { since_reversal_m, wheel_since_reversal_m, last_turn } =
             self.memory.after(interval.travel_m, distance_m, turn_rad);
-        Moment {
+        KinematicSample {
             v_m_s,
             omega_rad_s,
             acceleration_m_s2: 0.5 * (left + right),
@@ -107,10 +107,10 @@ impl ModelTerm for Recorded {
         }
     }
 
-    fn sight(&mut self, look: &Look<'_>, gradient: &mut [Pose]) {
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         if self.of.channel.is_seen() {
-            let speeds = (look.twist.v_m_s, look.twist.omega_rad_s);
-            let product = self.of.product(&seen(speeds, look.world_from_body, look.t_s));
+            let speeds = (measurement.twist.v_m_s, measurement.twist.omega_rad_s);
+            let product = self.of.product(&seen(speeds, measurement.world_from_body, measurement.t_s));
             gradient[0] = on_channel(self.of.channel, product, speeds);
         }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use kinematics::{Pose, Wheels};
 use model_term::TermParameter;
 
-use crate::covariate::{Channel, Covariate, Moment};
+use crate::covariate::{Channel, Covariate, KinematicSample};
 
 /// How a product of no covariates is written.
 pub(super) const CONSTANT: &str = "1";
@@ -45,20 +45,20 @@ impl Sparse {
         self.covariates.iter().any(Covariate::is_of_rows)
     }
 
-    pub(super) fn product(&self, at: &Moment<'_>) -> f64 {
+    pub(super) fn product(&self, at: &KinematicSample<'_>) -> f64 {
         self.covariates.iter().map(|covariate| covariate.value(at)).product()
     }
 
     /// The product for each wheel by what it does itself; 0 for one that the channel leaves alone.
-    pub(super) fn of_wheels(&self, channel: Channel, at: &Moment<'_>) -> Wheels<f64> {
+    pub(super) fn of_wheels(&self, channel: Channel, at: &KinematicSample<'_>) -> Wheels<f64> {
         Wheels::from_sides(|side| if channel.is_of(side) { self.product(&at.of_wheel(side)) } else { 0.0 })
     }
 }
 
 /// A moment at which an instrument looks: twist, heading and time alone are known of it.
-pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> Moment<'static> {
+pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> KinematicSample<'static> {
     static NONE: BTreeMap<String, f64> = BTreeMap::new();
-    Moment {
+    KinematicSample {
         v_m_s,
         omega_rad_s,
         acceleration_m_s2: 0.0,
@@ -86,10 +86,10 @@ pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_
 /// A size on a channel that is none of the wheels', by v and ω.
 pub(super) fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
     match channel {
-        Channel::Along | Channel::SeenAlong => Pose::new(size, 0.0, 0.0),
-        Channel::Across | Channel::SeenAcross => Pose::new(0.0, size, 0.0),
-        Channel::Yaw | Channel::SeenHeading => Pose::new(0.0, 0.0, size),
-        Channel::SeenLate => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
+        Channel::Along | Channel::OffsetAlong => Pose::new(size, 0.0, 0.0),
+        Channel::Across | Channel::OffsetAcross => Pose::new(0.0, size, 0.0),
+        Channel::Yaw | Channel::OffsetHeading => Pose::new(0.0, 0.0, size),
+        Channel::MeasurementDelay => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
         // What both wheels or one of them gain needs their separation: `Sparse::of_wheels`.
         Channel::Wheels | Channel::LeftWheel | Channel::RightWheel => Pose::IDENTITY,
     }
@@ -99,11 +99,11 @@ pub(super) fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64
 pub(super) fn parameter(of: &Sparse) -> TermParameter {
     let unit = match of.channel {
         Channel::Yaw => "rad/s",
-        Channel::SeenAlong | Channel::SeenAcross => "m",
-        Channel::SeenHeading => "rad",
-        Channel::SeenLate => "s",
+        Channel::OffsetAlong | Channel::OffsetAcross => "m",
+        Channel::OffsetHeading => "rad",
+        Channel::MeasurementDelay => "s",
         _ => "m/s",
     };
     let faded: f64 = of.covariates.iter().map(Covariate::fades).product();
-    TermParameter { name: "coefficient", unit, plausible: 0.02 * faded }
+    TermParameter { name: "coefficient", unit, prior_sigma: 0.02 * faded }
 }

@@ -64,20 +64,20 @@ fn a_wheel_gains_by_what_it_does_itself() {
 
 #[test]
 fn an_instrument_is_off_in_the_frame_of_the_robot() {
-    let mut state = term(Channel::SeenAcross, &["v"]).forward().expect("a term");
-    let mut sighting = Sighting { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, std::f64::consts::FRAC_PI_2) };
-    let before = sighting;
-    state.instrument(&mut sighting);
-    assert_eq!(sighting, before, "nothing has moved yet");
+    let mut state = term(Channel::OffsetAcross, &["v"]).forward().expect("a term");
+    let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, std::f64::consts::FRAC_PI_2) };
+    let before = reading;
+    state.instrument(&mut reading);
+    assert_eq!(reading, before, "nothing has moved yet");
     let mut step = specimen_step();
     step.rate_rad_s = Wheels::both(2.5);
     let untouched = step;
     state.floor(&mut step);
     assert_eq!(step, untouched, "it is seen, and not driven");
-    state.instrument(&mut sighting);
+    state.instrument(&mut reading);
     // Left of a robot that looks along y is −x: 0.1 × 0.2 m/s.
-    assert!((sighting.world_from_body.x_m - 0.98).abs() < 1e-15, "{sighting:?}");
-    assert!((sighting.world_from_body.y_m - 2.0).abs() < 1e-15, "{sighting:?}");
+    assert!((reading.world_from_body.x_m - 0.98).abs() < 1e-15, "{reading:?}");
+    assert!((reading.world_from_body.y_m - 2.0).abs() < 1e-15, "{reading:?}");
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
     let gained_m = |state: &mut dyn Forward, number, said: Option<f64>| {
         let mut info = RunInfo::default();
         info.covariates.extend(said.map(|said| ("load".to_owned(), said)));
-        state.begin_run(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
+        state.on_run_start(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
         let mut step = specimen_step();
         step.rate_rad_s = Wheels::both(2.5);
         state.floor(&mut step);
@@ -107,7 +107,7 @@ fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
 #[test]
 fn what_makes_no_term_says_why() {
     assert_eq!(term(Channel::Yaw, &["|v|", "sin(theta)"]).check(), Ok(()));
-    assert_eq!(term(Channel::SeenHeading, &["1"]).check(), Ok(()));
+    assert_eq!(term(Channel::OffsetHeading, &["1"]).check(), Ok(()));
     let unknown = problem(&term(Channel::Yaw, &["v", "speed"]));
     assert!(unknown.contains("no covariate \"speed\"") && unknown.contains("\"|omega|\""), "{unknown}");
     assert!(problem(&term(Channel::Yaw, &[])).contains("0 covariates"));
@@ -121,7 +121,7 @@ fn what_makes_no_term_says_why() {
     assert_eq!(term(Channel::Wheels, &["wheel v", "row length"]).check(), Ok(()));
     let of_rows = problem(&term(Channel::Yaw, &["omega", "row length"]));
     assert!(of_rows.contains("\"row length\" goes with the channel wheels and \"wheel v\" alone"), "{of_rows}");
-    let seen = problem(&term(Channel::SeenAlong, &["session time"]));
+    let seen = problem(&term(Channel::OffsetAlong, &["session time"]));
     assert!(seen.contains("seen_along goes with these alone") && seen.contains("\"cos(theta)\""), "{seen}");
     let endless = SparseTerm { coefficient: f64::NAN, ..term(Channel::Yaw, &["v"]) };
     assert!(problem(&endless).contains("coefficient is NaN"));

@@ -9,11 +9,11 @@ use model_term::{Interval, ModelTerm, TermParameter};
 
 use super::recorded::Past;
 use super::sparse::{Sparse, on_channel, parameter};
-use crate::covariate::{Channel, Covariate, Moment};
+use crate::covariate::{Channel, Covariate, KinematicSample};
 
 /// Products on channels of the motion and of the wheels, a parameter each.
 #[derive(Clone)]
-pub(super) struct Together {
+pub(super) struct ProductBatch {
     past: Past,
     /// What the products are made of, each once, and its value by what each wheel does itself.
     covariates: Vec<Covariate>,
@@ -34,7 +34,7 @@ fn place<T: PartialEq>(list: &mut Vec<T>, of: T) -> usize {
     })
 }
 
-impl Together {
+impl ProductBatch {
     pub(super) fn new(all: &[Sparse]) -> Self {
         let (mut covariates, mut factors, mut on) = (Vec::new(), Vec::new(), Vec::new());
         for Sparse { channel, covariates: own } in all {
@@ -53,7 +53,7 @@ impl Together {
     }
 
     /// Finds every product at a moment.
-    fn find(&mut self, at: &Moment<'_>) {
+    fn find(&mut self, at: &KinematicSample<'_>) {
         let (left, right) = (at.of_wheel(Side::Left), at.of_wheel(Side::Right));
         let mut last = None;
         let mut of_cycle = |side: Side, cycles: u8| match last {
@@ -77,7 +77,7 @@ impl Together {
     }
 }
 
-impl ModelTerm for Together {
+impl ModelTerm for ProductBatch {
     fn parameters(&self) -> &[TermParameter] {
         &self.parameters
     }
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_is_seen_and_what_goes_with_rows_stands_alone() {
-        let seen = Sparse { channel: Channel::SeenAlong, covariates: vec![Speed] };
+        let seen = Sparse { channel: Channel::OffsetAlong, covariates: vec![Speed] };
         for other in [seen, Sparse::of_rows()] {
             assert!(!other.shares_moments() && Sparse::together(&[other]).is_none());
         }

@@ -8,14 +8,14 @@ use kinematics::{Count, DriveGeometry, GeometryError, OdometryCovariance, Pose, 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 use super::noise::{Expected, HEADING, NoiseFilter, POSITION, Variances, WHEELS};
-use crate::dead_reckoning_jacobian::{Lengths, Reckoned};
+use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
 
 /// When the factors count as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settling {
     /// Largest standard deviation of a factor.
     pub factor_sigma: f64,
-    /// Since half of the looks no factor may have moved by more than so many standard deviations of what those looks could tell.
+    /// Since half of the measurements no factor may have moved by more than so many standard deviations of what those measurements could tell.
     pub moved_sigmas: f64,
 }
 
@@ -27,7 +27,7 @@ impl Settling {
 /// The factors at an earlier look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Checkpoint {
-    looks: u64,
+    measurements: u64,
     factors: Vector3<f64>,
     covariance: Matrix3<f64>,
 }
@@ -54,31 +54,31 @@ pub struct AugmentedFilter<C> {
     diameter_per_factor: Vector3<f64>,
     factors: Vector3<f64>,
     counts: Wheels<C>,
-    /// P₀ and what multiplies the three variances, at the last look.
+    /// P₀ and what multiplies the three variances, at the last measurement.
     spread: [Matrix6<f64>; 4],
-    leg: Leg,
+    leg: PropagationInterval,
     noise: NoiseFilter,
     settling: Settling,
-    looks: u64,
+    measurements: u64,
     half: Checkpoint,
     next_half: Checkpoint,
 }
 
-/// What happened since the last look: the pose with its derivatives, and the wheels' noise for k² = 1 m.
+/// What happened since the last measurement: the pose with its derivatives, and the wheels' noise for k² = 1 m.
 #[derive(Debug, Clone, Copy)]
-struct Leg {
+struct PropagationInterval {
     start: Pose,
-    reckoned: Reckoned,
+    dead_reckoned: DeadReckoned,
     wheels: OdometryCovariance,
 }
 
-impl Leg {
+impl PropagationInterval {
     fn at(pose: Pose) -> Self {
-        Self { start: pose, reckoned: Reckoned::at(pose), wheels: OdometryCovariance::default() }
+        Self { start: pose, dead_reckoned: DeadReckoned::at(pose), wheels: OdometryCovariance::default() }
     }
 }
 
-/// What a look said.
+/// What a measurement said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
     /// Seen minus predicted: x, y in metres, heading in radians.
@@ -108,17 +108,17 @@ impl<C: Count> AugmentedFilter<C> {
         let mut spread = [Matrix6::zeros(); 4];
         let covariance = Matrix3::from_diagonal_element(factor_sigma * factor_sigma);
         spread[0].fixed_view_mut::<3, 3>(3, 3).copy_from(&covariance);
-        let half = Checkpoint { looks: 0, factors: Vector3::repeat(1.0), covariance };
+        let half = Checkpoint { measurements: 0, factors: Vector3::repeat(1.0), covariance };
         let mut filter = Self {
             nominal: Vector3::new(m_per_count.left, m_per_count.right, separation_m),
             diameter_per_factor: Vector3::new(diameter_m.left, diameter_m.right, separation_m),
             factors: half.factors,
             counts,
             spread,
-            leg: Leg::at(world_from_body),
+            leg: PropagationInterval::at(world_from_body),
             noise,
             settling: Settling::DEFAULT,
-            looks: 0,
+            measurements: 0,
             half,
             next_half: half,
         };
@@ -138,7 +138,7 @@ impl<C: Count> AugmentedFilter<C> {
     /// Puts the robot elsewhere, at a pose that the instrument saw: the next run begins. What is known of the factors stays.
     pub fn restart(&mut self, world_from_body: Pose, counts: Wheels<C>) {
         self.counts = counts;
-        self.leg = Leg::at(world_from_body);
+        self.leg = PropagationInterval::at(world_from_body);
         for part in &mut self.spread {
             part.fixed_rows_mut::<3>(0).fill(0.0);
             part.fixed_columns_mut::<3>(0).fill(0.0);
@@ -157,18 +157,18 @@ impl<C: Count> AugmentedFilter<C> {
 
     /// Takes the turn of both wheels since the last row, in units of the counts.
     fn turn(&mut self, turned: Wheels<f64>) -> Pose {
-        let lengths = self.lengths();
-        let travel_m = lengths.m_per_rad.zip_with(turned, |m_per_count, counts| m_per_count * counts);
+        let geometry_parameters = self.geometry_parameters();
+        let travel_m = geometry_parameters.m_per_rad.zip_with(turned, |m_per_count, counts| m_per_count * counts);
         let one = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(1.0) };
-        self.leg.wheels.propagate(self.leg.reckoned.pose, travel_m, lengths.separation_m, &one);
-        self.leg.reckoned.advance(&lengths, turned);
-        self.leg.reckoned.pose
+        self.leg.wheels.propagate(self.leg.dead_reckoned.pose, travel_m, geometry_parameters.separation_m, &one);
+        self.leg.dead_reckoned.advance(&geometry_parameters, turned);
+        self.leg.dead_reckoned.pose
     }
 
     /// Takes a pose that the instrument saw, and corrects pose, factors and noise.
     pub fn update(&mut self, world_from_body: Pose) -> Innovation {
         self.spread = self.spread_now();
-        let predicted = self.leg.reckoned.pose;
+        let predicted = self.leg.dead_reckoned.pose;
         let residual = Vector3::new(
             world_from_body.x_m - predicted.x_m,
             world_from_body.y_m - predicted.y_m,
@@ -183,7 +183,7 @@ impl<C: Count> AugmentedFilter<C> {
         let variances = *self.noise.variances();
         let covariance = expected.at(&variances);
         let whole = self.whole(&self.spread);
-        // A look without any error at all and a robot without any leave nothing to weigh.
+        // A measurement without any error at all and a robot without any leave nothing to weigh.
         let inverse = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gain: Matrix6x3<f64> = whole.fixed_columns::<3>(0) * inverse;
         let correction: Vector6<f64> = gain * residual;
@@ -202,13 +202,13 @@ impl<C: Count> AugmentedFilter<C> {
             predicted.y_m + correction[1],
             predicted.theta_rad + correction[2],
         );
-        self.leg = Leg::at(pose);
-        self.noise.look(&residual, &expected);
-        self.looks += 1;
-        if self.looks >= 2 * self.next_half.looks {
+        self.leg = PropagationInterval::at(pose);
+        self.noise.measurement(&residual, &expected);
+        self.measurements += 1;
+        if self.measurements >= 2 * self.next_half.measurements {
             self.half = self.next_half;
             self.next_half =
-                Checkpoint { looks: self.looks, factors: self.factors, covariance: self.factor_covariance() };
+                Checkpoint { measurements: self.measurements, factors: self.factors, covariance: self.factor_covariance() };
         }
         Innovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
     }
@@ -216,7 +216,7 @@ impl<C: Count> AugmentedFilter<C> {
     /// Where the robot is believed to be.
     #[must_use]
     pub const fn world_from_body(&self) -> Pose {
-        self.leg.reckoned.pose
+        self.leg.dead_reckoned.pose
     }
 
     /// The three factors: left wheel, right wheel, separation.
@@ -267,7 +267,7 @@ impl<C: Count> AugmentedFilter<C> {
         known && self.has_stopped_moving()
     }
 
-    /// Whether the later half of the looks, or more, moved the factors by no more than it could tell.
+    /// Whether the later half of the measurements, or more, moved the factors by no more than it could tell.
     ///
     /// A constant that is estimated better and better moves by as much as its variance shrinks: Var(now − then) = P_then − P_now. One that moves by more is no
     /// constant, or the noise is not what the filter takes it for.
@@ -281,9 +281,9 @@ impl<C: Count> AugmentedFilter<C> {
         })
     }
 
-    fn lengths(&self) -> Lengths {
+    fn geometry_parameters(&self) -> GeometryParameters {
         let [left, right, separation_m] = self.nominal.component_mul(&self.factors).into();
-        Lengths { m_per_rad: Wheels { left, right }, separation_m }
+        GeometryParameters { m_per_rad: Wheels { left, right }, separation_m }
     }
 
     fn whole(&self, spread: &[Matrix6<f64>; 4]) -> Matrix6<f64> {
@@ -291,19 +291,19 @@ impl<C: Count> AugmentedFilter<C> {
         spread[0] + spread[1] * variances[WHEELS] + spread[2] * variances[POSITION] + spread[3] * variances[HEADING]
     }
 
-    /// ∂(state now)/∂(state at the last look).
+    /// ∂(state now)/∂(state at the last measurement).
     fn transition(&self) -> Matrix6<f64> {
-        let Leg { start, reckoned, .. } = &self.leg;
+        let PropagationInterval { start, dead_reckoned, .. } = &self.leg;
         let mut transition = Matrix6::identity();
         // Turned by its heading's error, the whole leg swings round its start.
-        transition[(0, 2)] = -(reckoned.pose.y_m - start.y_m);
-        transition[(1, 2)] = reckoned.pose.x_m - start.x_m;
-        let by_factors = reckoned.by_lengths * Matrix3::from_diagonal(&self.nominal);
+        transition[(0, 2)] = -(dead_reckoned.pose.y_m - start.y_m);
+        transition[(1, 2)] = dead_reckoned.pose.x_m - start.x_m;
+        let by_factors = dead_reckoned.by_geometry * Matrix3::from_diagonal(&self.nominal);
         transition.fixed_view_mut::<3, 3>(0, 3).copy_from(&by_factors);
         transition
     }
 
-    /// The parts of the covariance carried over what happened since the last look.
+    /// The parts of the covariance carried over what happened since the last measurement.
     fn spread_now(&self) -> [Matrix6<f64>; 4] {
         let transition = self.transition();
         let mut spread = self.spread.map(|part| transition * part * transition.transpose());
@@ -313,7 +313,7 @@ impl<C: Count> AugmentedFilter<C> {
     }
 }
 
-/// What each variance adds to a look: nothing of the wheels, both coordinates, the heading.
+/// What each variance adds to a measurement: nothing of the wheels, both coordinates, the heading.
 fn instrument() -> [Matrix3<f64>; 3] {
     [
         Matrix3::zeros(),
@@ -387,18 +387,18 @@ mod tests {
     fn the_parts_add_up_to_the_covariance_of_a_filter_that_keeps_one() {
         let variances = [3e-6, 4e-6, 5e-6];
         let mut parts = filter(variances);
-        let look = Matrix3::from_diagonal(&Vector3::new(4e-6, 4e-6, 5e-6));
+        let measurement = Matrix3::from_diagonal(&Vector3::new(4e-6, 4e-6, 5e-6));
         let mut whole = Matrix6::zeros();
-        whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&look);
+        whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&measurement);
         whole.fixed_view_mut::<3, 3>(3, 3).copy_from(&Matrix3::from_diagonal_element(0.05 * 0.05));
         let wheel_noise = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(3e-6_f64.sqrt()) };
         for (left, right) in ROWS {
             let before = parts.world_from_body();
             let mut of_pose = OdometryCovariance::default();
-            let lengths = parts.lengths();
+            let geometry_parameters = parts.geometry_parameters();
             let turned = Wheels { left: left - parts.counts.left, right: right - parts.counts.right };
-            let travel_m = lengths.m_per_rad.zip_with(turned, |m_per_rad, rad| m_per_rad * rad);
-            of_pose.propagate(before, travel_m, lengths.separation_m, &wheel_noise);
+            let travel_m = geometry_parameters.m_per_rad.zip_with(turned, |m_per_rad, rad| m_per_rad * rad);
+            of_pose.propagate(before, travel_m, geometry_parameters.separation_m, &wheel_noise);
             let predicted = parts.predict(Wheels { left, right });
             let transition = parts.transition();
             whole = transition * whole * transition.transpose();
@@ -406,7 +406,7 @@ mod tests {
             block += of_pose.matrix();
             let seen = predicted * Pose::new(1e-3, -2e-3, 3e-3);
             let innovation = parts.update(seen);
-            let mean = whole.fixed_view::<3, 3>(0, 0) + look;
+            let mean = whole.fixed_view::<3, 3>(0, 0) + measurement;
             assert!((innovation.covariance - mean).norm() < 1e-12 * mean.norm());
             let gain = whole.fixed_columns::<3>(0) * mean.try_inverse().expect("regular");
             let rows = whole.fixed_rows::<3>(0).into_owned();
@@ -419,14 +419,14 @@ mod tests {
     }
 
     /// Legs of half a metre with half a radian of turn to either side, seen without error; the robot has these lengths.
-    fn wander(filter: &mut AugmentedFilter<f64>, lengths: Lengths, legs: u32) {
-        let mut truth = Reckoned::at(filter.world_from_body());
+    fn wander(filter: &mut AugmentedFilter<f64>, geometry_parameters: GeometryParameters, legs: u32) {
+        let mut truth = DeadReckoned::at(filter.world_from_body());
         let mut wheel_rad = filter.counts;
         filter.restart(truth.pose, wheel_rad);
         for leg in 0..legs {
             let turn = if leg % 4 < 2 { 1.0 } else { -1.0 };
             let step = Wheels { left: 6.0 - turn, right: 6.0 + turn };
-            truth.advance(&lengths, step);
+            truth.advance(&geometry_parameters, step);
             wheel_rad = wheel_rad.zip_with(step, |sum, step| sum + step);
             filter.predict(wheel_rad);
             filter.update(truth.pose);
@@ -435,7 +435,7 @@ mod tests {
 
     #[test]
     fn factors_are_found_settle_and_are_seen_to_change() {
-        let robot = |left: f64| Lengths {
+        let robot = |left: f64| GeometryParameters {
             m_per_rad: Wheels { left: 0.08 * left, right: 0.085 * 0.99 },
             separation_m: 0.363 * 1.03,
         };
@@ -444,7 +444,7 @@ mod tests {
         assert!(!filter.is_settled(), "two legs are not enough to know");
         wander(&mut filter, robot(1.01), 400);
         assert!(filter.is_settled(), "{} {}", filter.factors(), filter.factor_covariance());
-        // Linearised about a start that is 3 % off; the looks after it outweigh that.
+        // Linearised about a start that is 3 % off; the measurements after it outweigh that.
         let error = (filter.factors() - Vector3::new(1.01, 0.99, 1.03)).amax();
         assert!(error < 1e-4, "{error}");
         // The right wheel for the left one would not pass.

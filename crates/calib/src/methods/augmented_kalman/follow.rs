@@ -6,17 +6,17 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{AugmentedFilter, AugmentedKalman};
 use crate::estimate::{CalibError, nominal};
-use crate::pose_measurements::{Look, Looks, Spacing};
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 
-/// What the robot knows of its drive after a look.
+/// What the robot knows of its drive after a measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
     /// The run, by its id.
     pub run: String,
-    /// Looks since the very first.
-    pub looks: usize,
+    /// Measurements since the very first.
+    pub measurements: usize,
     /// Way driven since then by the nominal drive, metres.
-    pub way_m: f64,
+    pub distance_m: f64,
     /// Turned since then by the nominal drive, either way, radians.
     pub turn_rad: f64,
     /// The drive as it is believed to be.
@@ -28,28 +28,28 @@ pub struct Followed {
 }
 
 impl AugmentedKalman {
-    /// Follows the parameters through sessions in the order given, a look after the other; what is known is never gone back on.
+    /// Follows the parameters through sessions in the order given, a measurement after the other; what is known is never gone back on.
     ///
     /// # Errors
     /// [`CalibError`] when the sessions hold no poses, or a factor leaves what is a drive.
     pub fn follow(&self, sessions: &[Session<'_>]) -> Result<Vec<Followed>, CalibError> {
         let (_, geometry) = nominal(Self::NAME, sessions)?;
         let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
-        let (runs, _) = Looks::of_all(Self::NAME, sessions, spacing)?;
+        let (runs, _) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
         let mut turned = Wheels::both(0.0);
-        let start = runs.first().map_or(Pose::IDENTITY, |looks| looks.start);
+        let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);
         let noise = self.first_guess(sessions);
         let m_per_rad = geometry.m_per_rad();
         let mut filter = AugmentedFilter::new(&geometry, m_per_rad, self.factor_sigma, noise, start, turned);
-        let (mut followed, mut way_m, mut turn_rad) = (Vec::new(), 0.0, 0.0);
-        for looks in runs {
-            filter.restart(looks.start, turned);
-            for Look { wheel_rad, pose } in &looks.later {
+        let (mut followed, mut distance_m, mut turn_rad) = (Vec::new(), 0.0, 0.0);
+        for measurements in runs {
+            filter.restart(measurements.start, turned);
+            for PoseMeasurement { wheel_rad, pose } in &measurements.later {
                 for rad in wheel_rad {
                     turned = turned.zip_with(*rad, |turned, rad| turned + rad);
                     filter.predict(turned);
                     let step = geometry.increment(m_per_rad.zip_with(*rad, |m_per_rad, rad| m_per_rad * rad));
-                    way_m += step.distance_m.abs();
+                    distance_m += step.distance_m.abs();
                     turn_rad += step.turn_rad.abs();
                 }
                 filter.update(*pose);
@@ -57,9 +57,9 @@ impl AugmentedKalman {
                 let geometry = found.map_err(|source| CalibError::NotADrive { method: Self::NAME, source })?;
                 let covariance: Matrix3<f64> = filter.covariance();
                 followed.push(Followed {
-                    run: looks.run.to_owned(),
-                    looks: followed.len() + 1,
-                    way_m,
+                    run: measurements.run.to_owned(),
+                    measurements: followed.len() + 1,
+                    distance_m,
                     turn_rad,
                     geometry,
                     sigma_m: covariance.diagonal().map(|variance| variance.max(0.0).sqrt()),
@@ -71,7 +71,7 @@ impl AugmentedKalman {
     }
 }
 
-/// Where the parameters settled for good: the first look from which on they count as settled at every later one.
+/// Where the parameters settled for good: the first measurement from which on they count as settled at every later one.
 #[must_use]
 pub fn settled_at(followed: &[Followed]) -> Option<&Followed> {
     let unsettled = followed.iter().rposition(|step| !step.settled).map_or(0, |last| last + 1);

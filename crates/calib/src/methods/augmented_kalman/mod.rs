@@ -3,9 +3,9 @@
 //! Model: the state is the pose with the factors δ_L, δ_R of the wheels and δ_B of the separation over their nominal values. Rows of the log predict, with wheel
 //! noise of variance k²|s|; poses of the instrument correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that is one
 //! pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until factors and noise stay: the linearisation is then at the answer.
-//! Assumptions: the instrument sees the drive's centre, its errors are normal and independent from look to look, factors are constant. Looks are therefore
+//! Assumptions: the instrument sees the drive's centre, its errors are normal and independent from measurement to measurement, factors are constant. Looks are therefore
 //! taken apart by [`AugmentedKalman::look_every_m`]: twenty a second of one clock that is off are not independent.
-//! Observability: all three, from looks on paths with straights and turns; a factor that is hardly better known afterwards is refused.
+//! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly better known afterwards is refused.
 //! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the augmented filter); Mehra 1970 for the innovations.
 
 mod filter;
@@ -24,8 +24,8 @@ pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
-use crate::pose_measurements::{Look, Looks, Spacing};
-use crate::dead_reckoning_jacobian::unseen;
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
+use crate::dead_reckoning_jacobian::unobservable;
 
 /// The method with its beliefs before any data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub struct AugmentedKalman {
     pub truth_sigma_m: f64,
     /// First guess of its error in heading where the dataset does not state it, radians.
     pub truth_sigma_rad: f64,
-    /// Looks are taken after so much travel by the nominal robot, metres, …
+    /// Measurements are taken after so much travel by the nominal robot, metres, …
     pub look_every_m: f64,
     /// … or so much turn, radians, and at a run's end.
     pub look_every_rad: f64,
@@ -75,15 +75,15 @@ impl AugmentedKalman {
 
     const NAME: &'static str = "augmented_kalman";
 
-    fn pass(&self, runs: &[Looks<'_>], nominal: &DriveGeometry, factors: Vector3<f64>, noise: NoiseFilter) -> Pass {
+    fn pass(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, factors: Vector3<f64>, noise: NoiseFilter) -> Pass {
         let m_per_rad = nominal.m_per_rad();
-        let start = runs.first().map_or(Pose::IDENTITY, |looks| looks.start);
+        let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);
         let mut turned = Wheels::both(0.0);
         let mut filter =
             AugmentedFilter::new(nominal, m_per_rad, self.factor_sigma, noise, start, turned).starting_from(factors);
-        for looks in runs {
-            filter.restart(looks.start, turned);
-            for Look { wheel_rad, pose } in &looks.later {
+        for measurements in runs {
+            filter.restart(measurements.start, turned);
+            for PoseMeasurement { wheel_rad, pose } in &measurements.later {
                 for rad in wheel_rad {
                     turned = turned.zip_with(*rad, |turned, rad| turned + rad);
                     filter.predict(turned);
@@ -117,7 +117,7 @@ impl AugmentedKalman {
     }
 
     /// Passes until factors and variances stay; false when they do not.
-    fn iterate(&self, runs: &[Looks<'_>], nominal: &DriveGeometry, guess: NoiseFilter) -> (Pass, bool) {
+    fn iterate(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, guess: NoiseFilter) -> (Pass, bool) {
         let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.held_at(*guess.variances()));
         let mut share = 1.0;
         for _ in 0..MOST_PASSES {
@@ -166,7 +166,7 @@ impl Method for AugmentedKalman {
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
         let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
-        let (runs, runs_rejected) = Looks::of_all(Self::NAME, sessions, spacing)?;
+        let (runs, runs_rejected) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
         let (pass, stays) = self.iterate(&runs, &geometry, self.first_guess(sessions));
         self.observable(&pass.covariance)?;
         let [left, right, separation] = pass.factors.into();
@@ -188,7 +188,7 @@ impl Method for AugmentedKalman {
 }
 
 impl AugmentedKalman {
-    /// Refuses factors that the looks hardly told more of than was believed before.
+    /// Refuses factors that the measurements hardly told more of than was believed before.
     fn observable(&self, covariance: &Matrix3<f64>) -> Result<(), CalibError> {
         let eigen = covariance.symmetric_eigen();
         let vague = eigen.eigenvalues.imax();
@@ -196,7 +196,7 @@ impl AugmentedKalman {
         if left <= HARDLY_BETTER {
             return Ok(());
         }
-        let (parameter, missing) = unseen(&eigen.eigenvectors.column(vague).into_owned());
+        let (parameter, missing) = unobservable(&eigen.eigenvectors.column(vague).into_owned());
         let why = format!("{missing} (still {:.0} % of the doubt before any data)", 100.0 * left);
         Err(CalibError::Unobservable { method: Self::NAME, parameter, why })
     }

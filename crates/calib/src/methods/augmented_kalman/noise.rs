@@ -3,7 +3,7 @@
 //! Martinelli's second filter takes observables of the path whose means are linear in the noise parameters. Here they are the products of the first filter's
 //! innovations ν: at given gains their mean S = C + Σ q_i D_i is linear in the variances q, exactly, because the covariance in Joseph's form is; the first filter
 //! carries C and D along. q is a constant state seen through νν', whose scatter for normal errors gives the weights: information Λ_ij = ½ tr(S⁻¹D_i S⁻¹D_j) and
-//! its share of evidence ½ tr(S⁻¹D_i S⁻¹(νν' − C)) of each look. This is Fisher scoring on the likelihood of the innovations (Mehra 1970), a look at a time.
+//! its share of evidence ½ tr(S⁻¹D_i S⁻¹(νν' − C)) of each measurement. This is Fisher scoring on the likelihood of the innovations (Mehra 1970), a look at a time.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -66,7 +66,7 @@ impl NoiseFilter {
         }
     }
 
-    /// The same guess with other variances that stay while evidence is collected: for going over the same looks again.
+    /// The same guess with other variances that stay while evidence is collected: for going over the same measurements again.
     pub(super) fn held_at(&self, variances: Variances) -> Self {
         Self { variances, adapting: false, ..Self::new(self.guess, self.known) }
     }
@@ -78,7 +78,7 @@ impl NoiseFilter {
     }
 
     /// Takes an innovation.
-    pub(super) fn look(&mut self, innovation: &Vector3<f64>, expected: &Expected) {
+    pub(super) fn measurement(&mut self, innovation: &Vector3<f64>, expected: &Expected) {
         let mean = expected.at(&self.variances);
         let Some(inverse) = mean.try_inverse() else { return };
         let square = innovation * innovation.transpose();
@@ -137,7 +137,7 @@ impl NoiseFilter {
         }
     }
 
-    /// Logarithm of the likelihood of all looks and of the guess, to a constant.
+    /// Logarithm of the likelihood of all measurements and of the guess, to a constant.
     pub(super) fn log_posterior(&self) -> f64 {
         let prior = (0..3).filter(|i| !self.known[*i]).map(|i| {
             let ratio = self.guess[i] / self.variances[i];
@@ -170,9 +170,9 @@ mod tests {
 
     const TRUTH: [f64; 3] = [3e-6, 5e-7, 2e-6];
 
-    /// Looks after legs of different lengths, whose innovations have the covariance of [`TRUTH`] exactly: ±√3 times the columns of its root.
-    fn looks() -> Vec<(Vector3<f64>, Expected)> {
-        let mut looks = Vec::new();
+    /// Measurements after legs of different lengths, whose innovations have the covariance of [`TRUTH`] exactly: ±√3 times the columns of its root.
+    fn measurements() -> Vec<(Vector3<f64>, Expected)> {
+        let mut measurements = Vec::new();
         for leg in 1..=400_u32 {
             let length_m = 0.01 * f64::from(leg);
             let wheels = Matrix3::from_diagonal(&Vector3::new(0.5, length_m * length_m, 15.0)) * length_m;
@@ -187,11 +187,11 @@ mod tests {
             let root = expected.at(&TRUTH.into()).cholesky().expect("positive").l();
             for column in 0..3 {
                 for sign in [1.0, -1.0] {
-                    looks.push((root.column(column) * sign * 3_f64.sqrt(), expected));
+                    measurements.push((root.column(column) * sign * 3_f64.sqrt(), expected));
                 }
             }
         }
-        looks
+        measurements
     }
 
     fn guess() -> NoiseFilter {
@@ -202,12 +202,12 @@ mod tests {
         found.component_div(&Variances::from(TRUTH)).add_scalar(-1.0).amax()
     }
 
-    /// Variances at which the likelihood of the looks is largest.
-    fn scored(looks: &[(Vector3<f64>, Expected)], known: [bool; 3]) -> NoiseFilter {
+    /// Variances at which the likelihood of the measurements is largest.
+    fn scored(measurements: &[(Vector3<f64>, Expected)], known: [bool; 3]) -> NoiseFilter {
         let mut filter = NoiseFilter { known, ..guess() };
         for _ in 0..30 {
             filter = filter.held_at(*filter.variances());
-            looks.iter().for_each(|(innovation, expected)| filter.look(innovation, expected));
+            measurements.iter().for_each(|(innovation, expected)| filter.measurement(innovation, expected));
             let variances = filter.variances().zip_map(&filter.step(), |variance, step| variance * step.exp());
             filter.variances = variances;
         }
@@ -216,39 +216,39 @@ mod tests {
 
     #[test]
     fn variances_come_back_from_innovations_that_have_them() {
-        let looks = looks();
-        // The guess, off by a factor of two, is worth a look among the hundred or so after short legs that show the heading's error: 0.01.
-        let found = scored(&looks, [false; 3]);
+        let measurements = measurements();
+        // The guess, off by a factor of two, is worth a measurement among the hundred or so after short legs that show the heading's error: 0.01.
+        let found = scored(&measurements, [false; 3]);
         assert!(relative(found.variances()) < 0.01, "{}", found.variances());
         // What must not pass: without the part that does not depend on the noise, and with two variances taken for each other.
         let blind: Vec<_> =
-            looks.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
+            measurements.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
         assert!(relative(scored(&blind, [false; 3]).variances()) > 0.05);
         let swapped = |expected: &Expected| Expected {
             slopes: [expected.slopes[0], expected.slopes[2], expected.slopes[1]],
             ..*expected
         };
-        let swapped: Vec<_> = looks.iter().map(|(of, expected)| (*of, swapped(expected))).collect();
+        let swapped: Vec<_> = measurements.iter().map(|(of, expected)| (*of, swapped(expected))).collect();
         assert!(relative(scored(&swapped, [false; 3]).variances()) > 0.5);
     }
 
-    /// 20 seeds of 2400 looks. Each variance is estimated to the standard deviation that the information promises; 60 deviations of five of them are a false alarm
+    /// 20 seeds of 2400 measurements. Each variance is estimated to the standard deviation that the information promises; 60 deviations of five of them are a false positive
     /// of 3.4e-5.
     #[test]
     fn on_line_the_variances_come_as_near_as_the_information_allows() {
-        let looks = looks();
-        let information = scored(&looks, [false; 3]).information;
+        let measurements = measurements();
+        let information = scored(&measurements, [false; 3]).information;
         let covariance = information.try_inverse().expect("regular");
         let mut largest = 0.0_f64;
         for seed in 0..20 {
             let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
             let mut filter = guess();
-            for number in 0..looks.len() {
+            for number in 0..measurements.len() {
                 // Short and long legs in turn.
-                let (_, expected) = &looks[(number * 991) % looks.len()];
+                let (_, expected) = &measurements[(number * 991) % measurements.len()];
                 let root = expected.at(&TRUTH.into()).cholesky().expect("positive").l();
                 let draws = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
-                filter.look(&(root * draws), expected);
+                filter.measurement(&(root * draws), expected);
             }
             for i in 0..3 {
                 largest = largest.max((filter.variances()[i] - TRUTH[i]).abs() / covariance[(i, i)].sqrt());
@@ -262,10 +262,10 @@ mod tests {
 
     #[test]
     fn the_gradient_is_that_of_the_log_posterior_and_would_not_pass_wrong() {
-        let looks = looks();
+        let measurements = measurements();
         let at = |variances: Variances| {
             let mut filter = guess().held_at(variances);
-            looks.iter().for_each(|(innovation, expected)| filter.look(innovation, expected));
+            measurements.iter().for_each(|(innovation, expected)| filter.measurement(innovation, expected));
             filter
         };
         let point = Vector3::new(2e-6, 8e-7, 1e-6);
@@ -280,7 +280,7 @@ mod tests {
             let difference = (moved(h) - moved(-h)) / (2.0 * h);
             let ratio = guess().guess[i] / point[i];
             let gradient = filter.gradient[i] * point[i] + 0.5 * GUESS_WORTH * (ratio - 1.0);
-            // 2400 looks: third derivatives in the logarithm stay under a few thousand, truncation 1e-8 of it; rounding 1e-16·4e4/1e-4.
+            // 2400 measurements: third derivatives in the logarithm stay under a few thousand, truncation 1e-8 of it; rounding 1e-16·4e4/1e-4.
             assert!((gradient - difference).abs() < 1e-3, "{i}: {gradient} {difference}");
             assert!((gradient * 1.001 + 2e-3 - difference).abs() > 1e-3);
         }
@@ -288,12 +288,12 @@ mod tests {
 
     #[test]
     fn what_is_known_stays_and_what_is_absent_goes_to_the_border() {
-        let looks = looks();
-        let found = scored(&looks, [false, true, false]);
+        let measurements = measurements();
+        let found = scored(&measurements, [false, true, false]);
         assert_eq!(found.variances()[POSITION], 1e-6);
         // Innovations without any scatter: every variance ends where its range does, and none is negative.
         let mut filter = guess();
-        looks.iter().for_each(|(_, expected)| filter.look(&Vector3::zeros(), expected));
+        measurements.iter().for_each(|(_, expected)| filter.measurement(&Vector3::zeros(), expected));
         assert!(filter.variances().min() > 0.0 && filter.variances().max() < 1e-7, "{}", filter.variances());
     }
 }

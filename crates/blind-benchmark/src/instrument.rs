@@ -1,6 +1,6 @@
 //! What the outside instrument shows of a run: which looks, and what they err by.
 //!
-//! The simulator's instrument looks without error; here its looks are chosen (dense, sparse, the ends alone, or displacements between two of them) and
+//! The simulator's instrument looks without error; here its measurements are chosen (dense, sparse, the ends alone, or displacements between two of them) and
 //! disturbed: white, heavy-tailed (Student's t with three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white noise).
 
 use dataset::{Displacement, Run, TruthNoise, TruthSample};
@@ -9,7 +9,7 @@ use kinematics::Pose;
 
 use super::draw::Draw;
 
-/// What the looks are.
+/// What the measurements are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TruthKind {
@@ -19,11 +19,11 @@ pub enum TruthKind {
     Sparse,
     /// The first and the last pose of every run.
     Endpoints,
-    /// Displacements between looks, as scan matching gives them.
+    /// Displacements between measurements, as scan matching gives them.
     Relative,
 }
 
-/// What the looks err by, and what the log loses.
+/// What the measurements err by, and what the log loses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseClass {
@@ -47,8 +47,8 @@ impl NoiseClass {
         };
         match self {
             Self::White => Vec::new(),
-            Self::HeavyTailed => with_sign(Sign::IsolatedLooks),
-            Self::Correlated => with_sign(Sign::CorrelatedLooks),
+            Self::HeavyTailed => with_sign(Sign::IsolatedErrors),
+            Self::Correlated => with_sign(Sign::AutocorrelatedErrors),
             Self::Dropouts => self.effect().iter().map(Effect::id).collect(),
         }
     }
@@ -67,10 +67,10 @@ const SHARE_LOST: f64 = 0.02;
 
 /// How the robot of a case is looked at.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Watching {
+pub(crate) struct InstrumentModel {
     pub(crate) kind: TruthKind,
     pub(crate) class: NoiseClass,
-    /// Every so many looks of the simulated instrument.
+    /// Every so many measurements of the simulated instrument.
     every: usize,
     sigma_xy_m: f64,
     sigma_theta_rad: f64,
@@ -80,7 +80,7 @@ pub(crate) struct Watching {
     stated: f64,
 }
 
-impl Watching {
+impl InstrumentModel {
     pub(crate) fn draw(draw: &mut Draw) -> Self {
         let kind = match draw.below(10) {
             0..=3 => TruthKind::Dense,
@@ -120,7 +120,7 @@ impl Watching {
     }
 
     /// Variances of position and heading that independent errors of the same weight would have: those of errors that last grow by (1 + ρ)/(1 − ρ), ρ being
-    /// the correlation from look to look.
+    /// the correlation from measurement to measurement.
     pub(crate) fn variances(&self) -> [f64; 2] {
         let factor = if self.class == NoiseClass::Correlated {
             let between_s = self.every.min(200) as f64 / super::robot::RATE_HZ;
@@ -132,27 +132,27 @@ impl Watching {
         [self.sigma_xy_m, self.sigma_theta_rad].map(|sigma| factor * sigma * sigma)
     }
 
-    /// Which looks of a run are taken.
-    fn taken(&self, looks: usize) -> Vec<usize> {
-        let Some(last) = looks.checked_sub(1) else { return Vec::new() };
-        let mut taken: Vec<usize> = (0..looks).step_by(self.every.min(looks.max(1))).collect();
+    /// Which measurements of a run are taken.
+    fn taken(&self, measurements: usize) -> Vec<usize> {
+        let Some(last) = measurements.checked_sub(1) else { return Vec::new() };
+        let mut taken: Vec<usize> = (0..measurements).step_by(self.every.min(measurements.max(1))).collect();
         if taken.last() != Some(&last) && self.kind != TruthKind::Dense {
             taken.push(last);
         }
         taken
     }
 
-    /// Replaces the noise-free looks of a run by what is recorded of them; without draws, still without error.
-    pub(crate) fn look(&self, run: &mut Run, draw: Option<&mut Draw>) {
+    /// Replaces the noise-free measurements of a run by what is recorded of them; without draws, still without error.
+    pub(crate) fn measurement(&self, run: &mut Run, draw: Option<&mut Draw>) {
         let taken = self.taken(run.truth.len());
         let exact: Vec<(f64, Pose)> = taken
             .into_iter()
-            .map(|look| {
-                let sample = &run.truth[look];
+            .map(|measurement| {
+                let sample = &run.truth[measurement];
                 (sample.t_s, Pose::new(sample.x_m, sample.y_m, sample.theta_rad().unwrap_or(0.0)))
             })
             .collect();
-        let mut errors = Errors { watching: self, draw, lasting: [0.0; 3], last_s: f64::NEG_INFINITY };
+        let mut errors = Errors { instrument_model: self, draw, lasting: [0.0; 3], last_s: f64::NEG_INFINITY };
         if self.kind == TruthKind::Relative {
             run.truth.clear();
             run.displacements = exact
@@ -181,9 +181,9 @@ impl Watching {
     }
 }
 
-/// Errors of one look after the other.
+/// Errors of one measurement after the other.
 struct Errors<'w> {
-    watching: &'w Watching,
+    instrument_model: &'w InstrumentModel,
     draw: Option<&'w mut Draw>,
     lasting: [f64; 3],
     last_s: f64,
@@ -192,14 +192,15 @@ struct Errors<'w> {
 impl Errors<'_> {
     fn next(&mut self, t_s: f64) -> [f64; 3] {
         let Some(draw) = self.draw.as_deref_mut() else { return [0.0; 3] };
-        let (share, tau_s) = self.watching.lasting;
+        let (share, tau_s) = self.instrument_model.lasting;
         let keeps = (-(t_s - self.last_s) / tau_s).exp();
         self.last_s = t_s;
-        let sigma = [self.watching.sigma_xy_m, self.watching.sigma_xy_m, self.watching.sigma_theta_rad];
+        let sigma =
+            [self.instrument_model.sigma_xy_m, self.instrument_model.sigma_xy_m, self.instrument_model.sigma_theta_rad];
         std::array::from_fn(|k| {
             let white = draw.0.normal();
             sigma[k]
-                * match self.watching.class {
+                * match self.instrument_model.class {
                     NoiseClass::White | NoiseClass::Dropouts => white,
                     NoiseClass::HeavyTailed => {
                         // t₃ has variance 3: √3 makes it one.

@@ -4,13 +4,13 @@ use kinematics::Wheels;
 
 /// The side to which a value that drifts last went: it is held within a band, which it must cross to go to the other side.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LastSide {
+pub(crate) struct Hysteresis {
     half_width: f64,
     within: f64,
     sense: f64,
 }
 
-impl LastSide {
+impl Hysteresis {
     /// Neither yet.
     pub(crate) const fn beyond(half_width: f64) -> Self {
         Self { half_width, within: 0.0, sense: 0.0 }
@@ -35,13 +35,13 @@ pub(crate) const TURN_RAD: f64 = 0.03;
 /// The way since something last went the other way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reversals {
-    went: LastSide,
+    went: Hysteresis,
     since_m: f64,
 }
 
 impl Reversals {
     /// None yet.
-    pub(crate) const NONE: Self = Self { went: LastSide::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
+    pub(crate) const NONE: Self = Self { went: Hysteresis::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
 
     /// The way since the last one, after going this far on, or back where that is negative.
     pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
@@ -56,34 +56,34 @@ impl Reversals {
 
 /// What moments remember of a run.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Memory {
+pub(crate) struct MotionHistoryTracker {
     centre: Reversals,
     wheels: Wheels<Reversals>,
-    turned: LastSide,
+    turned: Hysteresis,
 }
 
 /// What is remembered at a moment: ways since reversals, and the sense of the last turn.
-pub(crate) struct Remembered {
+pub(crate) struct MotionHistory {
     pub(crate) since_reversal_m: f64,
     pub(crate) wheel_since_reversal_m: Wheels<[f64; 2]>,
     pub(crate) last_turn: f64,
 }
 
-impl Memory {
+impl MotionHistoryTracker {
     /// Of a run that begins.
     pub(crate) const NONE: Self = Self {
         centre: Reversals::NONE,
         wheels: Wheels { left: Reversals::NONE, right: Reversals::NONE },
-        turned: LastSide::beyond(TURN_RAD),
+        turned: Hysteresis::beyond(TURN_RAD),
     };
 
     /// What is remembered once the wheels and the robot have gone on.
-    pub(crate) fn after(&mut self, travel_m: Wheels<f64>, distance_m: f64, turn_rad: f64) -> Remembered {
+    pub(crate) fn after(&mut self, travel_m: Wheels<f64>, distance_m: f64, turn_rad: f64) -> MotionHistory {
         let since_m = Wheels::from_sides(|side| {
             let to_m = self.wheels[side].after(travel_m[side]);
             [to_m - travel_m[side].abs(), to_m]
         });
-        Remembered {
+        MotionHistory {
             since_reversal_m: self.centre.after(distance_m),
             wheel_since_reversal_m: since_m,
             last_turn: self.turned.after(turn_rad),
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_side_is_another_once_the_band_is_crossed() {
-        let mut side = LastSide::beyond(0.03);
+        let mut side = Hysteresis::beyond(0.03);
         assert_eq!([0.02, 0.02, -0.05, -0.02, 0.05].map(|by| side.after(by)), [0.0, 1.0, 1.0, -1.0, -1.0]);
     }
 

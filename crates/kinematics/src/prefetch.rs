@@ -8,7 +8,7 @@ const LINE: usize = 64;
 
 /// Asks for the lines of what is soon read.
 #[inline(always)]
-pub(crate) fn soon_read<T, const N: usize>(values: &[T; N]) {
+pub(crate) fn prefetch_read<T, const N: usize>(values: &[T; N]) {
     for_each_line(values, |value| {
         #[cfg(target_arch = "x86_64")]
         safe_arch::prefetch_t0(value);
@@ -19,7 +19,7 @@ pub(crate) fn soon_read<T, const N: usize>(values: &[T; N]) {
 
 /// Asks for the lines of what is soon written.
 #[inline(always)]
-pub(crate) fn soon_written<T, const N: usize>(values: &[T; N]) {
+pub(crate) fn prefetch_write<T, const N: usize>(values: &[T; N]) {
     for_each_line(values, |value| {
         #[cfg(target_arch = "x86_64")]
         safe_arch::prefetch_et0(value);

@@ -15,7 +15,7 @@ const MOST_MISSED: u32 = 3;
 
 /// The beat of a run's rows: a line through their times over the numbers of their beats.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Beat {
+pub(crate) struct SamplingPeriodEstimator {
     /// Times of the rows from which the beat is yet to be found.
     first_s: Vec<f64>,
     /// Of the rows of the beat: weight, means of number and time, and sums of squares and products about them.
@@ -31,7 +31,7 @@ pub(crate) struct Beat {
     pub(crate) late_s: f64,
 }
 
-impl Beat {
+impl SamplingPeriodEstimator {
     /// When beat 0 is and the time between two beats, where that is known.
     fn line(&self) -> Option<(f64, f64)> {
         (self.square > 0.0).then(|| {
@@ -41,15 +41,15 @@ impl Beat {
     }
 
     /// Takes a row of the beat, by Welford's recursion.
-    fn add(&mut self, beat: f64, time_s: f64) {
-        self.last = beat;
+    fn add(&mut self, sampling_period: f64, time_s: f64) {
+        self.last = sampling_period;
         let keeps = 1.0 - 1.0 / MEMORY_ROWS;
         self.rows = keeps * self.rows + 1.0;
-        let off = [beat - self.mean[0], time_s - self.mean[1]];
+        let off = [sampling_period - self.mean[0], time_s - self.mean[1]];
         for (mean, off) in self.mean.iter_mut().zip(off) {
             *mean += off / self.rows;
         }
-        self.square = keeps * self.square + off[0] * (beat - self.mean[0]);
+        self.square = keeps * self.square + off[0] * (sampling_period - self.mean[0]);
         self.product = keeps * self.product + off[0] * (time_s - self.mean[1]);
     }
 
@@ -66,17 +66,17 @@ impl Beat {
         let mut gaps_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         gaps_s.sort_by(f64::total_cmp);
         let between_s = gaps_s[gaps_s.len() / 2];
-        let (mut beat, mut last_s) = (0.0, rows_s[0]);
-        self.add(beat, last_s);
+        let (mut sampling_period, mut last_s) = (0.0, rows_s[0]);
+        self.add(sampling_period, last_s);
         for &row_s in &rows_s[1..] {
             let gap = (row_s - last_s) / between_s;
             if gap > NO_BEAT {
-                beat += if gap < ONE_BEAT { 1.0 } else { gap.round() };
+                sampling_period += if gap < ONE_BEAT { 1.0 } else { gap.round() };
                 last_s = row_s;
-                self.add(beat, row_s);
+                self.add(sampling_period, row_s);
             }
         }
-        self.late_s = self.line().map_or(0.0, |(zero_s, between_s)| last_s - zero_s - beat * between_s);
+        self.late_s = self.line().map_or(0.0, |(zero_s, between_s)| last_s - zero_s - sampling_period * between_s);
     }
 
     /// Takes the row that ends an interval: how late it is.
@@ -85,11 +85,11 @@ impl Beat {
             self.warm_up(from_s, row_s);
             return;
         };
-        let beat = ((row_s - zero_s) / between_s).round();
-        if beat <= self.last {
+        let sampling_period = ((row_s - zero_s) / between_s).round();
+        if sampling_period <= self.last {
             return; // It came by itself, at a standstill.
         }
-        let late_s = row_s - zero_s - beat * between_s;
+        let late_s = row_s - zero_s - sampling_period * between_s;
         if late_s.abs() > MISSED * between_s {
             self.missed += 1;
             if self.missed >= MOST_MISSED {
@@ -99,7 +99,7 @@ impl Beat {
         }
         self.missed = 0;
         self.late_s = late_s;
-        self.add(beat, row_s);
+        self.add(sampling_period, row_s);
     }
 }
 
@@ -114,14 +114,14 @@ mod tests {
         for seed in 0..50 {
             let mut stream = Address { seed, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test"));
             let mut stamp_s = |row: u32| between_s * f64::from(row) + stream.uniform_about_zero(jitter_s);
-            let mut beat = Beat::default();
+            let mut sampling_period = SamplingPeriodEstimator::default();
             let (mut before_s, mut square) = (stamp_s(0), 0.0);
             for row in 1..rows {
                 let row_s = stamp_s(row).max(before_s + 1e-3);
-                beat.next_row(before_s, row_s);
-                square += beat.late_s * beat.late_s;
+                sampling_period.next_row(before_s, row_s);
+                square += sampling_period.late_s * sampling_period.late_s;
                 // Never later than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
-                assert!(beat.late_s.abs() < between_s, "seed {seed} row {row}: {}", beat.late_s);
+                assert!(sampling_period.late_s.abs() < between_s, "seed {seed} row {row}: {}", sampling_period.late_s);
                 before_s = row_s;
             }
             // A uniform error.
