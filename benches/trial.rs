@@ -1,5 +1,5 @@
 //! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, calibrated by each method, all of it together
-//! beside a bare loop that does the same, and a point of a sweep. At last the ratios of these, timed in turn: medians over rounds of the fastest of five.
+//! beside a bare loop that does the same, a point of a sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of the fastest of five.
 
 mod yardstick;
 
@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use motion_programs::Schedule;
-use scenario::{Engine, Scenario};
+use scenario::{Engine, Instrument, Scenario};
 
 fn paper(engine: Engine) -> Scenario {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml");
@@ -80,6 +80,31 @@ fn sweep(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// The bound of the paper's protocol, which every point of a sweep computes, and of a square of one minute that is seen 20 times a second.
+fn bound(criterion: &mut Criterion) {
+    let protocol = paper(Engine::ClosedForm);
+    let mut dense = protocol.clone();
+    dense.protocols = vec![Schedule::Squares { side_m: 2.9, runs_each_way: 1 }];
+    dense.instruments = vec![Instrument::MotionCapture {
+        rate_hz: 20.0,
+        sigma_xy_m: 1e-3,
+        sigma_theta_rad: 1e-3,
+        latency_s: 0.0,
+        lever_x_m: 0.0,
+        lever_y_m: 0.0,
+        lever_theta_rad: 0.0,
+    }];
+    let mut group = criterion.benchmark_group("bound");
+    group.sample_size(20);
+    for (name, scenario) in [("protocol", protocol), ("dense", dense)] {
+        let programs = scenario.programs();
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| bench::FisherInformation::of(&scenario, &programs).expect("bounded"));
+        });
+    }
+    group.finish();
+}
+
 /// Seconds of one call, the fastest of five times some.
 fn fastest_s(calls: u32, mut call: impl FnMut()) -> f64 {
     let time = |_| {
@@ -132,5 +157,5 @@ fn ratios(_: &mut Criterion) {
     println!("  of it the bare loop    {:8.0} %", 100.0 * median(&|times| times[3] / times[2]));
 }
 
-criterion_group!(benches, trial, sweep, ratios);
+criterion_group!(benches, trial, sweep, bound, ratios);
 criterion_main!(benches);

@@ -105,7 +105,7 @@ const HELD_OUT: u32 = 16;
 const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
 const MOST_STEPS: usize = 5;
-/// Another form of which the hypothesis takes up less is another effect: the forms of tests/effect_hypotheses leave at most 0.65² of their squares.
+/// Another form of which the hypothesis takes up less is another effect: the forms of tests/effects/hypotheses leave at most 0.65² of their squares.
 const LEAST_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;

@@ -1,9 +1,8 @@
-//! Memory and time of large and of hopeless files. One test, as the peak is the process's.
+//! Memory of large and of hopeless files. A program with one test, as the peak is the process's; `benches/dataset.rs` measures the time.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::time::Instant;
 
 use dataset::{DatasetError, RunByRun, read};
 use peak_alloc::PeakAlloc;
@@ -57,19 +56,16 @@ fn peak_of_reading(dir: &Path) -> (Result<usize, DatasetError>, usize) {
 }
 
 #[test]
+<<<<<<< HEAD
 #[allow(clippy::print_stderr)]
+=======
+>>>>>>> 7cff86c381104a5edb3aa71d409fc7b97c009922
 fn columns_are_all_that_is_held_and_garbage_is_not_held_at_all() {
     for (rows, runs, block) in [(ROWS, 1, 1), (ROWS / 5, 1000, 500), (ROWS / 5, 1000, 1)] {
         let temp = tempfile::tempdir().expect("a temporary folder");
         write_manifest(temp.path(), runs);
         write_odometry(temp.path(), rows, runs, block);
-        let start = Instant::now();
         let (read_rows, peak_bytes) = peak_of_reading(temp.path());
-        let rows_per_s = rows as f64 / start.elapsed().as_secs_f64();
-        eprintln!(
-            "{runs} runs in blocks of {block}: {:.1} bytes a row, {rows_per_s:.2e} rows/s",
-            peak_bytes as f64 / rows as f64
-        );
         assert_eq!(read_rows.expect("readable"), rows);
         assert!(peak_bytes >= ROW_BYTES * rows, "the columns alone take more: the measurement is wrong");
         assert!(peak_bytes <= BYTES_PER_ROW_LIMIT * rows, "{} bytes a row", peak_bytes / rows);
@@ -94,11 +90,9 @@ fn columns_are_all_that_is_held_and_garbage_is_not_held_at_all() {
         // A line without end: a sparse file, which takes no room on the disk.
         let endless = File::options().append(true).open(temp.path().join(file)).expect("opened");
         endless.set_len(GIGABYTE).expect("grown");
-        let start = Instant::now();
         let (read_rows, peak_bytes) = peak_of_reading(temp.path());
         let error = read_rows.expect_err("a gigabyte of nothing");
         assert!(peak_bytes < 1 << 20, "{file}: {peak_bytes} bytes: {error}");
-        assert!(start.elapsed().as_secs_f64() < 2.0, "{file}: {error}");
         assert!(error.to_string().contains(file), "{error}");
     }
 }

@@ -23,7 +23,7 @@ const INTRODUCTION: &str = "\
 
 What makes real wheel odometry deviate. Every effect has two faces, in one file under [crates/effects/src/catalogue/](../crates/effects/src/catalogue). The *forward* face is how the
 world does it, inside a step of the simulator; its sizes are keys of a scenario ([scenario.md](scenario.md#effects)). The *hypothesis* face is how recorded data show it, and sees
-recorded quantities only. They share names and no code. `tests/effect_laws.rs` holds what all promise; `tests/effect_hypotheses/` drives every simulation model that has a mean and asks
+recorded quantities only. They share names and no code. `tests/effects/laws.rs` holds what all promise; `tests/effects/hypotheses/` drives every simulation model that has a mean and asks
 that its hypothesis, at the same sizes, predicts what was seen, and at half of them, one and a half, or with one sign turned does not.
 ";
 

@@ -166,7 +166,7 @@ impl ModelFit<'_> {
                         interval.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |interval| propagator.twist(interval));
                     propagator.measurement(body, 0, t_s, Twist { v_m_s, omega_rad_s });
                     let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
-                    add(propagator.from_terms(), late)
+                    add(propagator.sum_of_terms(), late)
                 };
             // Where the drive's centre stands at the first measurement, to first order in what the terms add to it.
             let mounted = start * body_from_sensor.inverse();

@@ -13,7 +13,7 @@ use crate::model::{Column, Instrument, Model};
 use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
 use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
-use crate::records::{Segment, Start};
+use crate::records::{MeasuredPose, Segment, Start};
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 
@@ -229,11 +229,18 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
+    /// Variances of a measurement's position and heading: the instrument's, times what its row states of itself.
+    #[inline(always)]
+    fn variance_of(&self, measured: &MeasuredPose) -> [f64; 2] {
+        let [_, _, xy, theta] = self.noise.variance;
+        [xy * measured.variance_factor[0], theta * measured.variance_factor[1]]
+    }
+
     /// Stands where a measurement saw the robot, after so many propagation intervals.
     #[inline(always)]
     fn start_at(&mut self, (propagations, measurement): (usize, usize), next_piece: usize, free_heading_rad: f64) {
         let measured = self.segment.measurements[measurement];
-        let [_, _, xy, theta] = self.noise.variance;
+        let [xy, theta] = self.variance_of(&measured);
         let pose = Pose::new(measured.x_m, measured.y_m, measured.theta_rad.unwrap_or(free_heading_rad));
         let free = measured.theta_rad.is_none();
         let interval = self.segment.intervals.get(next_piece).or(self.segment.intervals.last()).copied();
@@ -352,11 +359,11 @@ impl<'f, 'a> Filter<'f, 'a> {
             sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
             twist.omega_rad_s,
         );
-        let mut from_terms = Vector3::zeros();
+        let mut sum_of_terms = Vector3::zeros();
         for (number, size) in self.model.term_values.iter().enumerate().filter(|(_, size)| **size != 0.0) {
-            from_terms += *size * self.by_measurement.get(number);
+            sum_of_terms += *size * self.by_measurement.get(number);
         }
-        let ahead = mounted - late * moved + from_terms;
+        let ahead = mounted - late * moved + sum_of_terms;
         let error = Vector3::new(
             measured.x_m - self.pose.x_m - ahead.x,
             measured.y_m - self.pose.y_m - ahead.y,
@@ -367,7 +374,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };
-        let r = [self.noise.variance[2], self.noise.variance[2], self.noise.variance[3]];
+        let [xy, theta] = self.variance_of(&measured);
+        let r = [xy, xy, theta];
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
         let measured = [0, 1, 2].map(|component| {
             if component >= components {

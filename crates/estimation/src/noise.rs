@@ -64,6 +64,14 @@ impl NoisePrior {
         }
     }
 
+    /// Plausible standard deviations of a measurement's position, metres, and heading, radians.
+    pub(crate) const fn measurement_sigma(&self) -> [f64; 2] {
+        [
+            self.centre[NoiseComponent::MeasurementPosition as usize],
+            self.centre[NoiseComponent::MeasurementHeading as usize],
+        ]
+    }
+
     /// The same with one standard deviation held at next to nothing.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
         (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_SIGMA, HELD);

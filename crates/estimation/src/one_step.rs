@@ -270,7 +270,7 @@ impl ModelFit<'_> {
     ) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
-        let records = Records::of(&sessions).belonging_to(run);
+        let records = Records::relative_to(&sessions, self.prior.measurement_sigma()).belonging_to(run);
         if records.segments.is_empty() {
             return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
         }

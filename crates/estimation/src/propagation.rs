@@ -320,7 +320,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
             self.term_gradients(interval, travel_m, self.run_from_chain * pose);
-            let Pose { x_m, y_m, theta_rad } = self.from_terms();
+            let Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
             let arc = Increment { distance_m: distance_m + x_m, turn_rad: turn_rad + theta_rad }.arc();
             pose = pose * arc * Pose::new(0.0, y_m, 0.0);
             self.session_m += distance_m.abs();
@@ -331,7 +331,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
     }
 
     /// What the terms last said, at their parameters' values.
-    pub(crate) fn from_terms(&self) -> Pose {
+    pub(crate) fn sum_of_terms(&self) -> Pose {
         self.gradients.iter().zip(&self.model.term_values).fold(Pose::IDENTITY, |sum, (gradient, size)| {
             Pose::new(
                 sum.x_m + size * gradient.x_m,

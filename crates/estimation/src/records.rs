@@ -4,10 +4,11 @@
 //! displacement is a segment of its own: it starts where the instrument stood, which is known exactly in its own frame. Displacements that follow each other
 //! lead through the run: what goes with the heading in the room, or remembers, goes on from one to the next.
 
-use dataset::{RunInfo, Session};
+use dataset::{Run, RunInfo, Session, TruthSample};
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
+use crate::noise::NoisePrior;
 use crate::wheel_angles::{SAME_INSTANT_S, WheelAngleInterpolator, WheelInterval};
 
 /// A motion whose chord is less than this share of its way hardly shows where it went.
@@ -25,6 +26,8 @@ pub(crate) struct MeasuredPose {
     pub(crate) theta_rad: Option<f64>,
     /// How many intervals of the segment end before it.
     pub(crate) after: usize,
+    /// Variances of position and heading over those of a measurement without a stated precision of its own.
+    pub(crate) variance_factor: [f64; 2],
 }
 
 /// Where a segment starts.
@@ -157,9 +160,16 @@ pub struct Records<'a> {
 }
 
 impl<'a> Records<'a> {
-    /// The segments of sessions.
+    /// The segments of sessions. Standard deviations that rows state for themselves weigh relative to that of the instrument: what the first session states, or what is
+    /// plausible.
     #[must_use]
     pub fn of(sessions: &[Session<'a>]) -> Self {
+        let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
+        Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma())
+    }
+
+    /// The same relative to given standard deviations of position, metres, and heading, radians.
+    pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
         let mut records = Self { segments: Vec::new(), unused: Vec::new(), ids: Vec::new() };
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
@@ -177,7 +187,7 @@ impl<'a> Records<'a> {
                         wheel_rad: track.first_rad(),
                         session_m,
                     };
-                    add_poses(&mut records.segments, &base, &track, looks_of(run));
+                    add_poses(&mut records.segments, &base, &track, measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
                     let distance_m = |(diameter_m, side): (f64, &Vec<f64>)| {
                         side.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>() * 0.5 * diameter_m
@@ -326,22 +336,45 @@ impl<'a> Records<'a> {
     }
 }
 
-/// The measurements of a run: its truth, positions alone included, or else its marked points.
-fn looks_of(run: &dataset::RunView<'_>) -> Vec<(f64, f64, f64, Option<f64>)> {
-    let truth = &run.run().truth;
+/// What the instrument measured in a run, no interval before it yet.
+fn measured_poses(run: &dataset::RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
+    let Run { truth, truth_sigma, .. } = run.run();
     if truth.is_empty() {
         let poses = run.observed_poses().into_iter();
-        poses.map(|(t_s, pose)| (t_s, pose.x_m, pose.y_m, Some(pose.theta_rad))).collect()
-    } else {
-        truth.iter().map(|sample| (sample.t_s, sample.x_m, sample.y_m, sample.theta_rad())).collect()
+        return poses
+            .map(|(t_s, Pose { x_m, y_m, theta_rad })| MeasuredPose {
+                t_s,
+                x_m,
+                y_m,
+                theta_rad: Some(theta_rad),
+                after: 0,
+                variance_factor: [1.0; 2],
+            })
+            .collect();
     }
+    let factor = |sigma: Option<f64>, reference: f64| {
+        sigma.filter(|sigma| *sigma > 0.0).map_or(1.0, |sigma| (sigma / reference).powi(2))
+    };
+    let factor_of = |row: usize| match truth_sigma.as_ref().and_then(|sigmas| sigmas.get(row)) {
+        Some(sigma) => [factor(sigma.sigma_xy_m, reference[0]), factor(sigma.sigma_theta_rad, reference[1])],
+        None => [1.0; 2],
+    };
+    let of = |(row, sample): (usize, &TruthSample)| MeasuredPose {
+        t_s: sample.t_s,
+        x_m: sample.x_m,
+        y_m: sample.y_m,
+        theta_rad: sample.theta_rad(),
+        after: 0,
+        variance_factor: factor_of(row),
+    };
+    truth.iter().enumerate().map(of).collect()
 }
 
 fn add_poses<'a>(
     segments: &mut Vec<Segment<'a>>,
     base: &Segment<'a>,
     track: &WheelAngleInterpolator<'_>,
-    measurements: Vec<(f64, f64, f64, Option<f64>)>,
+    measurements: Vec<MeasuredPose>,
 ) {
     let mut cursor = track.cursor();
     let mut segment: Option<Segment<'a>> = None;
@@ -352,23 +385,23 @@ fn add_poses<'a>(
             segment
         }));
     };
-    for (t_s, x_m, y_m, theta_rad) in measurements {
+    for measured in measurements {
         let Some(before_s) =
             segment.as_ref().and_then(|segment| segment.measurements.last()).map(|measurement| measurement.t_s)
         else {
-            segment = begin(base, &mut cursor, (t_s, x_m, y_m, theta_rad));
+            segment = begin(base, &mut cursor, measured);
             continue;
         };
         let joined = segment.as_mut().is_some_and(|segment| {
-            let reaches = cursor.intervals(before_s, t_s, &mut segment.intervals);
+            let reaches = cursor.intervals(before_s, measured.t_s, &mut segment.intervals);
             if reaches {
-                segment.measurements.push(MeasuredPose { t_s, x_m, y_m, theta_rad, after: segment.intervals.len() });
+                segment.measurements.push(MeasuredPose { after: segment.intervals.len(), ..measured });
             }
             reaches
         });
         if !joined {
             close(segment.take());
-            segment = begin(base, &mut cursor, (t_s, x_m, y_m, theta_rad));
+            segment = begin(base, &mut cursor, measured);
         }
     }
     close(segment);
@@ -377,17 +410,17 @@ fn add_poses<'a>(
 fn begin<'a>(
     base: &Segment<'a>,
     cursor: &mut crate::wheel_angles::Cursor<'_, '_>,
-    (t_s, x_m, y_m, theta_rad): (f64, f64, f64, Option<f64>),
+    first: MeasuredPose,
 ) -> Option<Segment<'a>> {
-    let wheel_rad = cursor.angle_rad(t_s)?.zip_with(base.wheel_rad, |turned, first| first + turned);
-    Some(Segment { wheel_rad, measurements: vec![MeasuredPose { t_s, x_m, y_m, theta_rad, after: 0 }], ..base.clone() })
+    let wheel_rad = cursor.angle_rad(first.t_s)?.zip_with(base.wheel_rad, |turned, first| first + turned);
+    Some(Segment { wheel_rad, measurements: vec![first], ..base.clone() })
 }
 
 fn add_displacements<'a>(
     segments: &mut Vec<Segment<'a>>,
     base: &Segment<'a>,
     track: &WheelAngleInterpolator<'_>,
-    run: &dataset::Run,
+    run: &Run,
 ) {
     let mut cursor = track.cursor();
     let mut last_s = f64::NEG_INFINITY;
@@ -403,6 +436,7 @@ fn add_displacements<'a>(
                 y_m: pose.y_m,
                 theta_rad: Some(pose.theta_rad),
                 after: intervals.len(),
+                variance_factor: [1.0; 2],
             };
             let continues = (measured.t0_s - last_s).abs() <= SAME_INSTANT_S;
             last_s = measured.t1_s;

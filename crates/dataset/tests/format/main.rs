@@ -1,0 +1,6 @@
+//! The dataset format: written and read without loss, bad input refused by line and column, blocks of runs, and real robots' logs.
+
+mod bad_input;
+mod blocks;
+mod real_data;
+mod round_trip;

@@ -1,0 +1,156 @@
+//! Who may use whom among the crates, as Cargo has it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+use crate::root;
+
+/// Who may use whom, dev- and build-dependencies too. `estimation` and `calib` never link what could tell them the truth.
+pub(crate) const ARROWS: &[(&str, &[&str])] = &[
+    ("kinematics", &[]),
+    ("atomic-file", &[]),
+    ("dataset", &["kinematics"]),
+    ("motion-programs", &["kinematics", "dataset"]),
+    ("model-term", &["kinematics", "dataset"]),
+    ("effects", &["kinematics", "dataset", "model-term"]),
+    ("scenario", &["kinematics", "dataset", "motion-programs", "model-term", "effects"]),
+    ("sim-yair", &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario"]),
+    ("estimation", &["kinematics", "dataset", "model-term"]),
+    ("calib", &["kinematics", "dataset", "motion-programs", "model-term", "estimation"]),
+    (
+        "diagnose",
+        &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario", "estimation", "calib"],
+    ),
+    ("report", &["atomic-file"]),
+    (
+        "bench",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "report",
+        ],
+    ),
+    (
+        "blind-benchmark",
+        &[
+            "kinematics",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "diagnose",
+        ],
+    ),
+    (
+        "paper-reproduction",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "report",
+            "bench",
+        ],
+    ),
+    (
+        "yair",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "diagnose",
+            "report",
+            "bench",
+            "blind-benchmark",
+            "paper-reproduction",
+        ],
+    ),
+];
+
+/// Every crate of the workspace with the crates of the workspace that it depends on, in any way.
+fn crates() -> BTreeMap<String, BTreeSet<String>> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let list = |value: &serde_json::Value| value.as_array().cloned().unwrap_or_default();
+    let name = |value: &serde_json::Value| value["name"].as_str().unwrap_or_default().to_owned();
+    let ours = |dependency: &&serde_json::Value| dependency["path"].is_string();
+    list(&metadata["packages"])
+        .iter()
+        .map(|package| (name(package), list(&package["dependencies"]).iter().filter(ours).map(name).collect()))
+        .collect()
+}
+
+/// What the crates do that the arrows do not allow.
+fn complaints(crates: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for (user, used) in crates {
+        let Some((_, allowed)) = ARROWS.iter().find(|(name, _)| name == user) else {
+            complaints.push(format!(
+                "crate {user} has no place: add it to ARROWS in tests/architecture/arrows.rs and to the rooms of ARCHITECTURE.md"
+            ));
+            continue;
+        };
+        let wrong = used.iter().filter(|used| !allowed.contains(&used.as_str()));
+        complaints
+            .extend(wrong.map(|used| format!("{user} must not depend on {used} (the arrows in ARCHITECTURE.md)")));
+    }
+    complaints
+}
+
+#[test]
+fn the_arrows_between_crates_hold() {
+    let crates = crates();
+    assert_eq!(complaints(&crates), Vec::<String>::new());
+    assert_eq!(crates.len(), ARROWS.len(), "crates and table: {:?}", crates.keys());
+    // What is allowed directly is allowed through others: no arrow can be walked round.
+    for (user, allowed) in ARROWS {
+        for (_, further) in ARROWS.iter().filter(|(name, _)| allowed.contains(name)) {
+            assert!(further.iter().all(|used| allowed.contains(used)), "{user} reaches more than it may use");
+        }
+    }
+}
+
+#[test]
+fn the_arrows_reject_an_estimator_that_links_the_truth_and_a_room_that_nobody_knows() {
+    let edge = |user: &str, used: &str| BTreeMap::from([(user.to_owned(), BTreeSet::from([used.to_owned()]))]);
+    for estimator in ["estimation", "calib"] {
+        for truth in ["effects", "scenario", "sim-yair", "bench"] {
+            assert_eq!(complaints(&edge(estimator, truth)).len(), 1, "{estimator} {truth}");
+        }
+    }
+    assert_eq!(complaints(&edge("diagnose", "sim-yair")).len(), 1);
+    assert_eq!(complaints(&edge("kinematics", "dataset")).len(), 1);
+    assert_eq!(complaints(&edge("calib", "dataset")).len(), 0);
+    let unknown = complaints(&edge("attic", "kinematics"));
+    assert!(unknown.len() == 1 && unknown[0].contains("add it to ARROWS"), "{unknown:?}");
+}

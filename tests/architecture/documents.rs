@@ -1,0 +1,83 @@
+//! The documents have every key, effect and method, and their links lead somewhere.
+
+use motion_programs::Schedule;
+use scenario::Scenario;
+
+use crate::{files, root, text};
+
+/// The keys that a part of a scenario accepts, by the message with which it refuses another one.
+fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
+    let kind = if kind.is_empty() { String::new() } else { format!("kind = \"{kind}\"\n") };
+    let refusal = toml::from_str::<T>(&format!("{kind}no_such_key = 0")).err().expect("refused").to_string();
+    let (_, known) = refusal.split_once("expected").unwrap_or_else(|| panic!("lists the known keys: {refusal}"));
+    known.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_scenario_document_has_every_key_and_every_effect() {
+    use scenario::{
+        Budget, Case, Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, Range, Robot, Sobol,
+        Sweep,
+    };
+    let document = text("docs/scenario.md");
+    let parts = [
+        ("", keys::<Scenario>("")),
+        ("robot", keys::<Robot>("")),
+        ("robot.encoder", keys::<Encoder>("")),
+        ("robot.controller", keys::<Controller>("")),
+        ("robot.motor", keys::<Motor>("")),
+        ("robot.point", keys::<Mark>("")),
+        ("engine", keys::<Engine>("stepping")),
+        ("noise", keys::<Noise>("")),
+        ("placement", keys::<Placement>("")),
+        ("log", keys::<Log>("")),
+        ("floor_grid", keys::<Instrument>("floor_grid")),
+        ("motion_capture", keys::<Instrument>("motion_capture")),
+        ("straights", keys::<Schedule>("straights")),
+        ("spins", keys::<Schedule>("spins")),
+        ("squares", keys::<Schedule>("squares")),
+        ("validation_path", keys::<Schedule>("validation_path")),
+        ("sweep", keys::<Sweep>("")),
+        ("sweep.sobol", keys::<Sobol>("")),
+        ("sweep.case", keys::<Case>("")),
+        ("an axis' range", keys::<Range>("")),
+        ("budget", keys::<Budget>("")),
+    ];
+    for (part, keys) in parts {
+        assert!(!keys.is_empty(), "{part}");
+        for key in keys {
+            assert!(document.contains(&format!("| `{key}` |")), "docs/scenario.md has no row for {key} of {part}");
+        }
+    }
+    for id in effects::CATALOGUE.iter().chain([&"term"]) {
+        let row = document.lines().find(|line| line.starts_with(&format!("| `{id}` |")));
+        let row = row.unwrap_or_else(|| panic!("docs/scenario.md has no row for the effect {id}"));
+        for key in keys::<effects::Effect>(id) {
+            assert!(row.contains(&format!("`{key}`")), "docs/scenario.md: the row of {id} lacks {key}");
+        }
+    }
+    let channels = effects::Channel::all().map(|channel| channel.name().to_owned());
+    for name in effects::Covariate::NAMED.iter().map(effects::Covariate::name).chain(channels) {
+        // A bar would end a table's cell.
+        let name = name.replace('|', "\\|");
+        assert!(document.contains(&format!("`{name}`")), "docs/scenario.md does not say what {name} is");
+    }
+}
+
+#[test]
+fn every_method_is_documented_and_every_link_leads_somewhere() {
+    let document = text("docs/calibration.md");
+    for method in calib::METHODS {
+        assert!(document.contains(&format!("\n## `{}`", method.name())), "docs/calibration.md lacks {}", method.name());
+    }
+    let which = text("docs/methods.md");
+    for method in calib::METHODS {
+        assert!(which.contains(&format!("\n| `{}` |", method.name())), "docs/methods.md lacks {}", method.name());
+    }
+    for file in files("").into_iter().filter(|file| file.extension().is_some_and(|extension| extension == "md")) {
+        for target in text(&file).split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()) {
+            let here = file.parent().unwrap_or(root()).join(target);
+            assert!(target.is_empty() || target.starts_with("http") || here.exists(), "{}: {target}", file.display());
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The folders are there, every source file says what it is, no file names a machine, and every scenario file can be simulated.
+
+use std::fs;
+
+use scenario::Scenario;
+use sim_yair::SimulatedRobot;
+
+use crate::arrows::ARROWS;
+use crate::{files, root, text};
+
+/// Names that say nothing of what is inside.
+const NO_NOUNS: [&str; 4] = ["utils", "common", "core", "helpers"];
+
+/// Past this many lines a file is likely two nouns.
+const LONGEST_FILE_LINES: usize = 600;
+
+#[test]
+fn the_rooms_are_there_and_every_file_says_what_it_is() {
+    for folder in ["src", "crates", "scenarios", "tests", "benches", "docs", ".ci"] {
+        assert!(root().join(folder).is_dir(), "the house has a folder {folder}");
+    }
+    for (name, _) in ARROWS {
+        assert!(!NO_NOUNS.contains(name), "{name} is no noun of this field");
+        assert!(*name == "yair" || root().join("crates").join(name).join("src/lib.rs").is_file(), "{name}");
+        assert!(text("ARCHITECTURE.md").contains(&format!("`{name}`")), "ARCHITECTURE.md does not speak of {name}");
+    }
+    let sources = files("crates").into_iter().chain(files("src")).chain(files("tests"));
+    for file in sources.filter(|file| file.extension().is_some_and(|extension| extension == "rs")) {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        assert!(!NO_NOUNS.contains(&stem.as_str()), "{}: a helper lives with its noun", file.display());
+        let source = text(&file);
+        assert!(source.starts_with("//! "), "{}: the first line must be a //! header", file.display());
+        let lines = source.lines().count();
+        assert!(lines <= LONGEST_FILE_LINES, "{}: {lines} lines; are there two nouns?", file.display());
+    }
+}
+
+#[test]
+fn the_repository_names_no_path_of_a_machine_and_no_registry() {
+    // Written apart, so that this file does not name them itself.
+    let folders = ["work", "root", "tmp", "home"].map(|name| format!("/{name}"));
+    let registries = [concat!("sparse", "+http"), concat!("replace", "-with"), concat!("[registr", "ies")];
+    let index = concat!("registry", "+https://github.com/rust-lang/crates.io-index");
+    for file in files("") {
+        let Ok(content) = fs::read_to_string(&file) else { continue };
+        for folder in &folders {
+            let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "._-}$)]".contains(c));
+            let named = content.match_indices(folder).find(|(at, _)| {
+                let after = content[at + folder.len()..].chars().next();
+                !is_part(content[..*at].chars().next_back()) && !after.is_some_and(char::is_alphanumeric)
+            });
+            assert!(named.is_none(), "{}: a path under {folder}", file.display());
+        }
+        for registry in registries {
+            assert!(!content.contains(registry), "{}: {registry}", file.display());
+        }
+        let other =
+            content.lines().find(|line| line.starts_with("source = ") && line.contains("+") && !line.contains(index));
+        assert!(other.is_none() || !file.ends_with("Cargo.lock"), "{}: {other:?}", file.display());
+    }
+}
+
+#[test]
+fn every_scenario_file_parses_survives_writing_and_can_be_simulated() {
+    let scenarios = files("scenarios");
+    assert!(!scenarios.is_empty());
+    for file in scenarios {
+        let scenario = Scenario::read(&file).unwrap_or_else(|error| panic!("{error}"));
+        let written = scenario.to_toml().expect("has a TOML form");
+        assert_eq!(Scenario::parse(&written, "written").expect("readable"), scenario, "{}", file.display());
+        let mut cases = vec![scenario.clone()];
+        if let Some(sweep) = &scenario.sweep {
+            let points = sweep.points(&scenario, "sweep").unwrap_or_else(|error| panic!("{error}"));
+            cases.extend(points.into_iter().map(|point| point.scenario));
+        }
+        for case in cases {
+            let ready = SimulatedRobot::new(&case, case.seed, 0);
+            assert!(
+                ready.is_ok(),
+                "{}: {}",
+                file.display(),
+                ready.err().map(|error| error.to_string()).unwrap_or_default()
+            );
+        }
+    }
+}

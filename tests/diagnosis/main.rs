@@ -1,0 +1,8 @@
+//! Diagnosis of simulated robots: hidden effects are found and named, nulls are left alone, and planned runs tell names apart.
+
+mod blind_benchmark;
+mod hidden_effects;
+mod plan;
+mod report;
+#[path = "../support/mod.rs"]
+mod support;
