@@ -7,6 +7,7 @@ mod arrows;
 mod commands;
 mod documents;
 mod effect_ids;
+mod file_graph;
 mod files;
 #[path = "../support/mod.rs"]
 mod support;
