@@ -233,6 +233,5 @@ fn nominal(robot: &NominalRobot, key: &str) -> Option<f64> {
 
 /// Decimals that show two digits of sigma, six where there is none.
 fn decimals(sigma: Option<f64>) -> usize {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     sigma.filter(|sigma| *sigma > 0.0).map_or(6, |sigma| (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize)
 }

@@ -57,7 +57,6 @@ impl Terminal {
     }
 
     /// The one message of a failure, on standard error even when quiet.
-    #[allow(clippy::unused_self)]
     pub(crate) fn failure(&self, message: &str) {
         let _ = writeln!(std::io::stderr(), "error: {}", message.replace('\n', "; "));
     }

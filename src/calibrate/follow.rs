@@ -18,12 +18,10 @@ pub(super) fn run(sessions: &[Session<'_>], terminal: &Terminal) -> Result<ExitC
     // Measurements that lie apart by a constant factor: at first much is learned, later little.
     let mut due = 1.0;
     for step in &followed {
-        #[allow(clippy::cast_precision_loss)]
         let measurement = step.measurements as f64;
         let is_settling = settled.is_some_and(|settled| settled.measurements == step.measurements);
         if measurement >= due || is_settling || step.measurements == followed.len() {
             while due <= measurement {
-                #[allow(clippy::cast_precision_loss)]
                 let factor = (followed.len() as f64).powf(1.0 / (ROWS as f64 - 3.0));
                 due = (due * factor).max(due + 1.0);
             }

@@ -33,7 +33,6 @@ pub(super) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
     let mut all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
     // Chances of large statistics are all zero in a double: the statistic itself goes on.
     all.sort_by(|a, b| chi_square(b).total_cmp(&chi_square(a)));
-    #[allow(clippy::cast_precision_loss)]
     let level = STANDS_OUT / tests.max(1) as f64;
     let standing = all.iter().filter(|against| p_value(against) < level).count();
     all.truncate(standing.clamp(LEAST, MOST));
@@ -140,7 +139,6 @@ fn predictions(next: &NextExperiment) -> Option<Figure> {
         "across" => "to the left of dead reckoning",
         _ => "turned to the left of dead reckoning",
     };
-    #[allow(clippy::cast_precision_loss)] // a handful of names
     let most = predicted.values.len() as f64 + 0.5;
     let x = Axis::dimensionless("name").range(Range::Fixed { low: 0.5, high: most });
     let mut panel = Panel::new("", x, Axis::new(quantity, unit).include(0.0));

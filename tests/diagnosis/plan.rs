@@ -122,7 +122,6 @@ fn drawn(case: u64) -> (&'static str, Scenario) {
     ];
     let sessions: [&[Schedule]; 5] =
         [&[STRAIGHTS], &[STRAIGHTS, SPINS], &[CIRCLES, STRAIGHTS], &[SPINS, CIRCLES], &[SQUARES]];
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // shares of a dozen and of five
     let (effect, session) = ((12.0 * kind) as usize, (5.0 * session) as usize);
     let (id, sizes) = &effects[effect];
     (id, robot(&format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n"), sessions[session]))
@@ -186,7 +185,6 @@ fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
             _ => seen.theta_rad,
         }
     });
-    #[allow(clippy::cast_precision_loss)]
     let n = ends.len() as f64;
     off.sum::<f64>() / n
 }

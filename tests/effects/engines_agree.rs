@@ -61,7 +61,6 @@ fn missed(engine: Engine, motions: &[Motion], trials: u64) -> Vec<Pose> {
 fn largest_z(a: &[Pose], b: &[Pose]) -> f64 {
     let moment = |of: &dyn Fn(&Pose) -> f64| {
         let summary = |sample: &[Pose]| {
-            #[allow(clippy::cast_precision_loss)]
             let n = sample.len() as f64;
             let mean = sample.iter().map(of).sum::<f64>() / n;
             (mean, sample.iter().map(|pose| (of(pose) - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)

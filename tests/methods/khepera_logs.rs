@@ -16,7 +16,6 @@ fn counted(log: &str) -> (usize, [i64; 2]) {
         let number = |key: &str| object[key].as_f64().expect("a number");
         for (total, key) in totals.iter_mut().zip(["phi_l", "phi_r"]) {
             let turns = number(key) * number("T") / std::f64::consts::TAU;
-            #[allow(clippy::cast_possible_truncation)] // some hundred counts
             let counts = (turns * TICKS_PER_REV).round() as i64;
             *total += counts;
         }

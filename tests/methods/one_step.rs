@@ -36,7 +36,6 @@ fn run(seed: u64, ahead_m: f64) -> Run {
         if row % 200 == 0 {
             speed = Wheels { left: speeds.random_range(-0.1..0.4), right: speeds.random_range(0.0..0.5) };
         }
-        #[allow(clippy::cast_precision_loss)]
         let t_s = 0.05 * row as f64;
         odometry.t_s.push(t_s);
         if let WheelLog::Angles(angles) = &mut odometry.wheels {

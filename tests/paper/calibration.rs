@@ -231,7 +231,6 @@ fn paper_outliers_are_rejected_wheel_by_wheel() {
     for run in measured.runs.iter_mut().take(3) {
         let dataset::WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { panic!("the simulator logs ticks") };
         let (first, last) = (ticks.left[0], ticks.left.len() - 1);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
         let skidded = first + (1.03 * (ticks.left[last] - first) as f64).round() as i64;
         ticks.left[last] = skidded;
     }

@@ -56,10 +56,7 @@ fn peak_of_reading(dir: &Path) -> (Result<usize, DatasetError>, usize) {
 }
 
 #[test]
-<<<<<<< HEAD
 #[allow(clippy::print_stderr)]
-=======
->>>>>>> 7cff86c381104a5edb3aa71d409fc7b97c009922
 fn columns_are_all_that_is_held_and_garbage_is_not_held_at_all() {
     for (rows, runs, block) in [(ROWS, 1, 1), (ROWS / 5, 1000, 500), (ROWS / 5, 1000, 1)] {
         let temp = tempfile::tempdir().expect("a temporary folder");

@@ -93,7 +93,6 @@ const MAX_REJECTED: f64 = 0.2;
 /// With fewer measurements a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
 const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 
-#[allow(clippy::cast_precision_loss)] // thousands
 fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
     let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
     fit.records.measurements() as f64 / runs.max(1) as f64

@@ -150,7 +150,6 @@ impl SamplingStatistics {
                 };
                 if let (WheelLog::Ticks(ticks), Some(m_per_count)) = (&run.odometry.wheels, m_per_count) {
                     let steps = ticks.right.windows(2).zip(run.odometry.t_s.windows(2));
-                    #[allow(clippy::cast_precision_loss)]
                     speeds.extend(
                         steps.map(|(of, t)| ((of[1] - of[0]) as f64 * m_per_count.right / (t[1] - t[0])).abs()),
                     );
@@ -169,7 +168,6 @@ impl SamplingStatistics {
 }
 
 fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let at = (values.len() as f64 * share) as usize;
     (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }

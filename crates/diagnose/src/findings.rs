@@ -58,7 +58,7 @@ pub(crate) fn findings(
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let of_log = finding::of_outlying_rows(log.as_ref()).into_iter().chain(finding::of_spans(spans.as_ref()));
-    let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(|finding| finding.is_unlisted());
+    let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);
     if !nameless.is_empty() {
         // With times in other units even a gross fault may be an accident.
@@ -71,7 +71,7 @@ pub(crate) fn findings(
     // Something is left that no name explains; a failed check that a scatter explains has its name already.
     let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < BEYOND_SCATTER;
     let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
-    let told = asked.unlisted.is_some() || findings.iter().any(|finding| finding.is_unlisted());
+    let told = asked.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
     if !(restored || scatters || told) {
         findings.extend(finding::of_failed_checks(&asked.checked));
     }

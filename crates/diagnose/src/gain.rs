@@ -30,7 +30,6 @@ pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> 
     if before.len() != after.len() || before.iter().zip(&after).any(|(before, after)| before.run != after.run) {
         return Err("the models do not hold out the same runs".to_owned());
     }
-    #[allow(clippy::cast_precision_loss)]
     let freedom = before.len() as f64 - 1.0;
     let per_observation = |units: &[Unit]| -> f64 {
         let constant = 0.5 * std::f64::consts::TAU.ln();
@@ -76,14 +75,12 @@ fn drift(before: &[EndError], after: &[EndError]) -> Option<Compared> {
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
     let (mean, error) = ratio(&pairs);
-    #[allow(clippy::cast_precision_loss)]
     let reach = student_95(pairs.len() as f64 - 1.0) * error;
     Some(Compared { base: percent(&before), extended: percent(&after), low: mean - reach, high: mean + reach })
 }
 
 /// Σa/Σb over units and its standard error, linearised.
 fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
-    #[allow(clippy::cast_precision_loss)]
     let n = pairs.len() as f64;
     let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
     let mean = a / b;

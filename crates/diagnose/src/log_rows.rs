@@ -53,10 +53,8 @@ pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
         let of = of_run(&run.odometry, run.info.continuous);
         Rows { all: sum.all + of.all, outlying: sum.outlying + of.outlying }
     });
-    #[allow(clippy::cast_precision_loss)]
     let chance = Poisson::new(BY_CHANCE * rows.all as f64).ok()?;
     let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
-    #[allow(clippy::cast_precision_loss)]
     let statistic = rows.outlying as f64;
     Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_LEVEL })
 }
@@ -70,7 +68,6 @@ fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
     Rows { all: of.left.all + of.right.all, outlying: of.left.outlying + of.right.outlying }
 }
 
-#[allow(clippy::cast_precision_loss)] // counts are far under 2⁵³
 fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
     let mut rows = Rows::default();
     let rates: Vec<(f64, f64)> = t_s
@@ -111,7 +108,6 @@ mod tests {
             let t_s = stamp_s(row);
             way += speed(0.5 * (t_s + last_s)) * (t_s - last_s);
             last_s = t_s;
-            #[allow(clippy::cast_possible_truncation)]
             let counts = f64::round(way) as i64;
             (t_s, counts)
         };

@@ -35,7 +35,6 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     let outliers = asked.checked.outliers;
     let tests = &asked.checked.checks;
     let far = outliers.isolated + outliers.staying;
-    #[allow(clippy::cast_precision_loss)]
     if far as f64 > MAX_OUTLIERS * (outliers.measurements + far) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
@@ -50,7 +49,6 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     let followed =
         asked.base.selections.first().is_some_and(|taken| taken.mean_measurements(&asked.base.records) >= 2.0);
     if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
-        #[allow(clippy::cast_precision_loss)]
         let share = outliers.isolated as f64 / (outliers.measurements + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.measurements + far;

@@ -181,7 +181,6 @@ fn log_mean(logs: &[f64]) -> f64 {
     if !most.is_finite() {
         return most;
     }
-    #[allow(clippy::cast_precision_loss)] // a grid
     let count = logs.len() as f64;
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / count).ln()
 }
@@ -227,10 +226,8 @@ fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
         };
         measurements.push((own, (segment, at_ramp[segment][first..=measurement].contains(&true))));
     }
-    #[allow(clippy::cast_precision_loss)] // thousands
     let count = measurements.len() as f64;
     let way = measurements.iter().map(|(measurement, _)| measurement.way).sum::<f64>() / count;
-    #[allow(clippy::cast_precision_loss)]
     let share = measurements.iter().filter(|(_, (_, ramp))| *ramp).count() as f64 / count;
     let mut found = Vec::new();
     let mut last: Option<(usize, usize)> = None;

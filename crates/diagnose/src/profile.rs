@@ -33,7 +33,6 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), candidate.held().first()) else {
         return none;
     };
-    #[allow(clippy::cast_precision_loss)] // a handful of values
     let mut reach = (high - low) / (grid.len().max(2) - 1) as f64;
     // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other variants.
     let (low_end, high_end) = (low - 0.5 * reach, high + 0.5 * reach);

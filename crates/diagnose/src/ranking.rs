@@ -56,7 +56,6 @@ pub(crate) fn best_variants(scored: &[Scored]) -> Vec<Entry> {
 }
 
 /// How many effects of a scan can be seen at all, each a test: at least one.
-#[allow(clippy::cast_precision_loss)] // dozens
 pub(crate) fn tests_in(entries: &[Entry]) -> f64 {
     entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64
 }

@@ -123,9 +123,7 @@ fn implausible(fit: &ModelFit<'_>) -> f64 {
 
 /// Share of measurements that a fit takes for outliers.
 pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
-    let share = fit.fit.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64;
-    share
+    fit.fit.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64
 }
 
 /// Does a base fit look like a robot whose counts follow it?

@@ -123,7 +123,6 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let correlation = whiteness(fit, &mut add);
     tails(fit, &mut add);
     let outliers = outliers(fit);
-    #[allow(clippy::cast_precision_loss)]
     add(Check::Outliers, (outliers.isolated + outliers.staying) as f64, outliers.p_value);
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
@@ -144,7 +143,6 @@ fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovatio
 fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let squares: Vec<f64> = innovations(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
-        #[allow(clippy::cast_precision_loss)]
         let n = squares.len() as f64;
         if n < 2.0 {
             continue;
@@ -167,7 +165,6 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
                 (((run.chi_square / run.count / mean).cbrt() - (1.0 - part)) / part.sqrt()).powi(2)
             })
             .sum();
-        #[allow(clippy::cast_precision_loss)]
         add(Check::RunToRun, squares, p_of_chi_square(squares, runs.len() as f64 - 1.0));
     }
 }
@@ -178,7 +175,6 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
     let mut strongest = (0.0, 0.0_f64);
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
-        #[allow(clippy::cast_precision_loss)]
         let n = series.len() as f64;
         if n < 20.0 {
             continue;
@@ -192,7 +188,6 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
             for pair in series.windows(lag + 1).filter(follows) {
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
-                #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // five
                 let weight = fit.records.weight_of_pair(pair[0].segment, pair[lag].segment, lag as i32);
                 resembles += weight * pair[0].z * pair[lag].z;
                 weights += weight * weight;
@@ -221,7 +216,6 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
 fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
-        #[allow(clippy::cast_precision_loss)]
         let n = series.len() as f64;
         if n < 50.0 {
             continue;
@@ -283,7 +277,6 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
             found.isolated += 1;
         }
     }
-    #[allow(clippy::cast_precision_loss)]
     let (count, expected) = (far.len() as f64, (found.measurements + far.len()) as f64 * OUTLIER_CHANCE);
     // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };

@@ -347,7 +347,6 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<V
     if span <= least.max(1e-6 * first.abs().max(last.abs())) {
         return None;
     }
-    #[allow(clippy::cast_precision_loss)] // a dozen bins
     let share = |k: usize| k as f64 / BINS as f64;
     if periodic {
         // About the middle of a bin, not its edge: robots like to start at 0.
@@ -381,7 +380,6 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<V
 
 /// Root mean square of the residuals.
 fn scatter(values: &[(f64, f64, f64)]) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
     let n = values.len() as f64;
     (values.iter().map(|(_, size, _)| size * size).sum::<f64>() / n).sqrt()
 }
@@ -397,7 +395,6 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         if own.len() < MIN_IN_BIN {
             continue;
         }
-        #[allow(clippy::cast_precision_loss)]
         let n = own.len() as f64;
         let (at, mean, mean_z) =
             own.iter().fold((0.0, 0.0, 0.0), |sum, (x, size, z)| (sum.0 + x / n, sum.1 + size / n, sum.2 + z / n));
@@ -408,7 +405,6 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
     let (sum, weights) = bins.iter().fold((0.0, 0.0), |sum, bin| (sum.0 + weight(bin) * bin.mean, sum.1 + weight(bin)));
     let about = |centre: f64| bins.iter().map(|bin| weight(bin) * (bin.mean - centre).powi(2)).sum::<f64>();
     let (chi_square, varies_chi_square) = (about(0.0), if weights > 0.0 { about(sum / weights) } else { 0.0 });
-    #[allow(clippy::cast_precision_loss)]
     let freedom = bins.len() as f64;
     let varies_p_value = if freedom > 1.0 { p_of_chi_square(varies_chi_square, freedom - 1.0) } else { 1.0 };
     Profile { p_value: p_of_chi_square(chi_square, freedom), bins, chi_square, varies_chi_square, varies_p_value }

@@ -78,7 +78,6 @@ pub(crate) fn rivals<'a>(
         .map(|extended| {
             let candidate = extended.candidates[index].clone();
             let variants = entries.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
-            #[allow(clippy::cast_precision_loss)]
             let trials = (variants.map_or(1, |entry| entry.variants.max(1)) as f64).ln();
             let likelier = base_cost - cost(&extended.fit, most);
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
@@ -86,7 +85,6 @@ pub(crate) fn rivals<'a>(
             let log_odds =
                 directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions))
                     - trials;
-            #[allow(clippy::cast_precision_loss)] // a handful
             let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
             (Name { candidate, log_odds, explains, outdone: false }, extended)
         })

@@ -74,7 +74,6 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
 
 /// How many values the noise was estimated from, after the free columns.
 pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
     let columns = fit.columns.len() as f64;
     (equations.count - columns).max(1.0)
 }

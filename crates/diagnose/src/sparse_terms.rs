@@ -30,7 +30,6 @@ pub(crate) struct FoundTerm<'a> {
 }
 
 /// Log of the trials that a sparse term has to pay for.
-#[allow(clippy::cast_precision_loss)] // hundreds
 fn log_trials(trials: usize) -> f64 {
     (trials as f64).ln()
 }

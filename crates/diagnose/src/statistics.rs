@@ -11,7 +11,6 @@ pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) ->
     if dimensions == 0 || !statistic.is_finite() {
         return 1.0;
     }
-    #[allow(clippy::cast_precision_loss)] // a handful of dimensions
     let dimensions = dimensions as f64;
     FisherSnedecor::new(dimensions, freedom.max(1.0)).map_or(1.0, |f| f.sf(statistic.max(0.0) / dimensions))
 }
@@ -19,7 +18,6 @@ pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) ->
 /// The same of a score's statistic, g'I⁻¹g, whose variance was estimated from `count` values that have what is tested in them: it is at most `count`, and what it
 /// leaves of that is what the variance should have been estimated from (exact for one variance: F of the regression).
 pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom: f64) -> f64 {
-    #[allow(clippy::cast_precision_loss)] // a handful of dimensions
     let left = freedom - dimensions as f64;
     if dimensions == 0 || !statistic.is_finite() || left < 1.0 {
         return 1.0;
@@ -55,7 +53,6 @@ pub(crate) fn student_95(freedom: f64) -> f64 {
 
 /// The chance that the best of so many trials is as good as `p`; Šidák 1967.
 pub(crate) fn sidak(p: f64, trials: usize) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
     let trials = trials as f64;
     -f64::exp_m1(trials * f64::ln_1p(-p.min(1.0 - 1e-16)))
 }
@@ -66,7 +63,6 @@ pub(crate) fn holm(p: &[f64], level: f64) -> Vec<bool> {
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
     let mut fails = vec![false; p.len()];
     for (rank, &test) in order.iter().enumerate() {
-        #[allow(clippy::cast_precision_loss)]
         let left = (p.len() - rank) as f64;
         if p[test] * left > level {
             break;

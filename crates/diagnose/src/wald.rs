@@ -59,7 +59,6 @@ pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usiz
     let information = projection.of_columns(&equations, &own).information;
     let estimates = extended.estimates(candidate);
     let stands = estimates.dot(&(&information * &estimates));
-    #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
     let squares: f64 = runs.iter().map(|run| projection.score_of(run, &equations, &own).dot(&estimates).powi(2)).sum();
     let t = stands / (squares * n / (n - 1.0)).sqrt();
@@ -82,7 +81,6 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
         gradient: projection.score_of(run, &equations, &own),
     });
     let ClusterRobust { covariance, left_out: 0 } = ClusterRobust::of(&inverse, clusters) else { return None };
-    #[allow(clippy::cast_precision_loss)]
     let n = runs.len() as f64;
     // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
     let widening = student_95(n - 1.0) / 1.96;

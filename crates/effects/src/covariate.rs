@@ -237,7 +237,6 @@ impl Covariate {
     /// The covariate of a run whose values over the runs are these, 0 for one that does not say it; `None` where they do not differ.
     #[must_use]
     pub fn of_run(key: &str, values: &[f64]) -> Option<Self> {
-        #[allow(clippy::cast_precision_loss)]
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let sd = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt();

@@ -86,9 +86,8 @@ fn decimals_for(sigma: f64) -> usize {
     if !(sigma.is_finite() && sigma > 0.0) {
         return 2;
     }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to 9
-    let decimals = (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize;
-    decimals
+
+    (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize
 }
 
 #[cfg(test)]

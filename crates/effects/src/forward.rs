@@ -113,7 +113,6 @@ pub struct PoseReading {
 
 /// Which hooks of an effect do anything. The simulator calls no others, so that an effect costs nothing at the stages that it leaves alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(clippy::struct_excessive_bools)] // one a hook
 pub struct Hooks {
     /// [`Forward::on_run_start`].
     pub on_run_start: bool,

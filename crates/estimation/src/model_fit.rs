@@ -219,7 +219,6 @@ impl ModelFit<'_> {
     fn times_taken(&self) -> f64 {
         let taken =
             |segment: usize| self.selections.iter().filter(|phase| !phase.propagations[segment].is_empty()).count();
-        #[allow(clippy::cast_precision_loss)]
         if self.records.segments.iter().all(Segment::is_displacement) {
             let times = (0..self.records.segments.len()).map(taken).filter(|times| *times > 0);
             let (sum, count) = times.fold((0, 0), |(sum, count), times| (sum + times, count + 1));

@@ -53,7 +53,6 @@ pub(crate) enum Explained<T> {
 }
 
 fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
-    #[allow(clippy::cast_precision_loss)]
     let n = values.len() as f64;
     if n < 2.0 {
         return None;
@@ -232,7 +231,6 @@ impl ModelFit<'_> {
                 .filter(|(group, _)| self.shows(**group, column))
                 .map(|(_, instrument)| of(instrument))
                 .collect();
-            #[allow(clippy::cast_precision_loss)] // a group a run at most
             if shown.is_empty() { common } else { shown.iter().sum::<f64>() / shown.len() as f64 }
         };
         let Pose { x_m, y_m, theta_rad } = common.body_from_sensor;

@@ -76,7 +76,6 @@ pub(crate) fn pass(
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let products = Products::of(columns, pass_options.parts);
     let mut result = Pass::nothing();
-    #[allow(clippy::cast_precision_loss)] // a handful of phases
     let weight = 1.0 / selections.len() as f64;
     let runs = runs(&records.segments);
     result.runs =

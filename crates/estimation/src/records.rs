@@ -225,7 +225,6 @@ impl<'a> Records<'a> {
             0.5 * (distance_m.left + distance_m.right)
         };
         let distance_m: f64 = self.segments.iter().flat_map(|segment| &segment.intervals).map(of).sum();
-        #[allow(clippy::cast_precision_loss)]
         let measurements = self.measurements().max(1) as f64;
         distance_m / measurements
     }
@@ -292,7 +291,6 @@ impl<'a> Records<'a> {
                 far.fold(0.0, f64::max)
             })
             .sum();
-        #[allow(clippy::cast_precision_loss)]
         let segments = self.segments.len().max(1) as f64;
         (squares / segments).sqrt()
     }

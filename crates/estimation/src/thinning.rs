@@ -49,7 +49,6 @@ impl Selection {
     /// The selections of all phases.
     #[must_use]
     pub fn of(records: &Records<'_>, thinning: Thinning, nominal: &Model) -> Vec<Self> {
-        #[allow(clippy::cast_precision_loss)] // a handful of phases
         let offset = |phase: usize| phase as f64 / thinning.phases as f64;
         (0..thinning.phases)
             .map(|phase| Self {
@@ -109,7 +108,6 @@ impl Selection {
             let taken = self.propagations[of].iter().map(Vec::len).sum::<usize>();
             if taken > 0 {
                 series += 1.0;
-                #[allow(clippy::cast_precision_loss)]
                 let taken = taken as f64;
                 measurements += taken;
             }

@@ -50,7 +50,6 @@ impl<'a> WheelAngleInterpolator<'a> {
         let turn_rad = match &odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
-                #[allow(clippy::cast_precision_loss)] // whole turns are taken off first where the counter is long
                 let mark = |column: &[i64]| (column[0] as f64 * rad).rem_euclid(std::f64::consts::TAU);
                 first_rad = ticks.as_ref().map(|column| mark(column));
                 ticks.as_ref().map(|column| since_first(column, rad))

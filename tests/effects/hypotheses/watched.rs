@@ -74,7 +74,6 @@ pub(crate) struct Row {
 
 pub(crate) fn rows(run: &Run, ticks_per_rev: f64) -> Vec<Row> {
     let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("the simulator logs ticks") };
-    #[allow(clippy::cast_precision_loss)]
     let angle =
         |k: usize| Wheels { left: ticks.left[k], right: ticks.right[k] }.map(|count| count as f64 / ticks_per_rev);
     let angle = |k| angle(k).map(|turns| turns * std::f64::consts::TAU);

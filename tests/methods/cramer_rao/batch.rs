@@ -67,7 +67,6 @@ impl<'a> Script<'a> {
         let mut robot = SimulatedRobot::new(&silent, 1, 0).expect("simulates");
         robot.drive_into(&program(motions), &mut run).expect("drives");
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { unreachable!("the simulated robot counts") };
-        #[allow(clippy::cast_precision_loss)]
         let rows = ticks
             .left
             .iter()

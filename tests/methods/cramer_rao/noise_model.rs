@@ -99,7 +99,6 @@ fn misses(scenario: &Scenario, motions: &[Motion]) -> Vec<Vector3<f64>> {
 fn largest_z(misses: &[Vector3<f64>], covariance: &Matrix3<f64>) -> f64 {
     let Some(cholesky) = covariance.cholesky() else { return f64::INFINITY };
     let whiten = cholesky.l().try_inverse().expect("a triangle with a positive diagonal");
-    #[allow(clippy::cast_precision_loss)]
     let n = misses.len() as f64;
     let mut largest: f64 = 0.0;
     for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)] {

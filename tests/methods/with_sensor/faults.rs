@@ -239,7 +239,6 @@ fn slope(dataset: &Dataset) -> f64 {
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("the simulator logs ticks") };
         let rows = run.odometry.t_s.windows(2).zip(ticks.left.windows(2));
         for ((t_s, counts), sample) in rows.zip(&run.wheel_reference[1..]) {
-            #[allow(clippy::cast_precision_loss)] // some counts
             let ticks_s = (counts[1] - counts[0]) as f64 / (t_s[1] - t_s[0]);
             product += ticks_s * sample.speed_m_s.left;
             square += ticks_s * ticks_s;

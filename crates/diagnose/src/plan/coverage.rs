@@ -381,7 +381,6 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
             let of_mark_m = reading_sigma_m.hypot(resolution_m / 12_f64.sqrt());
             let marks = &scenario.robot.points;
-            #[allow(clippy::cast_precision_loss)] // a handful of marks
             let n = marks.len() as f64;
             let mean = |of: &dyn Fn(&scenario::Mark) -> f64| marks.iter().map(of).sum::<f64>() / n;
             let (x_m, y_m) = (mean(&|mark| mark.x_m), mean(&|mark| mark.y_m));

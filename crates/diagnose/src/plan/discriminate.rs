@@ -193,7 +193,6 @@ impl DiscriminationSearch<'_> {
 
     /// How many pairs of runs of each of some kinds the time allows.
     fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
         let pairs = (within_min / self.minutes(kinds)).floor() as u32;
         pairs.min(MAX_PAIRS)
     }

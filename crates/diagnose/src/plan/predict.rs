@@ -94,7 +94,6 @@ pub(super) fn predictions(
 }
 
 /// The instants, as shares of a run's duration.
-#[allow(clippy::cast_precision_loss)] // a dozen
 fn shares() -> [f64; INSTANTS] {
     std::array::from_fn(|instant| (instant + 1) as f64 / INSTANTS as f64)
 }
@@ -174,7 +173,6 @@ impl PlannedRun {
             Some(measurements(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
-        #[allow(clippy::cast_precision_loss)] // four
         let mean =
             |index, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(index).map(of).sum::<Vector3<f64>>() / PHASES as f64;
         let seen = (0..here.len() / PHASES).map(|index| {

@@ -42,7 +42,6 @@ impl PhysicalEffect for CounterWrap {
     }
 
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         Some(Self { bits: size(sizes, "bits")? as u32 })
     }
 }

@@ -102,7 +102,6 @@ struct Missing {
 /// Carries the counts of every gap on, and says what was missing.
 ///
 /// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the acceleration is constant; the row after it shows less.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // counts are far under 2⁵³
 fn fill(odometry: &mut Odometry) -> Missing {
     let mut missing = Missing::default();
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return missing };
@@ -151,7 +150,6 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         missing.rows += of_run.rows;
         missing.lost += of_run.lost;
         missing.kept += of_run.kept;
-        #[allow(clippy::cast_precision_loss)]
         let written = run.odometry.t_s.len() as f64;
         rows += written;
     }

@@ -77,7 +77,6 @@ impl PhysicalEffect for EncoderCycle {
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
         let (left_sin, left_cos) = (size(sizes, "left_sin_rad")?, size(sizes, "left_cos_rad")?);
         let (right_sin, right_cos) = (size(sizes, "right_sin_rad")?, size(sizes, "right_cos_rad")?);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         Some(Self {
             cycles: size(sizes, "cycles")? as u32,
             left_amplitude_rad: left_sin.hypot(left_cos),

@@ -109,7 +109,6 @@ impl Forward for State {
 
     fn readout(&mut self, readout: &mut Readout) {
         for side in Side::BOTH {
-            #[allow(clippy::cast_possible_truncation)] // far under 2⁶³ counts
             let lost = (self.lost_m[side] / readout.m_per_count[side]).round() as i64;
             readout.ticks[side] -= lost;
         }
@@ -159,7 +158,6 @@ mod tests {
             }
             let mut readout = Readout { ticks: Wheels::both(0), m_per_count: Wheels::both(1e-6), written: true };
             state.readout(&mut readout);
-            #[allow(clippy::cast_precision_loss)]
             let lost_m_s = -sense * 1e-6 * readout.ticks.left as f64 / (dt_s * f64::from(steps));
             // A uniform fraction has a standard deviation of 0.58 of its mean: five standard errors of 5000 are 4 %.
             assert!((lost_m_s / 2e-3 - 1.0).abs() < 0.04, "{lost_m_s}");

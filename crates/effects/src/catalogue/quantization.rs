@@ -38,7 +38,6 @@ impl PhysicalEffect for Quantization {
     }
 
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         Some(Self { counts_per_tick: size(sizes, "counts_per_tick")? as u32 })
     }
 }

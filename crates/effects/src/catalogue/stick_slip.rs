@@ -212,7 +212,6 @@ mod tests {
                 state.seed_run(Address { seed: 3, point: 0, trial: 0, run }.stream(StreamName::new("test")));
                 let mut behind_m = 0.0;
                 for way in ways {
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some hundred steps
                     for _ in 0..(way.abs() * breakaway_m / each_m).round() as usize {
                         let mut step = step;
                         step.travel_m = Wheels::both(each_m * way.signum());

@@ -95,7 +95,6 @@ fn off_usual(dataset: &Dataset) -> f64 {
     let (mut distance_m, mut time_s) = (0.0, 0.0);
     for Odometry { t_s, wheels, .. } in dataset.runs.iter().map(|run| &run.odometry) {
         let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
-        #[allow(clippy::cast_precision_loss)] // far under 2⁵³ counts
         let turned_rad = match wheels {
             WheelLog::Ticks(ticks) => {
                 let counted =

@@ -54,7 +54,6 @@ impl PhysicalEffect for TornRead {
     }
 
     fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is checked
         let jump_counts = size(sizes, "jump_counts")? as u32;
         Some(Self { probability: size(sizes, "probability")?, jump_counts })
     }
@@ -94,9 +93,7 @@ const MOST_ROWS: usize = 2;
 /// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
 /// their neighbours, and jumps that are not undone, are none of this fault.
 fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
-    #[allow(clippy::cast_precision_loss)]
     let step = jump as f64;
-    #[allow(clippy::cast_precision_loss)]
     let increment = |k: usize| (ticks[k + 1] - ticks[k]) as f64;
     let last = ticks.len().saturating_sub(1);
     let out_of_line = |k: usize| {
@@ -139,7 +136,6 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
     if mended > 0 {
         let ends = [(0, -jumps[0], !first_used), (last, jumps[last - 1], used < last)];
         // A wheel that starts or stops there is on the line through the two increments beside, and not where a tear of its own puts it.
-        #[allow(clippy::cast_precision_loss)]
         let rate = |k: usize| (ticks[k + 1] - ticks[k]) as f64 / (t_s[k + 1] - t_s[k]);
         let off_line = |own: usize, next: usize, further: usize| {
             (rate(own) - 2.0 * rate(next) + rate(further)) * (t_s[own + 1] - t_s[own])
@@ -147,7 +143,6 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
         let off_lines = if last < 3 { [0.0; 2] } else { [-off_line(0, 1, 2), off_line(last - 1, last - 2, last - 3)] };
         for ((row, astray, free), off_line) in ends.into_iter().zip(off_lines) {
             if free && astray.abs() == 1.0 && (off_line - astray * step).abs() < step / 4.0 {
-                #[allow(clippy::cast_possible_truncation)] // −1 or 1
                 let off = astray as i64;
                 ticks[row] -= off * jump;
                 mended += 1;
@@ -173,7 +168,6 @@ fn put_back(ticks: &mut [i64], jumps: &[f64], jump: i64) -> usize {
     let (mut astray, mut mended) = (0.0, 0);
     for (count, jumps) in ticks.iter_mut().zip(jumps) {
         astray += jumps;
-        #[allow(clippy::cast_possible_truncation)] // −1, 0 or 1
         let off = astray as i64;
         *count -= off * jump;
         mended += usize::from(off != 0);
@@ -227,7 +221,6 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
                 }
             }
         }
-        #[allow(clippy::cast_precision_loss)]
         (mended > 0).then(|| RecordCorrection {
             sizes: vec![("probability", mended as f64 / samples as f64), ("jump_counts", jump as f64)],
             sentence: format!("{mended} counts were torn while they were read, off by {jump}"),

@@ -119,7 +119,6 @@ mod tests {
         let n = 40_000;
         let all = mahalanobis_distance(size, n);
         let jumped: Vec<&Pose> = all.iter().filter(|pose| **pose != Pose::IDENTITY).collect();
-        #[allow(clippy::cast_precision_loss)]
         let (share, m) = (jumped.len() as f64 / f64::from(n), jumped.len() as f64);
         // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven numbers raise a false positive once in 2e5 seeds.
         // Rejected: an isotropic jump of that *length* (half the variance) and a heading that jumps together with x.

@@ -94,7 +94,6 @@ impl Forward for State {
     }
 
     fn readout(&mut self, readout: &mut Readout) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // counts of a run are far under 2⁵³
         let logged = |counts: i64| (counts as f64 * self.size.factor).floor() as i64;
         readout.ticks = readout.ticks.map(logged);
     }
