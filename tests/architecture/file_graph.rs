@@ -13,6 +13,8 @@ use syn::buffer::{Cursor, TokenBuffer};
 use syn::visit::{self, Visit};
 use syn::{Attribute, ImplItemFn, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, VisRestricted, Visibility};
 
+use crate::root;
+
 /// A module's path from the crate's root, or a path in the source text.
 type Names = Vec<String>;
 
@@ -21,9 +23,8 @@ type Graph = BTreeMap<String, BTreeMap<String, BTreeSet<String>>>;
 
 #[test]
 fn no_files_of_a_crate_use_each_other_in_circles() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut crates = BTreeMap::from([("yair".to_owned(), root.join("src"))]);
-    for entry in fs::read_dir(root.join("crates")).expect("the crates stand here") {
+    let mut crates = BTreeMap::from([("yair".to_owned(), root().join("src"))]);
+    for entry in fs::read_dir(root().join("crates")).expect("the crates stand here") {
         let entry = entry.expect("readable");
         crates.insert(entry.file_name().to_string_lossy().into_owned(), entry.path().join("src"));
     }

@@ -145,7 +145,7 @@ fn number(runs: u64) -> f64 {
     runs as f64
 }
 
-/// What programs cost at a pace.
+/// What programs cost a robot.
 pub(crate) fn cost(programs: &[MotionProgram], drive_limits: &DriveLimits) -> Cost {
     programs.iter().map(|program| drive_limits.cost(program)).sum()
 }
