@@ -115,7 +115,7 @@ impl Reproduction {
         };
         writeln!(
             page,
-            "\n{verdict}: the least likely hypothesis is {worst:.2} below the best in log likelihood, where {TOLD_APART} would be a likelihood ratio of 20. So all of \
+            "\n{verdict}: the least likely hypothesis is {worst:.2} below the best in log likelihood, where {DISCRIMINATION_LEVEL} would be a likelihood ratio of 20. So all of \
              table 1's scatter can be measuring, and none of it the wheel. It matters: a scatter of the sensitivity goes on along a path, a scatter of \
              measuring does not.\n"
         )?;
