@@ -9,6 +9,7 @@ mod documents;
 mod effect_ids;
 mod file_graph;
 mod files;
+mod words;
 #[path = "../support/mod.rs"]
 mod support;
 
