@@ -9,9 +9,9 @@ mod documents;
 mod effect_ids;
 mod file_graph;
 mod files;
-mod words;
 #[path = "../support/mod.rs"]
 mod support;
+mod words;
 
 use std::fs;
 use std::path::{Path, PathBuf};

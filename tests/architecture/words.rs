@@ -97,7 +97,8 @@ fn private_names(source: &str) -> Vec<String> {
     identifiers.visit_file(&syn::parse_file(source).expect("Rust"));
     let standard = |ident: &String| {
         let whole = PRIVATE.iter().find(|(private, _)| private == ident).map(|(_, standard)| (*standard).to_owned());
-        let of_prefix = |(private, standard): &(&str, &str)| Some(format!("{standard}{}", ident.strip_prefix(private)?));
+        let of_prefix =
+            |(private, standard): &(&str, &str)| Some(format!("{standard}{}", ident.strip_prefix(private)?));
         whole.or_else(|| PREFIXES.iter().find_map(of_prefix)).map(|standard| format!("{ident} is {standard}"))
     };
     identifiers.0.keys().filter_map(standard).collect()

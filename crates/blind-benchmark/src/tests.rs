@@ -22,7 +22,7 @@ fn is_likely(successes: usize, of: usize, probability: f64) -> bool {
 /// the oracle's limit with the power that its noncentrality says. Half or twice the noncentrality is rejected.
 #[test]
 fn the_oracle_has_the_power_that_it_states() {
-    const TRIALS: usize = 60;
+    const TRIALS: usize = 160;
     let id = "slip_speed";
     let trial = Trial::at_limit(5, id).expect("simulates").expect("a robot that shows it");
     let found = |hidden: bool| -> usize {

@@ -119,7 +119,8 @@ fn umbmark_ratio(table_2: &Table2) -> Finding {
     let umbmark = TABLE_2_UMBMARK.sensitivity;
     let measured = umbmark.right.value / umbmark.left.value;
     let direct = TABLE_1.right.mean / TABLE_1.left.mean;
-    let relative_var = |shape: super::shape::Variant| shape.variance / shape.count as f64 / (shape.mean * shape.mean);
+    let relative_var =
+        |shape: super::shape::SampleShape| shape.variance / shape.count as f64 / (shape.mean * shape.mean);
     let error = (relative_var(TABLE_1.left) + relative_var(TABLE_1.right)).sqrt();
     // UMBmark's own scatter, from the simulation of table 2: the ratio moves by twice a sensitivity's error, the mean being kept.
     let own = table_2.cell("umbmark", "C_L").map_or(0.0, |cell| 2.0 * cell.sigma);

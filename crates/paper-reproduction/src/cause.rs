@@ -290,7 +290,7 @@ fn predict(
 /// The five published numbers with their standard deviations.
 fn published(table_2: &Table2) -> ([f64; NUMBERS], [f64; NUMBERS]) {
     let umbmark = TABLE_2_UMBMARK.sensitivity;
-    let of_mean = |shape: super::shape::Variant| shape.std / (shape.count as f64).sqrt();
+    let of_mean = |shape: super::shape::SampleShape| shape.std / (shape.count as f64).sqrt();
     let simulated = |method, symbol| table_2.cell(method, symbol).map_or(f64::NAN, |cell| cell.sigma);
     let rounding = |half_digit: f64| half_digit / 3_f64.sqrt();
     (

@@ -4,11 +4,11 @@
 
 use kinematics::Wheels;
 
-use super::shape::Variant;
+use super::shape::SampleShape;
 
 /// Table 1: odometric sensitivity, mm/pulse, over the runs that the paper kept.
-pub const TABLE_1: Wheels<Variant> = Wheels {
-    left: Variant {
+pub const TABLE_1: Wheels<SampleShape> = Wheels {
+    left: SampleShape {
         count: 79,
         mean: 1.0334,
         variance: 4.13e-6,
@@ -19,7 +19,7 @@ pub const TABLE_1: Wheels<Variant> = Wheels {
         skewness_z: 0.2420,
         kurtosis_z: -0.8991,
     },
-    right: Variant {
+    right: SampleShape {
         count: 82,
         mean: 1.0322,
         variance: 2.97e-6,

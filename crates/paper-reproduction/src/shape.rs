@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// A sample in nine numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Variant {
+pub struct SampleShape {
     /// How many values ("frecuencia").
     pub count: usize,
     /// Mean.
@@ -26,7 +26,7 @@ pub struct Variant {
 }
 
 /// A row of table 1: its name and how it is read off a shape.
-pub type StatisticRow = (&'static str, fn(&Variant) -> f64);
+pub type StatisticRow = (&'static str, fn(&SampleShape) -> f64);
 
 /// The rows of table 1, in its order.
 pub const ROWS: [StatisticRow; 9] = [
@@ -41,7 +41,7 @@ pub const ROWS: [StatisticRow; 9] = [
     ("standardized kurtosis", |shape| shape.kurtosis_z),
 ];
 
-impl Variant {
+impl SampleShape {
     /// The shape of a sample of at least four values; `None` for fewer, or when all are equal.
     ///
     /// Skewness and kurtosis are the bias-corrected G₁ and G₂ (Joanes & Gill 1998) that statistics packages print, divided by the standard errors
@@ -86,12 +86,12 @@ mod tests {
     #[test]
     fn a_known_sample_has_its_textbook_shape() {
         // 1..5: mean 3, variance 2.5, G1 = 0, G2 = −1.2 (the uniform's).
-        let shape = Variant::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).expect("five values");
+        let shape = SampleShape::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).expect("five values");
         assert_eq!((shape.mean, shape.variance, shape.min, shape.max, shape.range), (3.0, 2.5, 1.0, 5.0, 4.0));
         assert!(shape.skewness_z.abs() < 1e-12);
         assert!((shape.kurtosis_z + 1.2 / (24.0_f64 / 5.0).sqrt()).abs() < 1e-12);
-        assert_eq!(Variant::of(&[1.0, 2.0, 3.0]), None);
-        assert_eq!(Variant::of(&[2.0; 9]), None);
+        assert_eq!(SampleShape::of(&[1.0, 2.0, 3.0]), None);
+        assert_eq!(SampleShape::of(&[2.0; 9]), None);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use serde::Serialize;
 use sim_yair::SimulationError;
 
 use super::published::TABLE_1;
-use super::shape::{ROWS, Variant};
+use super::shape::{ROWS, SampleShape};
 use super::units::{COUNTS_PER_PULSE, MM_PER_M};
 use bench::Trial;
 
@@ -153,9 +153,9 @@ impl Experiment {
 const TRIALS_PER_TASK: u64 = 50;
 
 /// Shapes of `trials` experiments in order.
-fn variants(scenario: &Scenario, first: u64, trials: u64) -> Result<Vec<Wheels<Variant>>, SimulationError> {
+fn variants(scenario: &Scenario, first: u64, trials: u64) -> Result<Vec<Wheels<SampleShape>>, SimulationError> {
     let tasks = trials.div_ceil(TRIALS_PER_TASK);
-    let done: Result<Vec<Vec<Wheels<Variant>>>, SimulationError> = (0..tasks)
+    let done: Result<Vec<Vec<Wheels<SampleShape>>>, SimulationError> = (0..tasks)
         .into_par_iter()
         .map(|task| {
             let mut experiment = Experiment::new(scenario)?;
@@ -163,7 +163,7 @@ fn variants(scenario: &Scenario, first: u64, trials: u64) -> Result<Vec<Wheels<V
             let mut variants = Vec::new();
             for trial in from..(from + TRIALS_PER_TASK).min(trials) {
                 let values = experiment.sensitivities(first + trial)?;
-                if let (Some(left), Some(right)) = (Variant::of(&values.left), Variant::of(&values.right)) {
+                if let (Some(left), Some(right)) = (SampleShape::of(&values.left), SampleShape::of(&values.right)) {
                     variants.push(Wheels { left, right });
                 }
             }
@@ -233,7 +233,7 @@ fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), S
     Ok((reading_sigma_m, ((1.0 - share) * left_to_explain).sqrt() / mean_c))
 }
 
-fn rows(variants: &[Wheels<Variant>], side: Side) -> Vec<Row> {
+fn rows(variants: &[Wheels<SampleShape>], side: Side) -> Vec<Row> {
     ROWS.iter()
         .map(|(statistic, of)| {
             let mut values: Vec<f64> = variants.iter().map(|shape| of(&shape[side])).collect();
@@ -258,17 +258,17 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 /// What of a shape can tell hypotheses apart once location and scale are fitted: the spread of both wheels, the extremes in standard deviations, and the
 /// standardized moments.
-fn features(shape: &Wheels<Variant>) -> Vec<f64> {
+fn features(shape: &Wheels<SampleShape>) -> Vec<f64> {
     Side::BOTH
         .iter()
         .flat_map(|side| {
-            let Variant { mean, std, min, max, skewness_z, kurtosis_z, .. } = shape[*side];
+            let SampleShape { mean, std, min, max, skewness_z, kurtosis_z, .. } = shape[*side];
             [std.ln(), (mean - min) / std, (max - mean) / std, skewness_z, kurtosis_z]
         })
         .collect()
 }
 
-fn log_synthetic_likelihood(variants: &[Wheels<Variant>]) -> f64 {
+fn log_synthetic_likelihood(variants: &[Wheels<SampleShape>]) -> f64 {
     let features_of: Vec<DVector<f64>> = variants.iter().map(|shape| DVector::from_vec(features(shape))).collect();
     let size = features_of[0].len();
     let n = features_of.len() as f64;

@@ -141,7 +141,7 @@ fn paths_that_do_not_show_it_are_refused_and_the_reason_says_what_to_drive() {
     let refusals = [
         (censi, straight, "the robot drives straight: add spins"),
         (censi, spin, "the robot spins: add straight runs"),
-        (censi, whole, "whole turns only; add looks after quarter turns"),
+        (censi, whole, "whole turns only; add measurements after quarter turns"),
         (censi, one_way, "one arc: add straight runs and spins, or arcs to the other side"),
         (censi, free, "displacement.csv"),
         (segments, straight, "wheel_separation_m cannot be told"),

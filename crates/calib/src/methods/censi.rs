@@ -296,7 +296,7 @@ pub fn solutions<'e>(samples: &mut (dyn Iterator<Item = &'e DisplacementSample> 
     let unobservable = CalibError::Unobservable {
         method: Censi::NAME,
         parameter: Parameter::SensorX,
-        why: "between two looks the robot turns by nothing or by whole turns only; add measurements after quarter turns"
+        why: "between two measurements the robot turns by nothing or by whole turns only; add measurements after quarter turns"
             .to_owned(),
     };
     if eigenvalues.min() * LARGEST_PLACE_CONDITION <= eigenvalues.max() {
