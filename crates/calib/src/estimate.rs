@@ -61,7 +61,7 @@ impl Parameter {
         Self::RightPerTick,
     ];
 
-    /// The parameters of [`Mounting`], in the order of its covariance.
+    /// The parameters of [`Extrinsics`], in the order of its covariance.
     pub const EXTRINSICS: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
 }
 

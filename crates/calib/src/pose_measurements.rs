@@ -116,7 +116,7 @@ pub(crate) struct ConvergenceCriterion {
 }
 
 impl ConvergenceCriterion {
-    /// The first and the last measurement within the log; `None` as for [`Looks::at`].
+    /// The first and the last measurement within the log; `None` as for [`PoseMeasurements::at`].
     pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
         let PoseMeasurements { start, mut later, .. } =
             PoseMeasurements::at(run, &WheelAngleInterpolator::of(run, robot)?, nominal, Spacing::ENDS)?;

@@ -2,8 +2,7 @@
 //!
 //! A [`Dataset`] holds one robot's runs: what it counted ([`Odometry`]) and what an outside instrument saw of it (poses,
 //! displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`], [`RunView`]), so that a subset of the
-//! runs costs nothing. A [`MotionProgram`] says what to drive and when to measure, a [`Platform`] is whatever can drive it: the
-//! simulator here, a real robot elsewhere.
+//! runs costs nothing.
 
 mod counter;
 mod error;

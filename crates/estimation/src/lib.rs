@@ -2,7 +2,7 @@
 //!
 //! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the geometry in force, plus mean terms; noise k² per metre that
 //! a wheel rolls and a variance per radian turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white noise. Start poses are
-//! free: a run begins at its first measurement. The innovations' derivatives by every mean parameter give, run by run, a normal equation ([`Evidence`]): estimates,
+//! free: a run begins at its first measurement. The innovations' derivatives by every mean parameter give, run by run, a normal equation ([`NormalEquations`]): estimates,
 //! score tests, refits and held-out scores are linear algebra on these.
 //!
 //! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry is never moved to make a covariance fit

@@ -40,7 +40,7 @@ impl ModelFit<'_> {
     }
 
     /// For each segment of two measurements, how dead reckoning from the first scatters about the second by the noise alone: variances along, across (m²) and of the
-    /// heading (rad²) in the frame of the second look, both measurements' errors included. In the order of [`Self::reckoned`] where every segment is such a one.
+    /// heading (rad²) in the frame of the second look, both measurements' errors included. In the order of [`Self::dead_reckoned`] where every segment is such a one.
     #[must_use]
     pub fn end_variances(&self) -> Vec<Vector3<f64>> {
         let Some(selection) = self.selections.first() else { return Vec::new() };

@@ -61,7 +61,7 @@ pub enum ReportError {
     },
     /// Lists that belong together and are not equally long.
     #[error("{place}: {found} {what}; {expected} are expected")]
-    GeometryParameters {
+    Lengths {
         /// Where.
         place: Place,
         /// The list that does not fit.

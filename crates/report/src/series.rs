@@ -169,7 +169,7 @@ impl Series {
             (found >= needed).then_some(()).ok_or_else(|| ReportError::TooFew { place: place(), what, needed, found })
         };
         let as_long = |what, found, expected| {
-            (found == expected).then_some(()).ok_or_else(|| ReportError::GeometryParameters {
+            (found == expected).then_some(()).ok_or_else(|| ReportError::Lengths {
                 place: place(),
                 what,
                 expected,
