@@ -156,9 +156,9 @@ fn continued(
     let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
     let asked = mean_structure(datasets, base, &catalogue, restored);
-    let findings = findings(datasets, &asked, faults, lost, &options.without);
-    let model = asked.model();
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
+    let findings = findings(&asked, (log.as_ref(), spans.as_ref()), faults, lost, &options.without);
+    let model = asked.model();
     let (gain, gain_why_null) = gain_of(&asked.base, model);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut asked.found.known.clone());
     let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);

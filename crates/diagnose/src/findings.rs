@@ -1,12 +1,9 @@
 //! The findings of all stages in one list: record faults, effects of the mean, sparse terms, noise effects, faults of the log; each with the doubts that the others cast on it.
 
-use dataset::Dataset;
-
 use crate::cause::Doubt;
 use crate::check::TestResult;
 use crate::finding;
 use crate::finding::Finding;
-use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
@@ -26,10 +23,10 @@ fn is_scatter(finding: &Finding) -> bool {
     }
 }
 
-/// The findings, record faults first and then those of the highest significance. `lost`: the odometry is uncorrelated with what the instrument measured.
+/// The findings, record faults first and then those of the highest significance. `log`, `spans`: the tests of the log itself; `lost`: the odometry is uncorrelated with what the instrument measured.
 pub(crate) fn findings(
-    datasets: &[Dataset],
     asked: &MeanStructure<'_>,
+    (log, spans): (Option<&TestResult>, Option<&TestResult>),
     faults: &[&Fault],
     lost: bool,
     without: &[String],
@@ -54,15 +51,14 @@ pub(crate) fn findings(
         let signs: Vec<Finding> = scatter(asked, without).into_iter().filter(|sign| !told(sign)).collect();
         findings.extend(signs);
     }
-    let (log, spans) = (check_rows(datasets), check_spans(datasets));
     let wheels = if lost { None } else { wrong_wheels(&asked.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
-    let of_log = finding::of_outlying_rows(log.as_ref()).into_iter().chain(finding::of_spans(spans.as_ref()));
+    let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);
     if !nameless.is_empty() {
         // With times in other units even a gross fault may be an accident.
-        let sound = spans.as_ref().is_none_or(|check| check.passes);
+        let sound = spans.is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
             finding.or_unlisted(1.0, Doubt::FaultyRecords);
         }

@@ -1,6 +1,6 @@
 //! What a propagation interval comes to by the counts and the terms, and what it depends on; kept from pass to pass where propagation intervals are long.
 //!
-//! A propagation interval of many intervals takes many times as long to be driven as its look to be taken, and it depends on the model alone, not on the noise. Near the model
+//! One of many wheel intervals takes many times as long to be driven as its measurement to be taken, and it depends on the model alone, not on the noise. Near the model
 //! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
 //! kept propagation intervals; where they end is settled by propagation intervals that are driven.
 
@@ -28,7 +28,7 @@ pub(crate) enum PropagationSource<'f> {
     /// They are driven.
     Integrated,
     /// They are driven, and kept.
-    CachedPropagation(SegmentCache),
+    Recorded(SegmentCache),
     /// They have been kept, by a model that differs from that in force by this.
     Cached(&'f SegmentCache, &'f Change),
 }
@@ -41,14 +41,14 @@ pub(crate) struct SegmentCache {
     parameters: usize,
     /// Derivatives of each propagation interval by them.
     by_terms: Vec<Vector3<f64>>,
-    /// What they add to the look at the start, and to that after each propagation interval, in the frame of the body.
+    /// What they add to the measurement at the start, and to that after each propagation interval, in the frame of the body.
     by_measurement: Vec<Pose>,
 }
 
 impl PropagationSource<'_> {
     /// So many, to be driven with terms of so many parameters, and kept.
     pub(crate) fn cached(propagations: usize, parameters: usize) -> Self {
-        Self::CachedPropagation(SegmentCache {
+        Self::Recorded(SegmentCache {
             moved: Vec::with_capacity(propagations),
             parameters,
             by_terms: Vec::with_capacity(propagations * parameters),
@@ -58,7 +58,7 @@ impl PropagationSource<'_> {
 
     /// Those that were kept.
     pub(crate) fn into_cached(self) -> Option<SegmentCache> {
-        if let Self::CachedPropagation(cached) = self { Some(cached) } else { None }
+        if let Self::Recorded(cached) = self { Some(cached) } else { None }
     }
 }
 
@@ -199,7 +199,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 Measurement { t_s, world_from_body: self.run_from_chain * pose, twist, run: self.segment.info };
             self.ask_terms(|term, own| term.measurement(&measurement, own));
         }
-        if let PropagationSource::CachedPropagation(cached) = &mut self.propagations {
+        if let PropagationSource::Recorded(cached) = &mut self.propagations {
             cached.keep_measurement(propagations, &self.gradients);
         }
     }
@@ -211,7 +211,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             return self.reused(cached, change, number);
         }
         let moved = self.driven(pose, propagation);
-        if let PropagationSource::CachedPropagation(cached) = &mut self.propagations {
+        if let PropagationSource::Recorded(cached) = &mut self.propagations {
             cached.moved.push(moved);
             cached.by_terms.extend((0..cached.parameters).map(|column| self.propagation_by_terms.get(column)));
         }
