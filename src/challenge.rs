@@ -75,10 +75,10 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     let [sessions, runs, measurements] = result.counts;
     terminal.say(&format!(
         "case {}: {:?}, {:?} paths, {:?} truth, {:?} noise; {sessions} sessions, {runs} runs, {measurements} measurements",
-        result.case, result.round, result.paths, result.truth, result.noise
+        result.case, result.case_kind, result.paths, result.truth, result.noise
     ))?;
     for hidden in &result.hidden {
-        let sizes: Vec<String> = hidden.sizes.iter().map(|(name, size)| format!("{name} = {size:.3e}")).collect();
+        let sizes: Vec<String> = hidden.values.iter().map(|(name, size)| format!("{name} = {size:.3e}")).collect();
         let form = if hidden.other_form { ", in another form" } else { "" };
         terminal.say(&format!("hidden: {}{form}: {}", hidden.id, sizes.join(", ")))?;
         if let Some(ratio) = hidden.ratio {
@@ -91,14 +91,14 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(why) = &result.refused {
         terminal.say(&format!("refused: {why}"))?;
     }
-    for said in &result.said {
-        let names = said.names.join(", ");
+    for reported in &result.reported {
+        let names = reported.names.join(", ");
         terminal.say(&format!(
             "said: {names} (probability {:.2}, z = {:.1}): {}",
-            said.probability, said.z, said.sentence
+            reported.probability, reported.z, reported.sentence
         ))?;
     }
-    if result.said.is_empty() && result.refused.is_none() {
+    if result.reported.is_empty() && result.refused.is_none() {
         terminal.say("said: nothing")?;
     }
     if !result.failed_checks.is_empty() {
@@ -108,11 +108,11 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
         terminal.say(&format!("gain on the held-out log: {found:.1} of {possible:.1}"))?;
     }
     if let Some(planned) = &result.planned {
-        let said: Vec<String> = planned.said.iter().map(|said| said.names.join("|")).collect();
-        let said = if said.is_empty() { "nothing".to_owned() } else { said.join(" + ") };
-        let can = if planned.can_be_told() { "the right name can be told" } else { "nothing tells the right name" };
+        let reported: Vec<String> = planned.reported.iter().map(|reported| reported.names.join("|")).collect();
+        let reported = if reported.is_empty() { "nothing".to_owned() } else { reported.join(" + ") };
+        let can = if planned.is_resolvable() { "the right name can be told" } else { "nothing tells the right name" };
         terminal.say(&match planned.planned {
-            true => format!("after the planned runs: {said}; by the oracle {can}"),
+            true => format!("after the planned runs: {reported}; by the oracle {can}"),
             false => format!("no planned runs; by the oracle {can}"),
         })?;
     }
@@ -135,15 +135,16 @@ fn show(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
     }
     terminal.say(&rows.to_string())?;
     // What went wrong, the most frequent first.
-    let mut wrong: Vec<_> = result.confusions.iter().filter(|confusion| confusion.hidden != confusion.said).collect();
-    wrong.retain(|confusion| (confusion.hidden.as_str(), confusion.said.as_str()) != ("nothing", "nothing"));
+    let mut wrong: Vec<_> =
+        result.confusions.iter().filter(|confusion| confusion.hidden != confusion.reported).collect();
+    wrong.retain(|confusion| (confusion.hidden.as_str(), confusion.reported.as_str()) != ("nothing", "nothing"));
     wrong.sort_by(|a, b| b.count.cmp(&a.count).then(a.cmp(b)));
     let mut list = table(&["round", "hidden", "said", "cases", "such as"], 3);
     for confusion in wrong.iter().take(MAX_SHOWN) {
         list.add_row([
-            confusion.round.clone(),
+            confusion.case_kind.clone(),
             confusion.hidden.clone(),
-            confusion.said.clone(),
+            confusion.reported.clone(),
             confusion.count.to_string(),
             confusion.cases.iter().take(3).map(u64::to_string).collect::<Vec<_>>().join(", "),
         ]);

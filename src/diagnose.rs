@@ -22,13 +22,9 @@ pub(crate) struct Arguments {
     /// Take an effect out of the catalogue; may be given several times.
     #[arg(long = "without", value_name = "ID")]
     without: Vec<String>,
-    /// Accepted for uniformity: nothing here is drawn by chance.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let _ = arguments.seed;
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let Diagnosis { mut document, extended, residuals, alternatives, .. } =
         ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone() })?;

@@ -32,9 +32,6 @@ pub(crate) struct Arguments {
     /// Folder for plan.toml, a scenario that drives the plan with the robot as it is known; one for each speed.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Accepted for uniformity: nothing here is drawn by chance.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -66,7 +63,6 @@ struct OfScenario {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let _ = arguments.seed;
     let limits = Limits { room_m: arguments.room, minutes: arguments.minutes, top_speed_m_s: arguments.speed };
     match &arguments.sources[..] {
         [file] if file.is_file() => of_scenario(file, &limits, arguments, terminal),

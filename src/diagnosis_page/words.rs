@@ -9,7 +9,7 @@ pub(super) fn meaning(finding: &Finding) -> String {
     let sizes: Estimates<'_> =
         finding.parameters.iter().map(|(name, value)| (name.as_str(), estimate(value))).collect();
     let description = effects::description(&finding.id);
-    description.and_then(|of| of.with_sizes(&sizes)).unwrap_or_else(|| finding.sentence.clone())
+    description.and_then(|of| of.with_values(&sizes)).unwrap_or_else(|| finding.sentence.clone())
 }
 
 /// The verdict in a sentence.

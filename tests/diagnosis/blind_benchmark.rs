@@ -16,7 +16,7 @@ const DETECTED: f64 = 0.7;
 const NAMED: f64 = 0.55;
 
 /// A size, in detection limits, at which an effect must be detected: above where the bar on power is, 1.6.
-const PLAIN_RATIO: f64 = 2.0;
+const CLEAR_RATIO: f64 = 2.0;
 
 /// Successes that so many trials fall short of with less than this chance.
 fn least(of: usize, share: f64, alpha: f64) -> u64 {
@@ -46,25 +46,28 @@ fn driven(seed: u64, numbers: impl Iterator<Item = u64>) -> Vec<CaseResult> {
 fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
     let white = || cases.iter().filter(|case| case.noise == NoiseClass::White);
     let share = alpha / 3.0;
-    let (alarms, nulls) = count(white().filter(|case| case.round == CaseKind::Null), |case| !case.said.is_empty());
+    let (alarms, nulls) =
+        count(white().filter(|case| case.case_kind == CaseKind::Null), |case| !case.reported.is_empty());
     let plain = || {
         white().filter(|case| {
-            let shows = |ratio: Option<f64>| ratio.is_some_and(|ratio| ratio > PLAIN_RATIO);
-            case.round == CaseKind::Single
+            let shows = |ratio: Option<f64>| ratio.is_some_and(|ratio| ratio > CLEAR_RATIO);
+            case.case_kind == CaseKind::Single
                 && case.hidden.iter().all(|own| own.kind == EffectKind::Mean && shows(own.ratio))
         })
     };
-    let (detected, singles) = count(plain(), |case| !case.said.is_empty());
+    let (detected, singles) = count(plain(), |case| !case.reported.is_empty());
     let named = |case: &CaseResult| {
-        case.hidden.iter().all(|hidden| case.said.first().is_some_and(|said| said.names.contains(&hidden.id)))
+        case.hidden
+            .iter()
+            .all(|hidden| case.reported.first().is_some_and(|reported| reported.names.contains(&hidden.id)))
     };
-    let (named, said) = count(plain().filter(|case| !case.said.is_empty()), named);
+    let (named, reported) = count(plain().filter(|case| !case.reported.is_empty()), named);
     println!(
-        "seed {seed}: {alarms} alarms in {nulls} nulls, {detected} of {singles} detected, {named} of {said} named"
+        "seed {seed}: {alarms} alarms in {nulls} nulls, {detected} of {singles} detected, {named} of {reported} named"
     );
     assert!(alarms <= most(nulls, ALARMS, share), "{alarms} alarms in {nulls} nulls");
     assert!(detected >= least(singles, DETECTED, share), "{detected} of {singles} detected");
-    assert!(named >= least(said, NAMED, share), "{named} of {said} named");
+    assert!(named >= least(reported, NAMED, share), "{named} of {reported} named");
 }
 
 /// Of cases 0 to 99 of a seed all 35 nulls and 35 singles, and the two pairs and four effects that are left out of the first block, of which nothing is asked
@@ -73,10 +76,14 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
 fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
     let cases = driven(seed, (0..100).filter(|number| *number < 20 || number % 20 < NULLS_AND_SINGLES));
-    let in_round = |round: CaseKind| cases.iter().filter(|case| case.round == round).count();
+    let in_case_kind = |case_kind: CaseKind| cases.iter().filter(|case| case.case_kind == case_kind).count();
     // No robot may show an effect that was drawn for it: docs/diagnose.md has such cases, a few in a hundred.
-    assert!(in_round(CaseKind::Null) == 35 && (30..=35).contains(&in_round(CaseKind::Single)), "{}", cases.len());
-    assert!(in_round(CaseKind::Pair) > 0 && in_round(CaseKind::LeftOut) > 0);
+    assert!(
+        in_case_kind(CaseKind::Null) == 35 && (30..=35).contains(&in_case_kind(CaseKind::Single)),
+        "{}",
+        cases.len()
+    );
+    assert!(in_case_kind(CaseKind::Pair) > 0 && in_case_kind(CaseKind::LeftOut) > 0);
     holds(seed, &cases, 1e-3);
 }
 

@@ -18,8 +18,8 @@ struct Specimen {
 }
 
 /// An effect as a scenario writes it.
-fn effect(id: &str, sizes: &str) -> Effect {
-    toml::from_str(&format!("kind = \"{id}\"\n{}", sizes.replace(", ", "\n"))).unwrap_or_else(|e| panic!("{id}: {e}"))
+fn effect(id: &str, values: &str) -> Effect {
+    toml::from_str(&format!("kind = \"{id}\"\n{}", values.replace(", ", "\n"))).unwrap_or_else(|e| panic!("{id}: {e}"))
 }
 
 /// Id, sizes that are none, sizes that show, unphysical sizes.

@@ -58,15 +58,15 @@ fn paper_table_2_direct_is_reproduced_and_umbmark_is_not() {
 fn paper_audit_derives_the_contradictions() {
     let derived = |id: &str| {
         let finding = REPRODUCTION.audit.iter().find(|finding| finding.id == id).expect("a finding");
-        (finding.derived.clone(), finding.apart, finding.meaning.clone())
+        (finding.derived.clone(), finding.separation, finding.meaning.clone())
     };
     assert_eq!(derived("sigma_of_table_2").2, "table 2 prints 2σ with left and right swapped");
-    let (text, apart, _) = derived("wheelbase_of_umbmark");
+    let (text, separation, _) = derived("wheelbase_of_umbmark");
     assert!(text.contains("C_L 1.00069, C_R 0.99931, B 350.54 mm (y form: 352.42 mm)"), "{text}");
-    assert!(apart.expect("in standard deviations").0 > 20.0);
-    let (_, apart, _) = derived("wheel_ratio_of_umbmark");
+    assert!(separation.expect("in standard deviations").0 > 20.0);
+    let (_, separation, _) = derived("wheel_ratio_of_umbmark");
     // By hand 2.8 with the wheels' relative errors rounded; from the printed digits 2.9.
-    assert!((apart.expect("in standard errors").0 - 2.85).abs() < 0.1);
+    assert!((separation.expect("in standard errors").0 - 2.85).abs() < 0.1);
     let (text, _, _) = derived("clockwise_spins_by_eq_14");
     assert!(text.contains("363.0 mm counter-clockwise and 387.6 mm clockwise"), "{text}");
     assert!(derived("folding_arcsine").0.contains("80.0°"));
@@ -104,12 +104,12 @@ fn paper_causes_only_a_wheelbase_that_differs_in_corners_fits_and_is_plausible()
     // Slip in every turn, spins and corners alike, is a wheelbase by another name and reconciles nothing.
     assert!((fitted(Extension::TurnSlip).misfit / fitted(Extension::None).misfit - 1.0).abs() < 1e-3);
     assert!(fitted(Extension::NominalOf500).misfit > 100.0);
-    let told: Vec<Extension> = causes.not_told_apart.clone();
+    let told: Vec<Extension> = causes.not_discriminated.clone();
     assert_eq!(told, [Extension::CornerWheelbase, Extension::StartStopLength, Extension::ScaleOnSquares]);
     assert!(!fitted(Extension::StartStopLength).prior_sigma && !fitted(Extension::ScaleOnSquares).prior_sigma);
     // A straight of 4 m tells all three apart; ten turns do not.
-    assert!(causes.experiments[0].does.contains("straight of 4 m") && causes.experiments[0].tells_apart > 10.0);
-    assert!(causes.experiments.last().expect("three").tells_apart < 3.0);
+    assert!(causes.experiments[0].does.contains("straight of 4 m") && causes.experiments[0].discriminates_by > 10.0);
+    assert!(causes.experiments.last().expect("three").discriminates_by < 3.0);
 }
 
 /// The claim of figure 7 as a probability: kept by every set of parameters, the wrong ones too.

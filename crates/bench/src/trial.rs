@@ -3,12 +3,12 @@
 use dataset::{Dataset, Run, Session};
 use motion_programs::{MotionProgram, Platform};
 use scenario::Scenario;
-use sim_yair::{Plan, SimulatedRobot, SimulationError};
+use sim_yair::{PreparedProgram, SimulatedRobot, SimulationError};
 
 /// A simulated robot with its protocols and the dataset that they fill.
 pub struct Trial {
     robot: SimulatedRobot,
-    plans: Vec<Plan>,
+    prepared: Vec<PreparedProgram>,
     dataset: Dataset,
 }
 
@@ -38,8 +38,8 @@ impl Trial {
             points: robot.points().to_vec(),
             runs: vec![Run::default(); programs.len()],
         };
-        let plans = programs.into_iter().map(|program| robot.plan(program)).collect();
-        Ok(Self { robot, plans, dataset })
+        let prepared = programs.into_iter().map(|program| robot.prepare(program)).collect();
+        Ok(Self { robot, prepared, dataset })
     }
 
     /// The same trial at another point of a sweep's design: other draws.
@@ -55,8 +55,8 @@ impl Trial {
     /// [`SimulationError`] when a motion cannot be driven.
     pub fn drive(&mut self, trial: u64) -> Result<Session<'_>, SimulationError> {
         self.robot.restart(trial);
-        for (plan, run) in self.plans.iter().zip(&mut self.dataset.runs) {
-            self.robot.drive_plan_into(plan, run)?;
+        for (program, run) in self.prepared.iter().zip(&mut self.dataset.runs) {
+            self.robot.drive_prepared_into(program, run)?;
         }
         Ok(self.dataset.session())
     }

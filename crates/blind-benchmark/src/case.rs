@@ -8,7 +8,7 @@ use scenario::Scenario;
 use sim_yair::SimulatedRobot;
 
 use super::draw::Draw;
-use super::hidden::{Act, EffectKind, Hidden, hideable};
+use super::hidden::{ActingEffect, EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
 use super::oracle::{Detectability, TrueNoise};
 use super::power::{DISCRIMINATION_LEVEL, detection_limit};
@@ -62,7 +62,8 @@ pub struct OracleView {
     /// Whether it acts in another functional form than the catalogue's.
     pub other_form: bool,
     /// Sizes by the hypothesis's names, shape parameters after them.
-    pub sizes: Vec<(String, f64)>,
+    #[serde(rename = "sizes")]
+    pub values: Vec<(String, f64)>,
     /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None` for gross faults.
     pub noncentrality: Option<f64>,
     /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
@@ -79,7 +80,7 @@ pub struct OracleView {
 pub(crate) struct Case {
     seed: u64,
     number: u64,
-    pub(crate) round: CaseKind,
+    pub(crate) case_kind: CaseKind,
     pub(crate) robot: RandomRobot,
     pub(crate) instrument_model: InstrumentModel,
     pub(crate) hidden: Vec<Hidden>,
@@ -98,9 +99,9 @@ pub(crate) struct Case {
 const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
 const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
 /// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
-const CLOSE: f64 = 1.5;
+const MAX_RATIO_ERROR: f64 = 1.5;
 /// Where the held-out log's draws are, away from the sessions'.
-const HELD_OUT: u32 = 16;
+const HELD_OUT_RUN: u32 = 16;
 /// Where those of planned runs are.
 const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
@@ -113,7 +114,7 @@ const ATTEMPTS: u64 = 10;
 /// The sessions of a robot with hidden effects, with noise or without.
 fn drive(
     plans: &[SessionPlan],
-    case: &Sight<'_>,
+    case: &DriveContext<'_>,
     hidden: &[&Hidden],
     noisy: bool,
     first_point: u32,
@@ -123,7 +124,7 @@ fn drive(
 }
 
 /// What the drives of one case share.
-struct Sight<'c> {
+struct DriveContext<'c> {
     seed: u64,
     number: u64,
     robot: &'c RandomRobot,
@@ -132,7 +133,7 @@ struct Sight<'c> {
 
 fn drive_session(
     plan: &SessionPlan,
-    case: &Sight<'_>,
+    case: &DriveContext<'_>,
     hidden: &[&Hidden],
     ids: &[&str],
     noisy: bool,
@@ -144,14 +145,14 @@ fn drive_session(
     }
     scenario.effects.extend(case.robot.harmless(ids));
     // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
-    if noisy && point < HELD_OUT {
+    if noisy && point < HELD_OUT_RUN {
         scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
     let mut more = Vec::new();
     for hidden in hidden {
         match hidden.act() {
-            Some(Act::Catalogue(effect)) => scenario.effects.push(effect),
-            Some(Act::Other(forward)) => more.push((hidden.id, forward)),
+            Some(ActingEffect::Catalogue(effect)) => scenario.effects.push(effect),
+            Some(ActingEffect::Other(forward)) => more.push((hidden.id, forward)),
             None => {}
         }
     }
@@ -178,20 +179,20 @@ fn drive_session(
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
     pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
-        let (round, place) = CaseKind::of(number);
+        let (case_kind, place) = CaseKind::of(number);
         for attempt in 0..ATTEMPTS {
             // Two that show on the same paths must be met; which, is drawn anew.
-            let ids = Self::ids(seed, number, round, place, if round == CaseKind::Pair { attempt } else { 0 });
-            if let Some(case) = Self::attempt(seed, number, round, &ids, attempt)? {
+            let ids = Self::ids(seed, number, case_kind, place, if case_kind == CaseKind::Pair { attempt } else { 0 });
+            if let Some(case) = Self::attempt(seed, number, case_kind, &ids, attempt)? {
                 return Ok(Ok(case));
             }
         }
-        Ok(Err(Self::ids(seed, number, round, place, 0).first().copied().unwrap_or("")))
+        Ok(Err(Self::ids(seed, number, case_kind, place, 0).first().copied().unwrap_or("")))
     }
 
     /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn have a mean or scatter: a gross fault is one of
     /// a few discrete things.
-    fn ids(seed: u64, number: u64, round: CaseKind, place: u64, attempt: u64) -> Vec<&'static str> {
+    fn ids(seed: u64, number: u64, case_kind: CaseKind, place: u64, attempt: u64) -> Vec<&'static str> {
         let mut draw = Draw::of(seed, number, "what", attempt);
         let all = hideable();
         let of =
@@ -207,7 +208,7 @@ impl Case {
             });
             list[draw.below(list.len())]
         };
-        match round {
+        match case_kind {
             CaseKind::Null => Vec::new(),
             CaseKind::Single => vec![one(0.1, 0.15)],
             CaseKind::Pair => {
@@ -225,7 +226,7 @@ impl Case {
     fn attempt(
         seed: u64,
         number: u64,
-        round: CaseKind,
+        case_kind: CaseKind,
         ids: &[&'static str],
         attempt: u64,
     ) -> Result<Option<Self>, ChallengeError> {
@@ -238,11 +239,11 @@ impl Case {
             let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(None) };
             hidden.push(effect);
         }
-        let measurement = Sight { seed, number, robot: &robot, instrument_model: &instrument_model };
+        let measurement = DriveContext { seed, number, robot: &robot, instrument_model: &instrument_model };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
         let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: instrument_model.variances() };
-        let ratios = if round == CaseKind::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
+        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, measurement_var: instrument_model.variances() };
+        let ratios = if case_kind == CaseKind::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
         let mut detectability = Vec::new();
@@ -273,7 +274,7 @@ impl Case {
         let best_drive = best.map(Detectability::best_drive);
         let datasets = drive(&robot.sessions, &measurement, &all, true, 0)?;
         let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, ChallengeError> {
-            Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT)?.pop())
+            Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT_RUN)?.pop())
         };
         let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
         let mut held_out_by_chance = Vec::new();
@@ -283,7 +284,7 @@ impl Case {
         Ok(Some(Self {
             seed,
             number,
-            round,
+            case_kind,
             instrument_model,
             hidden,
             oracle,
@@ -298,9 +299,9 @@ impl Case {
 
     /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only effect, which is a mean: other names, each with the noncentrality of the
     /// test between it and the true one by all that was driven.
-    pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<More>, ChallengeError> {
+    pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<FurtherRuns>, ChallengeError> {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
-        let measurement = Sight {
+        let measurement = DriveContext {
             seed: self.seed,
             number: self.number,
             robot: &self.robot,
@@ -315,7 +316,7 @@ impl Case {
             return Ok(None);
         };
         let rivals = detectability.rivals(effect.id, known(effect, &detectability));
-        Ok(Some(More { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
+        Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
     }
 
     /// The drive that a calibration should find.
@@ -325,7 +326,7 @@ impl Case {
 }
 
 /// What a robot brings home that drives some more.
-pub(crate) struct More {
+pub(crate) struct FurtherRuns {
     pub(crate) datasets: Vec<Dataset>,
     pub(crate) rivals: Vec<(&'static str, f64)>,
 }
@@ -384,7 +385,7 @@ fn scale(
     let mut growth = 1.0_f64;
     for _ in 0..MAX_STEPS {
         let off = wanted / found.1;
-        if (1.0 / CLOSE.sqrt()..=CLOSE.sqrt()).contains(&off) {
+        if (1.0 / MAX_RATIO_ERROR.sqrt()..=MAX_RATIO_ERROR.sqrt()).contains(&off) {
             break;
         }
         let before = (effect.scale, found.1);
@@ -402,7 +403,7 @@ fn scale(
         found = (next, at_next);
     }
     let off = wanted / found.1;
-    let close = (1.0 / CLOSE..=CLOSE).contains(&off);
+    let close = (1.0 / MAX_RATIO_ERROR..=MAX_RATIO_ERROR).contains(&off);
     // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
     let described_better = || {
         found
@@ -412,7 +413,7 @@ fn scale(
             .is_some_and(|(_, left)| *left < -DISCRIMINATION_LEVEL)
     };
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > MIN_SHARE && !described_better());
-    let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_taken_up_by_lengths();
+    let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_explained_by_geometry();
     if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 
@@ -423,12 +424,12 @@ fn view(
     both: Option<&Detectability>,
     others: &[Hidden],
 ) -> OracleView {
-    let sizes = effect.sizes().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
+    let values = effect.values().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
     let mut view = OracleView {
         id: effect.id.to_owned(),
         kind: effect.kind,
         other_form: effect.other_form,
-        sizes,
+        values,
         noncentrality: None,
         ratio: None,
         form_share: None,
@@ -499,8 +500,8 @@ impl Trial {
             }
             let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
             let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, look_var: instrument_model.variances() };
-            let measurement = Sight { seed, number: 0, robot: &robot, instrument_model: &instrument_model };
+            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, measurement_var: instrument_model.variances() };
+            let measurement = DriveContext { seed, number: 0, robot: &robot, instrument_model: &instrument_model };
             let plain = drive(&robot.sessions, &measurement, &[], false, 0)?;
             let mut noncentrality = 0.0;
             for _ in 0..4 {
@@ -521,7 +522,7 @@ impl Trial {
     /// The oracle's statistic on a drive with noise of its own, with the effect or without.
     pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
         let Self { seed, robot, instrument_model, .. } = self;
-        let measurement = Sight { seed: *seed, number, robot, instrument_model };
+        let measurement = DriveContext { seed: *seed, number, robot, instrument_model };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
         let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise);

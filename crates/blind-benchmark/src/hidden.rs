@@ -4,8 +4,8 @@
 //! such robots do not exist, and the tool may say so.
 
 use effects::{
-    Benchmark, CATALOGUE, Effect, Forward, HostRobot, Hypothesis, Needs, SizeLaw, Sizes, Stream, description,
-    hypothesis,
+    Benchmark, CATALOGUE, Effect, Forward, HostRobot, Hypothesis, Needs, ParameterLaw, ParameterValues, Stream,
+    description, hypothesis,
 };
 use kinematics::Wheels;
 
@@ -50,9 +50,9 @@ pub(crate) struct Hidden {
     /// In another form than the catalogue's.
     pub(crate) other_form: bool,
     /// Sizes at scale 1, by the names of the hypothesis.
-    sizes: Sizes,
+    values: ParameterValues,
     /// Shape parameters, whatever the scale.
-    pub(crate) held: Sizes,
+    pub(crate) fixed: ParameterValues,
     pub(crate) scale: f64,
     /// Largest scale that a real robot may have.
     pub(crate) most: f64,
@@ -62,7 +62,7 @@ pub(crate) struct Hidden {
 }
 
 /// How a hidden effect acts.
-pub(crate) enum Act {
+pub(crate) enum ActingEffect {
     Catalogue(Effect),
     Other(Box<dyn Forward>),
 }
@@ -80,20 +80,20 @@ impl Hidden {
             id,
             kind,
             other_form: benchmark.other_form.is_some() && draw.chance(0.5),
-            sizes: Vec::new(),
-            held: Vec::new(),
+            values: Vec::new(),
+            fixed: Vec::new(),
             scale: 1.0,
             most: benchmark.max_scale,
             benchmark,
             host: robot.host(),
         };
-        match benchmark.sizes {
-            SizeLaw::Direction { held, positive } => hidden.draw_direction(held, positive, draw)?,
-            SizeLaw::Scatter(law) => (hidden.sizes, hidden.held) = law(&hidden.host, &mut draw.0),
-            SizeLaw::Fault(law) => {
+        match benchmark.values {
+            ParameterLaw::Direction { fixed, positive } => hidden.draw_direction(fixed, positive, draw)?,
+            ParameterLaw::Scatter(law) => (hidden.values, hidden.fixed) = law(&hidden.host, &mut draw.0),
+            ParameterLaw::Fault(law) => {
                 // The left wheel, the right one, or both.
                 let either = draw.below(3);
-                hidden.held = law(Wheels { left: either != 1, right: either != 0 }, &mut draw.0);
+                hidden.fixed = law(Wheels { left: either != 1, right: either != 0 }, &mut draw.0);
             }
         }
         hidden.act().is_some().then_some(hidden)
@@ -101,26 +101,26 @@ impl Hidden {
 
     fn draw_direction(
         &mut self,
-        held: fn(Sizes, &HostRobot, &mut Stream) -> Sizes,
+        fixed: fn(ParameterValues, &HostRobot, &mut Stream) -> ParameterValues,
         positive: bool,
         draw: &mut Draw,
     ) -> Option<()> {
         let Some(Hypothesis::Terms(variants)) = hypothesis(self.id) else { return None };
         let variant = &variants[draw.below(variants.len())];
-        self.held = held(variant.held.clone(), &self.host, &mut draw.0);
+        self.fixed = fixed(variant.fixed.clone(), &self.host, &mut draw.0);
         let parameters = variant.term.parameters();
         // Both wheels, or one of them.
-        let spared = ["", "", "left_", "right_"][draw.below(4)];
+        let spared_wheel = ["", "", "left_", "right_"][draw.below(4)];
         for attempt in 0..20 {
-            self.sizes = parameters
+            self.values = parameters
                 .iter()
                 .map(|parameter| {
                     let size = draw.0.normal() * parameter.prior_sigma;
-                    let spared = !spared.is_empty() && parameter.name.starts_with(spared);
+                    let spared_wheel = !spared_wheel.is_empty() && parameter.name.starts_with(spared_wheel);
                     // A loss that is a gain is no effect: after some attempts every size is positive.
                     (
                         parameter.name,
-                        if spared {
+                        if spared_wheel {
                             0.0
                         } else if attempt < 10 {
                             size
@@ -132,14 +132,14 @@ impl Hidden {
                 .collect();
             let largest = parameters
                 .iter()
-                .zip(&self.sizes)
+                .zip(&self.values)
                 .map(|(parameter, (_, size))| (size / parameter.prior_sigma).abs())
                 .fold(0.0, f64::max);
             if largest == 0.0 {
                 continue;
             }
-            self.sizes.iter_mut().for_each(|(_, size)| *size /= largest);
-            if self.act().is_some() && (!positive || self.sizes.iter().all(|(_, size)| *size >= 0.0)) {
+            self.values.iter_mut().for_each(|(_, size)| *size /= largest);
+            if self.act().is_some() && (!positive || self.values.iter().all(|(_, size)| *size >= 0.0)) {
                 return Some(());
             }
         }
@@ -147,19 +147,19 @@ impl Hidden {
     }
 
     /// Sizes in force, by name; shape parameters after them.
-    pub(crate) fn sizes(&self) -> Vec<(&'static str, f64)> {
-        let scaled = self.sizes.iter().map(|(name, size)| (*name, size * self.scale));
-        scaled.chain(self.held.iter().copied()).collect()
+    pub(crate) fn values(&self) -> Vec<(&'static str, f64)> {
+        let scaled = self.values.iter().map(|(name, size)| (*name, size * self.scale));
+        scaled.chain(self.fixed.iter().copied()).collect()
     }
 
     /// How it acts at its scale; `None` when that is not physical.
-    pub(crate) fn act(&self) -> Option<Act> {
-        let sizes = self.sizes();
+    pub(crate) fn act(&self) -> Option<ActingEffect> {
+        let values = self.values();
         if self.other_form {
             // Physical where the catalogue's form is.
-            effects::effect_from_estimates(self.id, &sizes)?;
-            return self.benchmark.other_form.map(|form| Act::Other((form.forward)(&sizes, &self.host)));
+            effects::effect_from_estimates(self.id, &values)?;
+            return self.benchmark.other_form.map(|form| ActingEffect::Other((form.forward)(&values, &self.host)));
         }
-        effects::effect_at_scale(self.id, &sizes, self.scale, &self.host).map(Act::Catalogue)
+        effects::effect_at_scale(self.id, &values, self.scale, &self.host).map(ActingEffect::Catalogue)
     }
 }

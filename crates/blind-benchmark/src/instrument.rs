@@ -56,14 +56,14 @@ impl NoiseClass {
     /// What the log loses in this class, as an effect.
     pub(crate) const fn effect(self) -> Option<Effect> {
         match self {
-            Self::Dropouts => Some(Effect::DroppedSamples(DroppedSamples { probability: SHARE_LOST })),
+            Self::Dropouts => Some(Effect::DroppedSamples(DroppedSamples { probability: LOST_ROW_SHARE })),
             Self::White | Self::HeavyTailed | Self::Correlated => None,
         }
     }
 }
 
 /// Share of the log's rows that are lost where some are.
-const SHARE_LOST: f64 = 0.02;
+const LOST_ROW_SHARE: f64 = 0.02;
 
 /// How the robot of a case is looked at.
 #[derive(Debug, Clone, Copy)]
@@ -152,7 +152,8 @@ impl InstrumentModel {
                 (sample.t_s, Pose::new(sample.x_m, sample.y_m, sample.theta_rad().unwrap_or(0.0)))
             })
             .collect();
-        let mut errors = Errors { instrument_model: self, draw, lasting: [0.0; 3], last_s: f64::NEG_INFINITY };
+        let mut errors =
+            MeasurementErrors { instrument_model: self, draw, lasting: [0.0; 3], last_s: f64::NEG_INFINITY };
         if self.kind == TruthKind::Relative {
             run.truth.clear();
             run.displacements = exact
@@ -182,14 +183,14 @@ impl InstrumentModel {
 }
 
 /// Errors of one measurement after the other.
-struct Errors<'w> {
+struct MeasurementErrors<'w> {
     instrument_model: &'w InstrumentModel,
     draw: Option<&'w mut Draw>,
     lasting: [f64; 3],
     last_s: f64,
 }
 
-impl Errors<'_> {
+impl MeasurementErrors<'_> {
     fn next(&mut self, t_s: f64) -> [f64; 3] {
         let Some(draw) = self.draw.as_deref_mut() else { return [0.0; 3] };
         let (share, tau_s) = self.instrument_model.lasting;

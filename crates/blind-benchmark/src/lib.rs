@@ -54,11 +54,13 @@ pub struct ChallengeResult {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct Confusion {
     /// What was asked.
-    pub round: String,
+    #[serde(rename = "round")]
+    pub case_kind: String,
     /// What was hidden.
     pub hidden: String,
     /// What was said.
-    pub said: String,
+    #[serde(rename = "said")]
+    pub reported: String,
     /// How often.
     pub count: usize,
     /// The cases.
@@ -119,11 +121,17 @@ fn confusions(cases: &[CaseResult]) -> Vec<Confusion> {
     for case in cases {
         let hidden: Vec<&str> = case.hidden.iter().map(|hidden| hidden.id.as_str()).collect();
         let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
-        let round = serde_json::to_value(case.round).ok().and_then(|value| value.as_str().map(str::to_owned));
-        counts.entry((round.unwrap_or_default(), hidden, case.verdict())).or_default().push(case.case);
+        let case_kind = serde_json::to_value(case.case_kind).ok().and_then(|value| value.as_str().map(str::to_owned));
+        counts.entry((case_kind.unwrap_or_default(), hidden, case.verdict())).or_default().push(case.case);
     }
     counts
         .into_iter()
-        .map(|((round, hidden, said), cases)| Confusion { round, hidden, said, count: cases.len(), cases })
+        .map(|((case_kind, hidden, reported), cases)| Confusion {
+            case_kind,
+            hidden,
+            reported,
+            count: cases.len(),
+            cases,
+        })
         .collect()
 }

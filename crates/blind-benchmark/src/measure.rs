@@ -43,13 +43,13 @@ fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool
 }
 
 /// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their names.
-const PLAIN_RATIO: f64 = 2.0;
+const CLEAR_RATIO: f64 = 2.0;
 /// A pair counts where the oracle finds each beside the other at this many detection limits.
 const PAIR_RATIO: f64 = 1.6;
 
 /// What was said of one hidden effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Naming {
+enum NamingOutcome {
     Undetected,
     First,
     InSet,
@@ -58,32 +58,32 @@ enum Naming {
     WrongSet,
 }
 
-fn naming(hidden: &OracleView, first: Option<&Reported>) -> Naming {
-    let Some(said) = first else { return Naming::Undetected };
-    if said.names[0] == hidden.id {
-        Naming::First
-    } else if said.names.contains(&hidden.id) {
-        Naming::InSet
-    } else if said.names[0] == "unlisted" {
-        Naming::Unlisted
-    } else if said.names.len() == 1 {
-        Naming::WrongName
+fn naming_outcome(hidden: &OracleView, first: Option<&Reported>) -> NamingOutcome {
+    let Some(reported) = first else { return NamingOutcome::Undetected };
+    if reported.names[0] == hidden.id {
+        NamingOutcome::First
+    } else if reported.names.contains(&hidden.id) {
+        NamingOutcome::InSet
+    } else if reported.names[0] == "unlisted" {
+        NamingOutcome::Unlisted
+    } else if reported.names.len() == 1 {
+        NamingOutcome::WrongName
     } else {
-        Naming::WrongSet
+        NamingOutcome::WrongSet
     }
 }
 
 fn is_aliased(hidden: &OracleView) -> bool {
     match hidden.kind {
         EffectKind::Mean => !hidden.aliases.is_empty(),
-        EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < PLAIN_RATIO),
+        EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
         EffectKind::Gross => false,
     }
 }
 
 /// All measures.
 pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
-    let of = |round: CaseKind| cases.iter().filter(move |case| case.round == round);
+    let of = |case_kind: CaseKind| cases.iter().filter(move |case| case.case_kind == case_kind);
     let alarm = |case: &CaseResult| case.findings().next().is_some();
     let mut measures = vec![
         share(
@@ -133,30 +133,38 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
 }
 
 fn names(cases: &[CaseResult]) -> Vec<Measure> {
-    let singles: Vec<(&OracleView, Naming, &CaseResult)> = cases
+    let singles: Vec<(&OracleView, NamingOutcome, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == CaseKind::Single)
+        .filter(|case| case.case_kind == CaseKind::Single)
         .filter_map(|case| {
             let hidden = case.hidden.first()?;
-            Some((hidden, naming(hidden, case.findings().next()), case))
+            Some((hidden, naming_outcome(hidden, case.findings().next()), case))
         })
-        .filter(|(_, naming, _)| *naming != Naming::Undetected)
+        .filter(|(_, naming_outcome, _)| *naming_outcome != NamingOutcome::Undetected)
         .collect();
     let plain = singles.iter().filter(|(hidden, _, _)| !is_aliased(hidden));
     let aliased = || singles.iter().filter(|(hidden, _, _)| is_aliased(hidden));
     let mut measures = vec![
-        share("first_name", "right name first", count(plain, |(_, naming, _)| *naming == Naming::First), 0.95, false),
+        share(
+            "first_name",
+            "right name first",
+            count(plain, |(_, naming_outcome, _)| *naming_outcome == NamingOutcome::First),
+            0.95,
+            false,
+        ),
         share(
             "set_holds",
             "aliased: the set holds the right name",
-            count(aliased(), |(_, naming, _)| matches!(naming, Naming::First | Naming::InSet)),
+            count(aliased(), |(_, naming_outcome, _)| {
+                matches!(naming_outcome, NamingOutcome::First | NamingOutcome::InSet)
+            }),
             0.98,
             false,
         ),
         share(
             "single_wrong_name",
             "aliased: a single wrong name",
-            count(aliased(), |(_, naming, _)| *naming == Naming::WrongName),
+            count(aliased(), |(_, naming_outcome, _)| *naming_outcome == NamingOutcome::WrongName),
             0.01,
             true,
         ),
@@ -176,9 +184,9 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
 fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     let sets = || cases.iter().filter_map(|case| Some((case, case.planned.as_ref()?)));
     let alone = |(case, planned): &(&CaseResult, &Planned)| {
-        planned.said.iter().any(|said| said.names[..] == [case.hidden[0].id.clone()])
+        planned.reported.iter().any(|reported| reported.names[..] == [case.hidden[0].id.clone()])
     };
-    let of: Vec<_> = sets().filter(|(_, planned)| planned.can_be_told()).collect();
+    let of: Vec<_> = sets().filter(|(_, planned)| planned.is_resolvable()).collect();
     let can = of.len();
     let detectability = share(
         "sets_that_can_be_told",
@@ -214,13 +222,13 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
 }
 
 fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
-    let said: Vec<(&OracleView, &CaseResult)> = cases
+    let reported: Vec<(&OracleView, &CaseResult)> = cases
         .iter()
-        .filter(|case| case.round == CaseKind::LeftOut && case.findings().next().is_some())
+        .filter(|case| case.case_kind == CaseKind::LeftOut && case.findings().next().is_some())
         .filter_map(|case| Some((case.hidden.first()?, case)))
         .collect();
     let outcome = |(hidden, case): &&(&OracleView, &CaseResult)| without(hidden, case);
-    let counted = said.iter().filter(|one| outcome(one) != Without::Alias);
+    let counted = reported.iter().filter(|one| outcome(one) != Without::Alias);
     vec![
         share(
             "left_out",
@@ -234,7 +242,7 @@ fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
             ..share(
                 "left_out_alias",
                 "left out: an alias is named (shown only)",
-                count(said.iter(), |one| outcome(&one) == Without::Alias),
+                count(reported.iter(), |one| outcome(&one) == Without::Alias),
                 1.0,
                 true,
             )
@@ -255,11 +263,11 @@ pub(crate) enum Without {
 
 pub(crate) fn without(hidden: &OracleView, case: &CaseResult) -> Without {
     let mut worst = Without::NoName;
-    for said in case.findings() {
-        if said.names.iter().any(|name| name == "unlisted") {
+    for reported in case.findings() {
+        if reported.names.iter().any(|name| name == "unlisted") {
             continue;
         }
-        if said.names.iter().any(|name| hidden.aliases.contains(name)) {
+        if reported.names.iter().any(|name| hidden.aliases.contains(name)) {
             if worst == Without::NoName {
                 worst = Without::Alias;
             }
@@ -274,9 +282,9 @@ fn pairs(cases: &[CaseResult]) -> Measure {
     let both_show =
         |case: &&CaseResult| case.hidden.iter().all(|hidden| hidden.ratio.is_some_and(|ratio| ratio >= PAIR_RATIO));
     let both = |case: &CaseResult| {
-        case.hidden.iter().all(|hidden| case.findings().any(|said| said.names.contains(&hidden.id)))
+        case.hidden.iter().all(|hidden| case.findings().any(|reported| reported.names.contains(&hidden.id)))
     };
-    let counted = cases.iter().filter(|case| case.round == CaseKind::Pair).filter(both_show);
+    let counted = cases.iter().filter(|case| case.case_kind == CaseKind::Pair).filter(both_show);
     share("pairs", "pairs: both in the findings", count(counted, both), 0.85, false)
 }
 
@@ -287,14 +295,14 @@ fn gain(id: &'static str, what: &'static str, cases: &[&CaseResult], bar: f64) -
 
 /// Findings of singles and pairs: is the first name right as often as stated; do intervals cover?
 fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
-    let rounds = |case: &&CaseResult| matches!(case.round, CaseKind::Single | CaseKind::Pair);
+    let case_kinds = |case: &&CaseResult| matches!(case.case_kind, CaseKind::Single | CaseKind::Pair);
     let findings: Vec<(f64, bool)> = cases
         .iter()
-        .filter(rounds)
-        .flat_map(|case| case.findings().map(move |said| (case, said)))
+        .filter(case_kinds)
+        .flat_map(|case| case.findings().map(move |reported| (case, reported)))
         // That something has no name is no statement of which.
-        .filter(|(_, said)| said.names[0] != "unlisted")
-        .map(|(case, said)| (said.probability, case.hidden.iter().any(|hidden| hidden.id == said.names[0])))
+        .filter(|(_, reported)| reported.names[0] != "unlisted")
+        .map(|(case, reported)| (reported.probability, case.hidden.iter().any(|hidden| hidden.id == reported.names[0])))
         .collect();
     // Ten bins of equal width.
     let mut bins: BTreeMap<u32, (f64, f64, f64)> = BTreeMap::new();
@@ -306,8 +314,12 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
     }
     let n = findings.len() as f64;
     let error = (n > 0.0).then(|| bins.values().map(|(stated, right, _)| (stated - right).abs()).sum::<f64>() / n);
-    let covered: Vec<bool> =
-        cases.iter().filter(rounds).flat_map(|case| &case.said).flat_map(|said| said.covered.clone()).collect();
+    let covered: Vec<bool> = cases
+        .iter()
+        .filter(case_kinds)
+        .flat_map(|case| &case.reported)
+        .flat_map(|reported| reported.covered.clone())
+        .collect();
     let covers = count(covered.iter(), |covered| *covered);
     vec![
         Measure {
@@ -332,7 +344,7 @@ const BOOTSTRAPS: usize = 400;
 fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let mut points: Vec<(f64, f64)> = cases
         .iter()
-        .filter(|case| case.round == CaseKind::Single && case.noise == NoiseClass::White)
+        .filter(|case| case.case_kind == CaseKind::Single && case.noise == NoiseClass::White)
         .filter_map(|case| {
             let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
             Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))

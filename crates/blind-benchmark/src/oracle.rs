@@ -19,16 +19,16 @@ use model_term::{ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector};
 
 /// What is known of the geometry parameters before any data, as a share: the tool holds to nominal what it sees worse.
-const LENGTHS_SD: f64 = 0.05;
+const GEOMETRY_PRIOR_SD: f64 = 0.05;
 /// A rival's sizes are free up to so many times what is plausible.
 const RIVAL_SD: f64 = 10.0;
 /// A size within so many standard deviations of nothing may be nothing.
-const IN_ERROR: f64 = 3.0;
+const ZERO_WITHIN_SIGMAS: f64 = 3.0;
 
 /// One shape of one name, and where its columns are.
 struct Candidate {
     id: &'static str,
-    held: Vec<(&'static str, f64)>,
+    fixed: Vec<(&'static str, f64)>,
     parameters: Vec<TermParameter>,
     columns: std::ops::Range<usize>,
 }
@@ -51,7 +51,7 @@ pub(crate) struct Detectability {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrueNoise {
     pub(crate) wheel_var_per_m: f64,
-    pub(crate) look_var: [f64; 2],
+    pub(crate) measurement_var: [f64; 2],
 }
 
 /// The noise of a robot whose counts say nearly all of a turn.
@@ -59,7 +59,7 @@ const MIN_VAR: f64 = 1e-16;
 
 impl TrueNoise {
     fn noise(self) -> Noise {
-        let [xy, theta] = self.look_var;
+        let [xy, theta] = self.measurement_var;
         Noise { variance: [self.wheel_var_per_m, MIN_VAR, xy, theta].map(|variance| variance.max(MIN_VAR)) }
     }
 }
@@ -79,7 +79,7 @@ pub(crate) fn misfit_of_form(
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
-    for _ in 0..=LENGTH_STEPS {
+    for _ in 0..=GAUSS_NEWTON_STEPS {
         let Some(seen) = measurement(datasets, &model, noise, terms) else { return least };
         least = least.min(0.5 * seen.total.chi_square);
         let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
@@ -112,12 +112,12 @@ fn measurement(
 }
 
 /// Steps of Gauss and Newton to the best lengths.
-const LENGTH_STEPS: usize = 3;
+const GAUSS_NEWTON_STEPS: usize = 3;
 
 /// The step of the geometry parameters to their best, without any effect.
-fn to_best_lengths(total: &NormalEquations, at: &[usize]) -> Option<DVector<f64>> {
-    let lengths = Information { matrix: total.block(at, at), gradient: total.gradient_of(at) };
-    let (step, _) = lengths.with_precision(at.iter().map(|_| LENGTHS_SD.powi(-2))).solve()?;
+fn to_best_geometry(total: &NormalEquations, at: &[usize]) -> Option<DVector<f64>> {
+    let geometry_parameters = Information { matrix: total.block(at, at), gradient: total.gradient_of(at) };
+    let (step, _) = geometry_parameters.with_precision(at.iter().map(|_| GEOMETRY_PRIOR_SD.powi(-2))).solve()?;
     Some(step)
 }
 
@@ -150,7 +150,7 @@ impl Detectability {
                 let parameters = variant.term.parameters().to_vec();
                 let columns = at..at + parameters.len();
                 at = columns.end;
-                candidates.push(Candidate { id, held: variant.held, parameters, columns });
+                candidates.push(Candidate { id, fixed: variant.fixed, parameters, columns });
                 terms.push(variant.term);
             }
         }
@@ -159,9 +159,9 @@ impl Detectability {
         let plain = measurement(without, &model, noise, &mut terms)?;
         let mut at_truth = None;
         let mut seen = measurement(datasets, &model, noise, &mut terms)?;
-        for _ in 0..LENGTH_STEPS {
+        for _ in 0..GAUSS_NEWTON_STEPS {
             at_truth.get_or_insert(seen.total.chi_square);
-            let step = to_best_lengths(&seen.total, &free)?;
+            let step = to_best_geometry(&seen.total, &free)?;
             Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
             seen = measurement(datasets, &model, noise, &mut terms)?;
         }
@@ -176,9 +176,9 @@ impl Detectability {
     }
 
     /// How much of χ² the geometry parameters and some candidates take up at their best, and the candidates' sizes there with standard deviations.
-    fn taken_up(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
+    fn explained(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
         let mut at = self.free.clone();
-        let mut prior: Vec<f64> = at.iter().map(|_| LENGTHS_SD.powi(-2)).collect();
+        let mut prior: Vec<f64> = at.iter().map(|_| GEOMETRY_PRIOR_SD.powi(-2)).collect();
         for candidate in candidates {
             at.extend(candidate.columns.clone());
             prior.extend(candidate.parameters.iter().map(|parameter| (RIVAL_SD * parameter.prior_sigma).powi(-2)));
@@ -191,21 +191,21 @@ impl Detectability {
 
     /// The signature's χ² with the geometry parameters at their best: noncentrality of the test by the true form.
     pub(crate) fn noncentrality(&self) -> f64 {
-        (self.total.chi_square - self.taken_up(&[]).0).max(0.0)
+        (self.total.chi_square - self.explained(&[]).0).max(0.0)
     }
 
     /// Whether the drive's geometry parameters take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
-    pub(crate) fn is_taken_up_by_lengths(&self) -> bool {
+    pub(crate) fn is_explained_by_geometry(&self) -> bool {
         self.noncentrality() < 0.01 * self.at_truth
     }
 
     /// The shape of a name that takes up most, beside the geometry parameters, and how much: noncentrality of the test by the hypothesis's own form.
     fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
-        let alone = self.taken_up(&[]).0;
+        let alone = self.explained(&[]).0;
         self.candidates
             .iter()
             .filter(|candidate| candidate.id == id)
-            .map(|candidate| (candidate, (self.taken_up(&[candidate]).0 - alone).max(0.0)))
+            .map(|candidate| (candidate, (self.explained(&[candidate]).0 - alone).max(0.0)))
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
@@ -217,7 +217,7 @@ impl Detectability {
     /// The same with another name's hypothesis in the model already.
     pub(crate) fn noncentrality_beside(&self, id: &str, other: &str) -> f64 {
         let (Some((own, _)), Some((other, _))) = (self.best_shape(id), self.best_shape(other)) else { return 0.0 };
-        (self.taken_up(&[own, other]).0 - self.taken_up(&[other]).0).max(0.0)
+        (self.explained(&[own, other]).0 - self.explained(&[other]).0).max(0.0)
     }
 
     /// The oracle's test of an effect with one shape on what was measured with noise: χ² without the effect.
@@ -237,7 +237,7 @@ impl Detectability {
                     matrix: self.total.block(&self.free, &self.free),
                     gradient: self.total.gradient_of(&self.free),
                 };
-                let free = free.with_precision(self.free.iter().map(|_| LENGTHS_SD.powi(-2)));
+                let free = free.with_precision(self.free.iter().map(|_| GEOMETRY_PRIOR_SD.powi(-2)));
                 let between = self.total.block(&own, &self.free);
                 let Some(inverse) = inverse(&free.matrix, 0.0) else { return 0 };
                 let left = self.total.block(&own, &own) - &between * inverse * between.transpose();
@@ -254,18 +254,18 @@ impl Detectability {
     /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less than `own` of the true signature its
     /// hypothesis takes up. Names whose best sizes no effect can have are none.
     pub(crate) fn rivals(&self, id: &str, own: f64) -> Vec<(&'static str, f64)> {
-        let alone = self.taken_up(&[]).0;
+        let alone = self.explained(&[]).0;
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
         for candidate in self.candidates.iter().filter(|candidate| candidate.id != id) {
-            let (taken, values) = self.taken_up(&[candidate]);
+            let (taken, values) = self.explained(&[candidate]);
             let term_values: Vec<(&str, f64)> = candidate
                 .parameters
                 .iter()
                 .zip(&values)
                 .map(|(parameter, (size, sigma))| {
-                    (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size })
+                    (parameter.name, if size.abs() < ZERO_WITHIN_SIGMAS * sigma { 0.0 } else { *size })
                 })
-                .chain(candidate.held.iter().copied())
+                .chain(candidate.fixed.iter().copied())
                 .collect();
             if effects::effect_from_estimates(candidate.id, &term_values).is_none()
                 && term_values.iter().any(|(_, size)| *size != 0.0)

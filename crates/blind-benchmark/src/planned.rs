@@ -8,10 +8,10 @@ use std::f64::consts::TAU;
 use diagnose::{HANDLING_S, MINUTES, NextExperiment, Options, diagnose};
 use motion_programs::{DriveLimits, Schedule};
 
-use super::case::{Case, More};
+use super::case::{Case, FurtherRuns};
 use super::hidden::EffectKind;
 use super::power::DISCRIMINATION_LEVEL;
-use super::result::{CaseResult, Planned, Reported, said};
+use super::result::{CaseResult, Planned, Reported, reported};
 use super::robot::{SessionPlan, programs_of};
 use crate::error::ChallengeError;
 
@@ -22,8 +22,8 @@ pub(crate) fn planned(
     next: Option<&NextExperiment>,
 ) -> Result<Option<Planned>, ChallengeError> {
     let [hidden] = &case.oracle[..] else { return Ok(None) };
-    let among = |said: &&Reported| {
-        said.names.contains(&hidden.id) && said.names.iter().filter(|name| *name != "unlisted").count() > 1
+    let among = |reported: &&Reported| {
+        reported.names.contains(&hidden.id) && reported.names.iter().filter(|name| *name != "unlisted").count() > 1
     };
     let (EffectKind::Mean, Some(found)) = (hidden.kind, result.findings().find(among)) else { return Ok(None) };
     let others = |name: &str| name != hidden.id && found.names.iter().any(|of| of == name);
@@ -37,34 +37,34 @@ pub(crate) fn planned(
     let mut planned = Planned {
         names: found.names.clone(),
         planned: false,
-        told_by_plan: false,
-        told_by_battery: false,
-        said: Vec::new(),
+        resolved_by_plan: false,
+        resolved_by_battery: false,
+        reported: Vec::new(),
     };
     let next = next.filter(|next| next.predicted.is_some());
     if let Some(next) = next {
         let (told, more) = tells(sessions(case, next))?;
-        (planned.planned, planned.told_by_plan) = (true, told);
+        (planned.planned, planned.resolved_by_plan) = (true, told);
         let all =
             case.datasets.iter().cloned().chain(more.into_iter().flat_map(|more| more.datasets)).collect::<Vec<_>>();
         if let Ok(diagnosis) = diagnose(&all, &Options::default()) {
-            planned.said = said(&diagnosis.document, case);
+            planned.reported = reported(&diagnosis.document, case);
         }
     }
-    (planned.told_by_battery, _) = tells(battery(case))?;
+    (planned.resolved_by_battery, _) = tells(battery(case))?;
     Ok(Some(planned))
 }
 
 /// So much faster a plan is tried again that is too slow for the controllers' steps of speed, and how often.
-const FASTER: f64 = 1.25;
+const SPEED_UP: f64 = 1.25;
 const MAX_FASTER: usize = 6;
 
 /// Drives plans at their speeds, or as slowly as the controllers can; `None` where they cannot.
-fn drive(case: &Case, mut plans: Vec<SessionPlan>) -> Result<Option<More>, ChallengeError> {
+fn drive(case: &Case, mut plans: Vec<SessionPlan>) -> Result<Option<FurtherRuns>, ChallengeError> {
     for _ in 0..MAX_FASTER {
         match case.drive_more(&plans) {
             Err(ChallengeError::Simulation(_)) => {
-                plans.iter_mut().for_each(|plan| plan.scenario.robot.cruise_speed_m_s *= FASTER);
+                plans.iter_mut().for_each(|plan| plan.scenario.robot.cruise_speed_m_s *= SPEED_UP);
             }
             driven => return driven,
         }

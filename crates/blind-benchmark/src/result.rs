@@ -28,7 +28,8 @@ pub struct CaseResult {
     /// The case's number: with the seed, all that it takes to drive it again.
     pub case: u64,
     /// What was asked.
-    pub round: CaseKind,
+    #[serde(rename = "round")]
+    pub case_kind: CaseKind,
     /// What was driven.
     pub paths: PathFamily,
     /// What the instrument showed.
@@ -40,7 +41,8 @@ pub struct CaseResult {
     /// What was hidden, as the oracle sees it.
     pub hidden: Vec<OracleView>,
     /// What was found.
-    pub said: Vec<Reported>,
+    #[serde(rename = "said")]
+    pub reported: Vec<Reported>,
     /// Checks that failed at the end.
     pub failed_checks: Vec<String>,
     /// Why there is no diagnosis.
@@ -58,9 +60,9 @@ impl CaseResult {
     pub(crate) fn findings(&self) -> impl Iterator<Item = &Reported> {
         let right = self.noise.right_answers();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
-        self.said
+        self.reported
             .iter()
-            .filter(move |said| !said.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
+            .filter(move |reported| !reported.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
     }
 
     /// What was said of it, in short.
@@ -68,7 +70,7 @@ impl CaseResult {
         if self.refused.is_some() {
             return "refused".to_owned();
         }
-        let names: Vec<String> = self.findings().map(|said| said.names.join("|")).collect();
+        let names: Vec<String> = self.findings().map(|reported| reported.names.join("|")).collect();
         if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
     }
 }
@@ -81,23 +83,26 @@ pub struct Planned {
     /// Whether there was a plan that tells names apart.
     pub planned: bool,
     /// Whether the oracle tells the right name from all others of the set after the planned runs.
-    pub told_by_plan: bool,
+    #[serde(rename = "told_by_plan")]
+    pub resolved_by_plan: bool,
     /// The same after the battery.
-    pub told_by_battery: bool,
+    #[serde(rename = "told_by_battery")]
+    pub resolved_by_battery: bool,
     /// What was found after the planned runs.
-    pub said: Vec<Reported>,
+    #[serde(rename = "said")]
+    pub reported: Vec<Reported>,
 }
 
 impl Planned {
     /// Whether somebody could have driven what tells.
     #[must_use]
-    pub fn can_be_told(&self) -> bool {
-        self.told_by_plan || self.told_by_battery
+    pub fn is_resolvable(&self) -> bool {
+        self.resolved_by_plan || self.resolved_by_battery
     }
 }
 
 /// A diagnosis' findings, as far as they are scored.
-pub(crate) fn said(document: &Document, case: &Case) -> Vec<Reported> {
+pub(crate) fn reported(document: &Document, case: &Case) -> Vec<Reported> {
     document
         .findings
         .iter()
@@ -106,7 +111,7 @@ pub(crate) fn said(document: &Document, case: &Case) -> Vec<Reported> {
             let exact = hidden.filter(|hidden| hidden.kind == EffectKind::Mean && !hidden.other_form);
             let covered = exact.map_or_else(Vec::new, |hidden| {
                 hidden
-                    .sizes()
+                    .values()
                     .iter()
                     .filter_map(|(name, truth)| {
                         let value = finding.parameters.get(*name)?;

@@ -125,7 +125,7 @@ impl RandomRobot {
 pub(crate) const RATE_HZ: f64 = 20.0;
 
 /// Radius of the tightest arc in wheelbases: the inner wheel runs at a sixth of the outer one's speed, which the controllers can still do.
-const TIGHTEST: f64 = 0.7;
+const MIN_ARC_RADIUS_RATIO: f64 = 0.7;
 
 fn session(base: &Scenario, family: PathFamily, share: f64, draw: &mut Draw) -> SessionPlan {
     let mut scenario = base.clone();
@@ -143,7 +143,7 @@ fn pairs(pairs: f64, share: f64) -> u32 {
 fn programs(family: PathFamily, scenario: &Scenario, share: f64, draw: &mut Draw) -> Vec<MotionProgram> {
     // Ways in seconds of driving, so that slow robots do not drive for hours.
     let speed_m_s = scenario.robot.cruise_speed_m_s;
-    let tightest_m = TIGHTEST * scenario.robot.wheel_separation_m;
+    let tightest_m = MIN_ARC_RADIUS_RATIO * scenario.robot.wheel_separation_m;
     let mut distance_m = |low_s: f64, high_s: f64| speed_m_s * draw.uniform(low_s, high_s);
     let straights = Schedule::Straights { length_m: distance_m(3.0, 7.0), runs: 2 * pairs(3.0, share) };
     let squares = Schedule::Squares { side_m: distance_m(2.0, 4.0), runs_each_way: pairs(2.0, share) };

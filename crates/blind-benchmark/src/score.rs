@@ -10,12 +10,12 @@ use super::case::{Case, CaseKind};
 use super::hidden::{EffectKind, kind_of};
 use super::oracle::{misfit, misfit_of_form};
 use super::planned::planned;
-use super::result::{CaseResult, said};
+use super::result::{CaseResult, reported};
 use crate::error::ChallengeError;
 
 /// Diagnoses a case and scores it.
 pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeError> {
-    let without = match case.round {
+    let without = match case.case_kind {
         CaseKind::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
         _ => Vec::new(),
     };
@@ -31,13 +31,13 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
     ];
     let mut result = CaseResult {
         case: number,
-        round: case.round,
+        case_kind: case.case_kind,
         paths: case.robot.family,
         truth: case.instrument_model.kind,
         noise: case.instrument_model.class,
         counts,
         hidden: case.oracle.clone(),
-        said: Vec::new(),
+        reported: Vec::new(),
         failed_checks: Vec::new(),
         refused: None,
         extended: false,
@@ -46,13 +46,13 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
     };
     match diagnosed {
         Ok(diagnosis) => {
-            result.said = said(&diagnosis.document, case);
+            result.reported = reported(&diagnosis.document, case);
             let failed = diagnosis.document.checks.iter().filter(|check| !check.passes);
             result.failed_checks = failed.map(|check| check.name.clone()).collect();
             result.extended = !diagnosis.found.terms().is_empty();
-            debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.said.is_empty());
+            debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.reported.is_empty());
             result.gain = gain(case, Some(&diagnosis))?;
-            if case.round == CaseKind::Single {
+            if case.case_kind == CaseKind::Single {
                 result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
             }
         }
@@ -89,8 +89,8 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];
-        let sizes = hidden.sizes();
-        let of = |name: &str| sizes.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
+        let values = hidden.values();
+        let of = |name: &str| values.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
         let of_shape = |variant: Variant| {
             let mut model = Model::of(truth, 0);
             model.term_values = variant.term.parameters().iter().map(|parameter| of(parameter.name)).collect();

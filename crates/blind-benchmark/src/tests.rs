@@ -83,7 +83,10 @@ fn rounds_take_turns_and_leave_every_effect_out_once() {
             .iter()
             .all(|kind| all.iter().any(|(_, of)| of == kind))
     );
-    let places: Vec<u64> =
-        (0..200).map(CaseKind::of).filter(|(round, _)| *round == CaseKind::LeftOut).map(|(_, place)| place).collect();
+    let places: Vec<u64> = (0..200)
+        .map(CaseKind::of)
+        .filter(|(case_kind, _)| *case_kind == CaseKind::LeftOut)
+        .map(|(_, place)| place)
+        .collect();
     assert_eq!(places, (0..40).collect::<Vec<u64>>());
 }

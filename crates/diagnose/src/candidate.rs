@@ -58,14 +58,14 @@ impl Candidate {
     }
 
     /// Its held variant parameters.
-    pub(crate) fn held(&self) -> Vec<(&'static str, f64)> {
+    pub(crate) fn fixed(&self) -> Vec<(&'static str, f64)> {
         match self {
             Self::Effect { id, variant, at } => {
-                let mut held = variants(id).into_iter().nth(*variant).map(|variant| variant.held).unwrap_or_default();
-                if let (Some(value), [(_, own)]) = (at, &mut held[..]) {
+                let mut fixed = variants(id).into_iter().nth(*variant).map(|variant| variant.fixed).unwrap_or_default();
+                if let (Some(value), [(_, own)]) = (at, &mut fixed[..]) {
                     *own = *value;
                 }
-                held
+                fixed
             }
             Self::Sparse(_) => Vec::new(),
         }
@@ -76,7 +76,7 @@ impl Candidate {
         let Self::Effect { id, .. } = self else { return Vec::new() };
         let variants = variants(id);
         let values =
-            variants.iter().filter(|variant| variant.at.is_some()).filter_map(|variant| Some(variant.held.first()?.1));
+            variants.iter().filter(|variant| variant.at.is_some()).filter_map(|variant| Some(variant.fixed.first()?.1));
         values.collect()
     }
 

@@ -71,7 +71,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
         let effect = match candidate {
             Candidate::Effect { id, .. } => {
                 let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
-                let estimates: Vec<(&str, f64)> = named.chain(candidate.held()).collect();
+                let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
                 effect_from_estimates(id, &estimates)
                     .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?
             }

@@ -79,7 +79,7 @@ impl Finding {
 
 /// The parameters of a candidate as found.
 pub(crate) fn parameters(candidate: &Candidate, estimates: &[(f64, f64)]) -> BTreeMap<String, Value> {
-    let held = candidate.held().into_iter().map(|(name, value)| {
+    let fixed = candidate.fixed().into_iter().map(|(name, value)| {
         let unit = name.rsplit_once('_').map_or("1", |(_, unit)| unit);
         (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() })
     });
@@ -87,7 +87,7 @@ pub(crate) fn parameters(candidate: &Candidate, estimates: &[(f64, f64)]) -> BTr
         let sigma = Some(*sigma).filter(|sigma| sigma.is_finite());
         (parameter.name.to_owned(), Value { value: *value, sigma, unit: parameter.unit.to_owned() })
     });
-    fitted.chain(held).collect()
+    fitted.chain(fixed).collect()
 }
 
 /// The findings of a search over the catalogue.
@@ -271,7 +271,7 @@ pub(crate) fn of_fault(fault: &Fault) -> Finding {
         z: (2.0 * fault.gain.min(1e6)).sqrt(),
         // A likelihood ratio of e^gain bounds the probability of as much by accident (Markov's inequality).
         p_value: (-fault.gain).exp(),
-        parameters: fault.sizes.iter().map(value).collect(),
+        parameters: fault.values.iter().map(value).collect(),
         basis: Basis::RecordFault(fault.sentence.clone()),
         doubts: Vec::new(),
     }

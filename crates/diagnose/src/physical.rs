@@ -22,7 +22,7 @@ pub(crate) fn effect_of(candidate: &Candidate, estimates: &[(f64, f64)]) -> Opti
     let fitted = parameters.iter().zip(estimates);
     let estimates: Vec<(&str, f64)> = fitted
         .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
-        .chain(candidate.held())
+        .chain(candidate.fixed())
         .collect();
     effect_from_estimates(candidate.id(), &estimates).filter(|effect| effect.physical().check().is_ok())
 }

@@ -30,7 +30,7 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     let first = model.range(index).start;
     let none = vec![0.0; parameters];
     let grid: Vec<f64> = candidate.grid().iter().map(|value| value.ln()).collect();
-    let (Some(&low), Some(&high), Some(&(_, held))) = (grid.first(), grid.last(), candidate.held().first()) else {
+    let (Some(&low), Some(&high), Some(&(_, fixed))) = (grid.first(), grid.last(), candidate.fixed().first()) else {
         return none;
     };
     let mut reach = (high - low) / (grid.len().max(2) - 1) as f64;
@@ -42,7 +42,7 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
         candidates[index] = candidate.moved_to(x.exp());
         Some(Point { x, model: refit(base, model, candidates)? })
     };
-    let mut best = Point { x: held.ln(), model: model.clone() };
+    let mut best = Point { x: fixed.ln(), model: model.clone() };
     let mut sigma = 0.0;
     for _ in 0..ROUNDS {
         let middle = best.x.clamp(low_end + 0.5 * reach, high_end - 0.5 * reach);

@@ -34,7 +34,7 @@ const MAY_BE_OFF: f64 = 0.1;
 /// A fault with the records without it.
 pub(crate) struct Fault {
     pub(crate) id: &'static str,
-    pub(crate) sizes: Vec<(&'static str, f64)>,
+    pub(crate) values: Vec<(&'static str, f64)>,
     pub(crate) sentence: String,
     pub(crate) records: Vec<Dataset>,
     /// Log of how much likelier the data become.
@@ -74,7 +74,7 @@ pub(crate) fn fault(
         if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
-        for Form { sizes, sentence, visible_in_log, records } in together(datasets, corrections) {
+        for Form { values, sentence, visible_in_log, records } in together(datasets, corrections) {
             if outlying && !visible_in_log {
                 continue;
             }
@@ -104,7 +104,7 @@ pub(crate) fn fault(
                 (visible_in_log, gain) > (*shown, known.gain + f64::from(u8::from(*shown)))
             };
             if gain > least && best.as_ref().is_none_or(better) {
-                best = Some((visible_in_log, Fault { id, sizes, sentence, records, gain: gain.max(GAIN) }));
+                best = Some((visible_in_log, Fault { id, values, sentence, records, gain: gain.max(GAIN) }));
             }
         }
     }
@@ -164,7 +164,7 @@ pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
 
 /// A form of a fault.
 struct Form {
-    sizes: Vec<(&'static str, f64)>,
+    values: Vec<(&'static str, f64)>,
     sentence: String,
     /// The log of some session shows it by itself.
     visible_in_log: bool,
@@ -188,7 +188,7 @@ fn together(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrect
     let each: Vec<Vec<RecordCorrection>> = datasets.iter().map(corrections).collect();
     let mut forms: Vec<Form> = Vec::new();
     for correction in each.iter().flatten() {
-        match forms.iter_mut().find(|form| is_same(&form.sizes, &correction.sizes)) {
+        match forms.iter_mut().find(|form| is_same(&form.values, &correction.values)) {
             Some(form) => {
                 form.visible_in_log |= correction.visible_in_log;
                 if form.sentence != correction.sentence {
@@ -196,7 +196,7 @@ fn together(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrect
                 }
             }
             None => forms.push(Form {
-                sizes: correction.sizes.clone(),
+                values: correction.values.clone(),
                 sentence: correction.sentence.clone(),
                 visible_in_log: correction.visible_in_log,
                 records: Vec::new(),
@@ -208,7 +208,7 @@ fn together(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrect
             .iter()
             .zip(&each)
             .map(|(dataset, own)| {
-                let same = own.iter().find(|correction| is_same(&form.sizes, &correction.sizes));
+                let same = own.iter().find(|correction| is_same(&form.values, &correction.values));
                 same.map_or_else(|| dataset.clone(), |correction| correction.records.clone())
             })
             .collect();

@@ -140,7 +140,7 @@ fn library(fit: &ModelFit<'_>) -> Vec<Candidate> {
         .map(|rate| Candidate::Sparse(Sparse { channel: Channel::Yaw, covariates: vec![rate, Curvature] }));
     let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
     let seen = seen.into_iter().flat_map(|covariates| {
-        Channel::SEEN.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
+        Channel::INSTRUMENT.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Candidate::Sparse);
     moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Candidate::Sparse(Sparse::of_rows())]).collect()

@@ -13,13 +13,13 @@ use crate::forward::{Forward, Hooks, Step};
 use crate::stream::Stream;
 
 /// A size by its name.
-pub type NamedSize = (&'static str, f64);
+pub type ParameterValue = (&'static str, f64);
 
 /// Sizes by their names.
-pub type Sizes = Vec<NamedSize>;
+pub type ParameterValues = Vec<ParameterValue>;
 
 /// The simulation model of another form, from sizes of the hypothesis, at which it does about as much.
-pub type FormOf = fn(&[NamedSize], &HostRobot) -> Box<dyn Forward>;
+pub type FormOf = fn(&[ParameterValue], &HostRobot) -> Box<dyn Forward>;
 
 /// The robot that an effect is hidden in.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,19 +57,19 @@ impl Needs {
 
 /// The law of an effect's sizes.
 #[derive(Debug, Clone, Copy)]
-pub enum SizeLaw {
+pub enum ParameterLaw {
     /// A random direction in units of what is large by the hypothesis's parameters.
     Direction {
         /// What stays the same whatever the scale, from the shape parameters of the hypothesis that was
         /// drawn; off its grid where any value is possible.
-        held: fn(Sizes, &HostRobot, &mut Stream) -> Sizes,
+        fixed: fn(ParameterValues, &HostRobot, &mut Stream) -> ParameterValues,
         /// A size of the wrong sign counts as none: the direction would not be what it says.
         positive: bool,
     },
     /// Sizes at scale 1, and what stays the same whatever the scale.
-    Scatter(fn(&HostRobot, &mut Stream) -> (Sizes, Sizes)),
+    Scatter(fn(&HostRobot, &mut Stream) -> (ParameterValues, ParameterValues)),
     /// A fault of the records, of one or both wheels, which has no scale.
-    Fault(fn(Wheels<bool>, &mut Stream) -> Sizes),
+    Fault(fn(Wheels<bool>, &mut Stream) -> ParameterValues),
 }
 
 /// Another functional form of an effect.
@@ -87,7 +87,7 @@ pub struct Benchmark {
     /// What the records must have.
     pub needs: Needs,
     /// The law of its sizes.
-    pub sizes: SizeLaw,
+    pub values: ParameterLaw,
     /// Largest scale of a real robot.
     pub max_scale: f64,
     /// Another functional form, of which one robot in two is.
@@ -101,23 +101,23 @@ const MAX_SCALE_OF_MEAN: f64 = 3.0;
 /// The same of scatter, which shows with the square of its size.
 const MAX_SCALE_OF_SCATTER: f64 = 10.0;
 
-fn as_tried(held: Sizes, _: &HostRobot, _: &mut Stream) -> Sizes {
-    held
+fn as_tried(fixed: ParameterValues, _: &HostRobot, _: &mut Stream) -> ParameterValues {
+    fixed
 }
 
 impl Benchmark {
     /// A mean in a random direction.
     pub(crate) const OF_MEAN: Self = Self {
         needs: Needs::NONE,
-        sizes: SizeLaw::Direction { held: as_tried, positive: false },
+        values: ParameterLaw::Direction { fixed: as_tried, positive: false },
         max_scale: MAX_SCALE_OF_MEAN,
         other_form: None,
         has_random_signature: false,
     };
 
     /// A mean whose shape parameters are drawn by a law of their own.
-    pub(crate) const fn of_mean_at(held: fn(Sizes, &HostRobot, &mut Stream) -> Sizes) -> Self {
-        Self { sizes: SizeLaw::Direction { held, positive: false }, ..Self::OF_MEAN }
+    pub(crate) const fn of_mean_at(fixed: fn(ParameterValues, &HostRobot, &mut Stream) -> ParameterValues) -> Self {
+        Self { values: ParameterLaw::Direction { fixed, positive: false }, ..Self::OF_MEAN }
     }
 
     /// A mean in another form on one robot in two.
@@ -126,13 +126,13 @@ impl Benchmark {
     }
 
     /// A scatter.
-    pub(crate) const fn of_scatter(law: fn(&HostRobot, &mut Stream) -> (Sizes, Sizes)) -> Self {
-        Self { sizes: SizeLaw::Scatter(law), max_scale: MAX_SCALE_OF_SCATTER, ..Self::OF_MEAN }
+    pub(crate) const fn of_scatter(law: fn(&HostRobot, &mut Stream) -> (ParameterValues, ParameterValues)) -> Self {
+        Self { values: ParameterLaw::Scatter(law), max_scale: MAX_SCALE_OF_SCATTER, ..Self::OF_MEAN }
     }
 
     /// A fault of the records.
-    pub(crate) const fn of_fault(law: fn(Wheels<bool>, &mut Stream) -> Sizes) -> Self {
-        Self { sizes: SizeLaw::Fault(law), ..Self::OF_MEAN }
+    pub(crate) const fn of_fault(law: fn(Wheels<bool>, &mut Stream) -> ParameterValues) -> Self {
+        Self { values: ParameterLaw::Fault(law), ..Self::OF_MEAN }
     }
 }
 
@@ -182,33 +182,33 @@ mod tests {
     }
 
     /// Sizes of an effect as the benchmark draws them, all of a mean's as large as is large; at scale 1.
-    fn drawn(id: &str, run: u32) -> Sizes {
+    fn drawn(id: &str, run: u32) -> ParameterValues {
         let benchmark = description(id).expect("known").benchmark;
         let mut stream = stream(run);
-        match benchmark.sizes {
-            SizeLaw::Direction { held, .. } => {
-                let shape =
+        match benchmark.values {
+            ParameterLaw::Direction { fixed, .. } => {
+                let variant =
                     hypothesis(id).and_then(Hypothesis::into_variants).and_then(|variants| variants.into_iter().next());
-                let Some(shape) = shape else { return Vec::new() };
-                let large = shape.term.parameters().iter().map(|parameter| (parameter.name, parameter.prior_sigma));
-                large.chain(held(shape.held.clone(), &host(), &mut stream)).collect()
+                let Some(variant) = variant else { return Vec::new() };
+                let large = variant.term.parameters().iter().map(|parameter| (parameter.name, parameter.prior_sigma));
+                large.chain(fixed(variant.fixed.clone(), &host(), &mut stream)).collect()
             }
-            SizeLaw::Scatter(law) => {
-                let (scaled, held) = law(&host(), &mut stream);
-                scaled.into_iter().chain(held).collect()
+            ParameterLaw::Scatter(law) => {
+                let (scaled, fixed) = law(&host(), &mut stream);
+                scaled.into_iter().chain(fixed).collect()
             }
-            SizeLaw::Fault(law) => law(Wheels { left: run.is_multiple_of(2), right: true }, &mut stream),
+            ParameterLaw::Fault(law) => law(Wheels { left: run.is_multiple_of(2), right: true }, &mut stream),
         }
     }
 
     /// Whether a law is that of what a hypothesis shows.
-    fn is_of(law: SizeLaw, hypothesis: &Hypothesis) -> bool {
+    fn is_of(law: ParameterLaw, hypothesis: &Hypothesis) -> bool {
         match hypothesis {
-            Hypothesis::Terms(_) => matches!(law, SizeLaw::Direction { .. }),
-            Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => matches!(law, SizeLaw::Scatter(_)),
-            Hypothesis::Records(_) => matches!(law, SizeLaw::Fault(_)),
+            Hypothesis::Terms(_) => matches!(law, ParameterLaw::Direction { .. }),
+            Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => matches!(law, ParameterLaw::Scatter(_)),
+            Hypothesis::Records(_) => matches!(law, ParameterLaw::Fault(_)),
             // Never hidden.
-            Hypothesis::Geometry | Hypothesis::Silent => matches!(law, SizeLaw::Direction { .. }),
+            Hypothesis::Geometry | Hypothesis::Silent => matches!(law, ParameterLaw::Direction { .. }),
         }
     }
 
@@ -216,21 +216,21 @@ mod tests {
     fn what_is_drawn_is_physical_and_what_its_hypothesis_is_of() {
         for id in CATALOGUE {
             let (benchmark, hypothesis) = (description(id).expect("known").benchmark, hypothesis(id).expect("known"));
-            assert!(is_of(benchmark.sizes, &hypothesis), "{id}");
+            assert!(is_of(benchmark.values, &hypothesis), "{id}");
             if matches!(hypothesis, Hypothesis::Geometry | Hypothesis::Silent) {
                 continue;
             }
             for run in 0..20 {
-                let sizes = drawn(id, run);
-                let effect = effect_at_scale(id, &sizes, 1.0, &host()).unwrap_or_else(|| panic!("{id}: {sizes:?}"));
+                let values = drawn(id, run);
+                let effect = effect_at_scale(id, &values, 1.0, &host()).unwrap_or_else(|| panic!("{id}: {values:?}"));
                 assert_eq!(effect.id(), *id);
                 // A size that the effect has under another name makes none.
-                let renamed: Sizes = sizes.iter().map(|(_, size)| ("another", *size)).collect();
-                assert!(sizes.is_empty() || effect_at_scale(id, &renamed, 1.0, &host()).is_none(), "{id}");
+                let renamed: ParameterValues = values.iter().map(|(_, value)| ("another", *value)).collect();
+                assert!(values.is_empty() || effect_at_scale(id, &renamed, 1.0, &host()).is_none(), "{id}");
             }
         }
         let fault = Benchmark::of_fault(|_, _| Vec::new());
-        assert!(!is_of(fault.sizes, &Hypothesis::Silent) && !is_of(fault.sizes, &Hypothesis::Scatter(&[])));
+        assert!(!is_of(fault.values, &Hypothesis::Silent) && !is_of(fault.values, &Hypothesis::Scatter(&[])));
     }
 
     /// Where a step was left by a form: what differs from a step that it does not act on.
@@ -272,13 +272,13 @@ mod tests {
         for id in CATALOGUE {
             let Some(form) = description(id).expect("known").benchmark.other_form else { continue };
             forms += 1;
-            let mut sizes = drawn(id, 0);
-            assert!(departs(&mut *(form.forward)(&sizes, &host())), "{id}");
+            let mut values = drawn(id, 0);
+            assert!(departs(&mut *(form.forward)(&values, &host())), "{id}");
             let variants = hypothesis(id).and_then(Hypothesis::into_variants).expect("a mean");
             for parameter in variants[0].term.parameters() {
-                sizes.iter_mut().filter(|(name, _)| *name == parameter.name).for_each(|(_, size)| *size = 0.0);
+                values.iter_mut().filter(|(name, _)| *name == parameter.name).for_each(|(_, value)| *value = 0.0);
             }
-            assert!(!departs(&mut *(form.forward)(&sizes, &host())), "{id} of no size");
+            assert!(!departs(&mut *(form.forward)(&values, &host())), "{id} of no value");
         }
         assert_eq!(forms, 9);
     }

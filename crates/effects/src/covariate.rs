@@ -44,11 +44,12 @@ impl Channel {
     /// Of the wheels.
     pub const WHEELS: [Self; 3] = [Self::Wheels, Self::LeftWheel, Self::RightWheel];
     /// Of the instrument.
-    pub const SEEN: [Self; 4] = [Self::OffsetAlong, Self::OffsetAcross, Self::OffsetHeading, Self::MeasurementDelay];
+    pub const INSTRUMENT: [Self; 4] =
+        [Self::OffsetAlong, Self::OffsetAcross, Self::OffsetHeading, Self::MeasurementDelay];
 
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
-        Self::MOTION.into_iter().chain(Self::WHEELS).chain(Self::SEEN)
+        Self::MOTION.into_iter().chain(Self::WHEELS).chain(Self::INSTRUMENT)
     }
 
     /// Its name in findings and scenarios.
@@ -70,8 +71,8 @@ impl Channel {
 
     /// Is it what the instrument sees, and not the motion?
     #[must_use]
-    pub fn is_seen(self) -> bool {
-        Self::SEEN.contains(&self)
+    pub fn is_of_instrument(self) -> bool {
+        Self::INSTRUMENT.contains(&self)
     }
 
     /// Is it the way of wheels, each by what it does itself?
@@ -328,9 +329,9 @@ impl Covariate {
             Self::RunTime => at.run_s / 60.0,
             Self::SessionTime => at.session_s / 600.0,
             Self::Way => at.session_m / 100.0,
-            Self::SinceReversal => (-at.since_reversal_m / FADES_M).exp(),
+            Self::SinceReversal => (-at.since_reversal_m / CASTOR_DECAY_M).exp(),
             Self::Curvature if at.omega_rad_s == 0.0 => 0.0,
-            Self::Curvature => at.omega_rad_s / at.omega_rad_s.hypot(at.v_m_s / BEND_M),
+            Self::Curvature => at.omega_rad_s / at.omega_rad_s.hypot(at.v_m_s / CURVATURE_RADIUS_M),
             Self::LastTurn => at.last_turn,
             Self::X => at.x_m,
             Self::Y => at.y_m,
@@ -340,10 +341,10 @@ impl Covariate {
 }
 
 /// Radius at which a bend is half-way, in the square, between straight on and on the spot, metres.
-const BEND_M: f64 = 0.2;
+const CURVATURE_RADIUS_M: f64 = 0.2;
 
 /// Way of the robot since its reversal over which 1/e is left, metres: that of castors.
-const FADES_M: f64 = 0.1;
+const CASTOR_DECAY_M: f64 = 0.1;
 /// Way of a wheel since its reversal over which 1/e is left, metres: that of teeth, keys and tyres.
 const WHEEL_FADES_M: f64 = 2e-3;
 

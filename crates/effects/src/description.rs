@@ -14,7 +14,7 @@ pub struct Description {
     /// their speed".
     pub meaning: &'static str,
     /// How people are told of it with the sizes that a fit found.
-    pub told: Told,
+    pub summary: Summary,
     /// What excites it.
     pub excitation: Excitation,
     /// How a single large error of it looks; `None` where its errors are not single ones.
@@ -32,7 +32,7 @@ impl Description {
     pub(crate) const fn of(meaning: &'static str) -> Self {
         Self {
             meaning,
-            told: Told::AsFound,
+            summary: Summary::Finding,
             excitation: Excitation::Manoeuvres,
             isolated_error: None,
             record_fault: RecordFault::WITH_A_TRACE,
@@ -43,24 +43,24 @@ impl Description {
 
     /// The meaning with sizes; `None` where the finding's own sentence says more.
     #[must_use]
-    pub fn with_sizes(&self, sizes: &Estimates<'_>) -> Option<String> {
-        match self.told {
-            Told::AsFound => None,
-            Told::ByMeaning => Some(self.meaning.to_owned()),
-            Told::WithSizes(told) => Some(told(sizes)),
+    pub fn with_values(&self, values: &Estimates<'_>) -> Option<String> {
+        match self.summary {
+            Summary::Finding => None,
+            Summary::Meaning => Some(self.meaning.to_owned()),
+            Summary::WithValues(summary) => Some(summary(values)),
         }
     }
 }
 
 /// How people are told of an effect that was found.
 #[derive(Clone, Copy)]
-pub enum Told {
+pub enum Summary {
     /// By the finding's own sentence, which says more: what a rewriting undid, or what the checks saw.
-    AsFound,
+    Finding,
     /// By the meaning: the sizes say little to people.
-    ByMeaning,
+    Meaning,
     /// By a sentence with the sizes in it.
-    WithSizes(fn(&Estimates<'_>) -> String),
+    WithValues(fn(&Estimates<'_>) -> String),
 }
 
 /// What excites an effect.
@@ -151,22 +151,23 @@ mod tests {
     /// A sentence with sizes names no size that a fit does not have: it would show a question mark.
     #[test]
     fn sentences_show_the_sizes_that_a_fit_finds() {
-        let mut with_sizes = 0;
+        let mut with_values = 0;
         for id in CATALOGUE {
             let description = description(id).expect("known");
-            let Told::WithSizes(told) = description.told else { continue };
+            let Summary::WithValues(summary) = description.summary else { continue };
             let variants =
                 hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_else(|| panic!("{id} has no sizes"));
-            let parameters = variants.iter().flat_map(|shape| shape.term.parameters().iter().map(|of| of.name));
-            let names = parameters.chain(variants.iter().flat_map(|shape| shape.held.iter().map(|(name, _)| *name)));
-            let sizes: Estimates<'_> =
+            let parameters = variants.iter().flat_map(|variant| variant.term.parameters().iter().map(|of| of.name));
+            let names =
+                parameters.chain(variants.iter().flat_map(|variant| variant.fixed.iter().map(|(name, _)| *name)));
+            let values: Estimates<'_> =
                 names.map(|name| (name, Estimate { value: 0.0125, sigma: Some(1e-3) })).collect();
-            let sentence = told(&sizes);
+            let sentence = summary(&values);
             assert!(!sentence.contains('?') && sentence.contains("± "), "{id}: {sentence}");
-            assert!(told(&Estimates::default()) != sentence, "{id}: it shows no size");
-            with_sizes += 1;
+            assert!(summary(&Estimates::default()) != sentence, "{id}: it shows no size");
+            with_values += 1;
         }
-        assert!(with_sizes >= 15, "{with_sizes}");
+        assert!(with_values >= 15, "{with_values}");
     }
 
     /// Properties of faults are of faults alone, single errors of what scatters alone.

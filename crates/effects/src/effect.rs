@@ -2,7 +2,7 @@
 
 use kinematics::DriveGeometry;
 
-use crate::benchmark::{HostRobot, NamedSize};
+use crate::benchmark::{HostRobot, ParameterValue};
 use crate::description::Description;
 use crate::forward::Forward;
 use crate::hypothesis::Hypothesis;
@@ -44,23 +44,29 @@ impl EffectError {
     }
 
     /// An error unless every value is finite.
-    pub(crate) fn unless_finite<const N: usize>(id: &'static str, sizes: [(&'static str, f64); N]) -> Result<(), Self> {
-        sizes.into_iter().try_for_each(|(name, value)| Self::unless(value.is_finite(), id, name, value, "finite"))
+    pub(crate) fn unless_finite<const N: usize>(
+        id: &'static str,
+        values: [(&'static str, f64); N],
+    ) -> Result<(), Self> {
+        values.into_iter().try_for_each(|(name, value)| Self::unless(value.is_finite(), id, name, value, "finite"))
     }
 
     /// An error unless every value is finite and 0 or more.
-    pub(crate) fn unless_sizes<const N: usize>(id: &'static str, sizes: [(&'static str, f64); N]) -> Result<(), Self> {
+    pub(crate) fn unless_negative<const N: usize>(
+        id: &'static str,
+        values: [(&'static str, f64); N],
+    ) -> Result<(), Self> {
         let holds = |value: f64| value.is_finite() && value >= 0.0;
-        sizes.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "0 or more"))
+        values.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "0 or more"))
     }
 
     /// An error unless every value is finite and positive.
     pub(crate) fn unless_positive<const N: usize>(
         id: &'static str,
-        sizes: [(&'static str, f64); N],
+        values: [(&'static str, f64); N],
     ) -> Result<(), Self> {
         let holds = |value: f64| value.is_finite() && value > 0.0;
-        sizes.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "positive"))
+        values.into_iter().try_for_each(|(name, value)| Self::unless(holds(value), id, name, value, "positive"))
     }
 }
 
@@ -107,22 +113,22 @@ pub trait PhysicalEffect {
         Self: Sized;
 
     /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make one.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self>
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self>
     where
         Self: Sized,
     {
-        let _ = sizes;
+        let _ = values;
         None
     }
 
     /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is another
     /// than [`Self::from_estimates`] makes of them.
-    fn at_scale(sizes: &[NamedSize], scale: f64, robot: &HostRobot) -> Option<Self>
+    fn at_scale(values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Self>
     where
         Self: Sized,
     {
         let _ = (scale, robot);
-        Self::from_estimates(sizes)
+        Self::from_estimates(values)
     }
 
     /// The effect without any harm, for records that have what it needs though it is not hidden: so such

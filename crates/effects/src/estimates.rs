@@ -25,18 +25,18 @@ impl Estimate {
 pub struct Estimates<'n>(BTreeMap<&'n str, Estimate>);
 
 impl<'n> FromIterator<(&'n str, Estimate)> for Estimates<'n> {
-    fn from_iter<I: IntoIterator<Item = (&'n str, Estimate)>>(sizes: I) -> Self {
-        Self(sizes.into_iter().collect())
+    fn from_iter<I: IntoIterator<Item = (&'n str, Estimate)>>(values: I) -> Self {
+        Self(values.into_iter().collect())
     }
 }
 
 impl Estimates<'_> {
-    /// The value of a size.
+    /// The value of a amplitude.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.0.get(name).map(|estimate| estimate.value)
     }
 
-    /// A size times a scale, in the unit shown; a question mark where it is not known.
+    /// A amplitude times a scale, in the unit shown; a question mark where it is not known.
     pub(crate) fn shown(&self, name: &str, scale: f64, unit: &str) -> String {
         self.0.get(name).map_or_else(|| "?".to_owned(), |estimate| estimate.shown(scale, unit))
     }
@@ -47,14 +47,15 @@ impl Estimates<'_> {
         let side = |side: &str| -> Option<(f64, String)> {
             let of = |part: &str| self.0.get(&format!("{side}_{part}{suffix}")[..]);
             let (sin, cos) = (of("sin")?, of("cos")?);
-            let size = sin.value.hypot(cos.value);
+            let amplitude = sin.value.hypot(cos.value);
             let sigma = sin
                 .sigma
                 .zip(cos.sigma)
-                .map(|(a, b)| ((sin.value * a).hypot(cos.value * b)) / size.max(f64::MIN_POSITIVE));
-            let shows = sigma.is_none_or(|sigma| size > 3.0 * sigma);
-            let text = format!("the {side} {what} by {}", plus_minus(scale * size, sigma.map(|s| s * scale), unit));
-            shows.then_some((size, text))
+                .map(|(a, b)| ((sin.value * a).hypot(cos.value * b)) / amplitude.max(f64::MIN_POSITIVE));
+            let shows = sigma.is_none_or(|sigma| amplitude > 3.0 * sigma);
+            let text =
+                format!("the {side} {what} by {}", plus_minus(scale * amplitude, sigma.map(|s| s * scale), unit));
+            shows.then_some((amplitude, text))
         };
         let mut sides: Vec<(f64, String)> = ["left", "right"].into_iter().filter_map(side).collect();
         sides.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -104,8 +105,8 @@ mod tests {
     #[test]
     fn only_a_significant_amplitude_is_shown() {
         let of = |value: f64| Estimate { value, sigma: Some(1.2e-3) };
-        let sizes = [("left_sin", 3e-3), ("left_cos", 4e-3), ("right_sin", 1e-3), ("right_cos", 2e-3)];
-        let estimates: Estimates<'_> = sizes.map(|(name, value)| (name, of(value))).into_iter().collect();
+        let values = [("left_sin", 3e-3), ("left_cos", 4e-3), ("right_sin", 1e-3), ("right_cos", 2e-3)];
+        let estimates: Estimates<'_> = values.map(|(name, value)| (name, of(value))).into_iter().collect();
         assert_eq!(estimates.amplitudes("", 1e3, "‰", "radius varies"), "the left radius varies by 5.0 ± 1.2 ‰");
         assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one cannot be told");
         assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.2 mm");

@@ -27,7 +27,7 @@ pub enum Hypothesis {
 /// A mean term with its shape parameters held.
 pub struct Variant {
     /// What is held, by the name in the effect's simulation model where that has it.
-    pub held: Vec<(&'static str, f64)>,
+    pub fixed: Vec<(&'static str, f64)>,
     /// The term.
     pub term: Box<dyn ModelTerm>,
     /// The term at any other value of what is held, where that is one continuous number.
@@ -58,26 +58,26 @@ impl Variant {
     /// A term without shape parameters.
     #[must_use]
     pub fn plain(term: impl ModelTerm + 'static) -> Vec<Self> {
-        vec![Self { held: Vec::new(), term: Box::new(term), at: None }]
+        vec![Self { fixed: Vec::new(), term: Box::new(term), at: None }]
     }
 
     /// A term at each of several values of one shape parameter, which is a number of things.
     #[must_use]
     pub fn over<T: ModelTerm + 'static>(name: &'static str, values: &[f64], term: impl Fn(f64) -> T) -> Vec<Self> {
-        values.iter().map(|&value| Self { held: vec![(name, value)], term: Box::new(term(value)), at: None }).collect()
+        values.iter().map(|&value| Self { fixed: vec![(name, value)], term: Box::new(term(value)), at: None }).collect()
     }
 
     /// A term at each of several values of one positive shape parameter, between which it may be anything.
     #[must_use]
     pub fn along(name: &'static str, values: &[f64], at: fn(f64) -> Box<dyn ModelTerm>) -> Vec<Self> {
-        values.iter().map(|&value| Self { held: vec![(name, value)], term: at(value), at: Some(at) }).collect()
+        values.iter().map(|&value| Self { fixed: vec![(name, value)], term: at(value), at: Some(at) }).collect()
     }
 }
 
 /// Records without a fault.
 pub struct RecordCorrection {
     /// The parameters of the fault that it undoes: names and values.
-    pub sizes: Vec<(&'static str, f64)>,
+    pub values: Vec<(&'static str, f64)>,
     /// What the fault was, for people: "the left and the right counter are swapped".
     pub sentence: String,
     /// Whether the log itself shows the fault, whatever an instrument saw.
@@ -87,8 +87,8 @@ pub struct RecordCorrection {
 }
 
 /// A size by its name.
-pub(crate) fn size(sizes: &[(&str, f64)], name: &str) -> Option<f64> {
-    sizes.iter().find(|(of, _)| *of == name).map(|(_, size)| *size)
+pub(crate) fn value_of(values: &[(&str, f64)], name: &str) -> Option<f64> {
+    values.iter().find(|(of, _)| *of == name).map(|(_, value)| *value)
 }
 
 /// A motion in the room, metres along its axes, along and across the middle of an interval.

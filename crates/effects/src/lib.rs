@@ -22,9 +22,9 @@ mod sampling_period;
 mod stream;
 mod term;
 
-pub use benchmark::{Benchmark, FormOf, HostRobot, NamedSize, Needs, OtherForm, SizeLaw, Sizes};
+pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
 pub use covariate::{Channel, Covariate};
-pub use description::{Description, Excitation, IsolatedError, RecordFault, Told};
+pub use description::{Description, Excitation, IsolatedError, RecordFault, Summary};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
 pub use forward::{Command, Forward, Hooks, PoseReading, Readout, RunStart, SampleClock, Step};
@@ -125,9 +125,9 @@ macro_rules! contents {
 
         /// The effect of an id with the sizes that a fit found; `None` when they do not make a physical one.
         #[must_use]
-        pub fn effect_from_estimates(id: &str, sizes: &[(&str, f64)]) -> Option<Effect> {
+        pub fn effect_from_estimates(id: &str, values: &[(&str, f64)]) -> Option<Effect> {
             match id {
-                $(stringify!($module) => <$Type as PhysicalEffect>::from_estimates(sizes).map(Effect::$Type),)*
+                $(stringify!($module) => <$Type as PhysicalEffect>::from_estimates(values).map(Effect::$Type),)*
                 _ => None,
             }
             .filter(|effect: &Effect| effect.physical().check().is_ok())
@@ -135,9 +135,9 @@ macro_rules! contents {
 
         /// The effect of an id with sizes that the blind benchmark drew, at a scale in a robot; `None` when they do not make a physical one.
         #[must_use]
-        pub fn effect_at_scale(id: &str, sizes: &[NamedSize], scale: f64, robot: &HostRobot) -> Option<Effect> {
+        pub fn effect_at_scale(id: &str, values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Effect> {
             match id {
-                $(stringify!($module) => <$Type as PhysicalEffect>::at_scale(sizes, scale, robot).map(Effect::$Type),)*
+                $(stringify!($module) => <$Type as PhysicalEffect>::at_scale(values, scale, robot).map(Effect::$Type),)*
                 _ => None,
             }
             .filter(|effect: &Effect| effect.physical().check().is_ok())

@@ -3,13 +3,13 @@
 /// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by, a beat.
 const MIN_ROWS: usize = 24;
 /// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
-const MEMORY_ROWS: f64 = 500.0;
+const FORGETTING_ROWS: f64 = 500.0;
 /// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with a row lost in it, hardly one as short.
-const ONE_BEAT: f64 = 1.7;
+const MAX_ONE_PERIOD: f64 = 1.7;
 /// Nor as short as this: such a row came by itself, at a standstill.
-const NO_BEAT: f64 = 0.3;
+const MIN_ONE_PERIOD: f64 = 0.3;
 /// A row that is farther from its beat than this share of it has missed it.
-const MISSED: f64 = 0.45;
+const MISSED_PHASE: f64 = 0.45;
 /// After so many in a row the log keeps another beat.
 const MAX_MISSED: u32 = 3;
 
@@ -43,7 +43,7 @@ impl SamplingPeriodEstimator {
     /// Takes a row of the beat, by Welford's recursion.
     fn add(&mut self, sampling_period: f64, time_s: f64) {
         self.last = sampling_period;
-        let keeps = 1.0 - 1.0 / MEMORY_ROWS;
+        let keeps = 1.0 - 1.0 / FORGETTING_ROWS;
         self.rows = keeps * self.rows + 1.0;
         let off = [sampling_period - self.mean[0], time_s - self.mean[1]];
         for (mean, off) in self.mean.iter_mut().zip(off) {
@@ -70,8 +70,8 @@ impl SamplingPeriodEstimator {
         self.add(sampling_period, last_s);
         for &row_s in &rows_s[1..] {
             let gap = (row_s - last_s) / between_s;
-            if gap > NO_BEAT {
-                sampling_period += if gap < ONE_BEAT { 1.0 } else { gap.round() };
+            if gap > MIN_ONE_PERIOD {
+                sampling_period += if gap < MAX_ONE_PERIOD { 1.0 } else { gap.round() };
                 last_s = row_s;
                 self.add(sampling_period, row_s);
             }
@@ -90,7 +90,7 @@ impl SamplingPeriodEstimator {
             return; // It came by itself, at a standstill.
         }
         let late_s = row_s - zero_s - sampling_period * between_s;
-        if late_s.abs() > MISSED * between_s {
+        if late_s.abs() > MISSED_PHASE * between_s {
             self.missed += 1;
             if self.missed >= MAX_MISSED {
                 *self = Self { late_s: self.late_s, ..Self::default() };

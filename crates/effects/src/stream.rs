@@ -143,16 +143,16 @@ static HALF_WIDTHS: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(|| {
         if layer == LAYERS {
             return 0.0;
         }
-        let mut word = SameWord((U + 3.0).to_bits() << 12 | layer as u64);
+        let mut word = ConstantWord((U + 3.0).to_bits() << 12 | layer as u64);
         let drawn: f64 = StandardNormal.sample(&mut word);
         drawn / U
     })
 });
 
 /// A generator of one word for ever.
-struct SameWord(u64);
+struct ConstantWord(u64);
 
-impl TryRng for SameWord {
+impl TryRng for ConstantWord {
     type Error = Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {

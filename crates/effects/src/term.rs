@@ -40,9 +40,9 @@ impl Sparse {
     #[must_use]
     pub fn term(&self) -> Box<dyn ModelTerm> {
         if self.is_of_rows()
-            && let Some(shape) = IntervalError::hypothesis().into_variants().and_then(|mut variants| variants.pop())
+            && let Some(variant) = IntervalError::hypothesis().into_variants().and_then(|mut variants| variants.pop())
         {
-            return Box::new(OfRows { of: shape.term, own: [parameter(self)] });
+            return Box::new(OfRows { of: variant.term, own: [parameter(self)] });
         }
         Box::new(Recorded::new(self))
     }
@@ -114,13 +114,13 @@ impl SparseTerm {
             return no_term(format!("\"{rows}\" goes with the channel wheels and \"{wheel}\" alone"));
         }
         let covariates = &sparse.covariates;
-        let (what, holds) = if self.channel.is_seen() {
+        let (what, holds) = if self.channel.is_of_instrument() {
             ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
         } else {
             ("must vanish at standstill and needs one of these", covariates.iter().any(Covariate::vanishes_at_rest))
         };
         if !holds {
-            let fits = |covariate: &&Covariate| match self.channel.is_seen() {
+            let fits = |covariate: &&Covariate| match self.channel.is_of_instrument() {
                 true => covariate.is_of_a_look(),
                 false => covariate.vanishes_at_rest() && (of_wheels || !covariate.is_of_a_wheel()),
             };
@@ -142,7 +142,7 @@ impl SparseTerm {
     #[must_use]
     pub(crate) fn shown(&self) -> Option<Hypothesis> {
         let term = self.sparse().ok()?.term();
-        Some(Hypothesis::Terms(vec![Variant { held: Vec::new(), term, at: None }]))
+        Some(Hypothesis::Terms(vec![Variant { fixed: Vec::new(), term, at: None }]))
     }
 }
 
@@ -161,7 +161,7 @@ impl PhysicalEffect for SparseTerm {
         if sparse.is_of_rows() {
             // Rows are of unlike length where stamps are irregular, and it shows in no others.
             let irregular =
-                IntervalError { share: self.coefficient / ROW_SHARE, jitter_s: IntervalError::USUAL_JITTER_S };
+                IntervalError { share: self.coefficient / ROW_SHARE, jitter_s: IntervalError::TYPICAL_JITTER_S };
             return if self.coefficient == 0.0 { None } else { irregular.forward() };
         }
         Some(Box::new(State {
@@ -201,7 +201,7 @@ struct State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { on_run_start: true, floor: true, instrument: self.sparse.channel.is_seen(), ..Hooks::NONE }
+        Hooks { on_run_start: true, floor: true, instrument: self.sparse.channel.is_of_instrument(), ..Hooks::NONE }
     }
 
     fn on_run_start(&mut self, run: &mut RunStart<'_>) {
@@ -209,8 +209,8 @@ impl Forward for State {
         (self.memory, self.speeds) = (MotionHistoryTracker::NONE, (0.0, 0.0));
         for (key, values) in &self.size.of_runs {
             let value = values[run.number as usize % values.len()];
-            let said = *run.info.covariates.entry(key.clone()).or_insert(value);
-            self.of_run.insert(key.clone(), said);
+            let predicted = *run.info.covariates.entry(key.clone()).or_insert(value);
+            self.of_run.insert(key.clone(), predicted);
         }
     }
 
@@ -222,7 +222,7 @@ impl Forward for State {
         let wheel_m_s2 = step.radius_m.zip_with(step.acceleration_rad_s2, |radius_m, rate| radius_m * rate);
         let (v_m_s, omega_rad_s) = (mean(wheel_m_s), turn(wheel_m_s));
         self.speeds = (v_m_s, omega_rad_s);
-        if self.sparse.channel.is_seen() {
+        if self.sparse.channel.is_of_instrument() {
             return;
         }
         let half_s = 0.5 * step.dt_s;
@@ -276,9 +276,9 @@ impl Forward for State {
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
-        let is_exact = |covariate: &Covariate| match (self.sparse.channel.is_seen(), covariate) {
+        let is_exact = |covariate: &Covariate| match (self.sparse.channel.is_of_instrument(), covariate) {
             (true, Covariate::CosHeading | Covariate::SinHeading) | (false, Covariate::OfRun { .. }) => true,
-            (is_seen, covariate) => !is_seen && covariate.is_a_speed(),
+            (is_of_instrument, covariate) => !is_of_instrument && covariate.is_a_speed(),
         };
         let exact = self.sparse.covariates.iter().all(is_exact);
         (!exact).then_some("what it goes with changes within a motion")

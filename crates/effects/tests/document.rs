@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use effects::{
-    Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError, SizeLaw,
-    Sizes, StreamName, description, hypothesis,
+    Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError,
+    ParameterLaw, ParameterValues, StreamName, description, hypothesis,
 };
 use model_term::TermParameter;
 
@@ -136,25 +136,25 @@ fn words(name: &str) -> String {
 
 /// The fitted sizes of a hypothesis with what is large and its unit, and its shape parameter with the values
 /// that are tried.
-fn sizes(id: &str) -> (Vec<TermParameter>, Sizes) {
+fn values(id: &str) -> (Vec<TermParameter>, ParameterValues) {
     let variants = hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_default();
     let mut fitted: Vec<TermParameter> = Vec::new();
-    for parameter in variants.iter().flat_map(|shape| shape.term.parameters()) {
+    for parameter in variants.iter().flat_map(|variant| variant.term.parameters()) {
         if fitted.iter().all(|known| known.name != parameter.name) {
             fitted.push(*parameter);
         }
     }
-    (fitted, variants.iter().flat_map(|shape| shape.held.clone()).collect())
+    (fitted, variants.iter().flat_map(|variant| variant.fixed.clone()).collect())
 }
 
 /// The meaning with all sizes large, the phases of periodic ones at zero.
 fn meaning(id: &str, description: &Description) -> String {
-    let (fitted, tried) = sizes(id);
+    let (fitted, tried) = values(id);
     let large = fitted.iter().map(|of| (of.name, if of.name.contains("cos") { 0.0 } else { of.prior_sigma }));
-    let held = tried.get(tried.len() / 2).copied();
+    let fixed = tried.get(tried.len() / 2).copied();
     let estimate = |(name, value)| (name, Estimate { value, sigma: None });
-    let estimates: Estimates<'_> = large.chain(held).map(estimate).collect();
-    description.with_sizes(&estimates).unwrap_or_else(|| description.meaning.to_owned())
+    let estimates: Estimates<'_> = large.chain(fixed).map(estimate).collect();
+    description.with_values(&estimates).unwrap_or_else(|| description.meaning.to_owned())
 }
 
 fn isolated_error(of: IsolatedError) -> &'static str {
@@ -181,16 +181,16 @@ fn benchmark(id: &str, description: &Description) -> Option<String> {
         payload_kg: vec![0.0, 5.0],
         jitter_s: 0.005,
     };
-    let law = match (hypothesis(id)?, benchmark.sizes) {
+    let law = match (hypothesis(id)?, benchmark.values) {
         (Hypothesis::Geometry | Hypothesis::Silent, _) => return None,
-        (_, SizeLaw::Direction { .. }) if benchmark.max_scale == 1.0 => "up to a large size".to_owned(),
-        (_, SizeLaw::Direction { .. }) => format!("up to {} times a large size", number(benchmark.max_scale)),
-        (_, SizeLaw::Scatter(law)) => {
+        (_, ParameterLaw::Direction { .. }) if benchmark.max_scale == 1.0 => "up to a large size".to_owned(),
+        (_, ParameterLaw::Direction { .. }) => format!("up to {} times a large size", number(benchmark.max_scale)),
+        (_, ParameterLaw::Scatter(law)) => {
             let (scaled, _) = law(&host, &mut stream);
             let scaled = scaled.iter().map(|(name, size)| format!("`{name}` {}", number(*size))).collect::<Vec<_>>();
             format!("{} at scale 1; scales up to {}", scaled.join(", "), number(benchmark.max_scale))
         }
-        (_, SizeLaw::Fault(law)) => {
+        (_, ParameterLaw::Fault(law)) => {
             let drawn = law(kinematics::Wheels::both(true), &mut stream);
             format!("{} drawn", listed(drawn.iter().map(|(name, _)| name)))
         }
@@ -208,7 +208,7 @@ fn section(id: &str, source: &str) -> Result<String, String> {
     if let Excitation::Conditions(how) = description.excitation {
         add("Excited by", format!("other conditions than what is driven: {how}."));
     }
-    let (fitted, tried) = sizes(id);
+    let (fitted, tried) = values(id);
     if !fitted.is_empty() {
         let each = fitted.iter().map(|of| format!("`{}` ({})", of.name, with_unit(of.prior_sigma, of.unit)));
         let reason =
@@ -308,6 +308,6 @@ fn a_header_without_a_part_or_with_one_twice_is_rejected() {
     }
     assert!(header("another", &whole).is_err());
     // Sizes that nobody says why they are large.
-    let id = CATALOGUE.iter().find(|id| !sizes(id).0.is_empty()).expect("a mean term");
+    let id = CATALOGUE.iter().find(|id| !values(id).0.is_empty()).expect("a mean term");
     assert!(section(id, &source(id).replace(LARGE, "")).is_err_and(|problem| problem.contains(LARGE)));
 }

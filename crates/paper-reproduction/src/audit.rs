@@ -22,7 +22,8 @@ pub struct Finding {
     /// What follows from the paper's other numbers.
     pub derived: String,
     /// How far apart they are, and in what unit; `None` where it is no matter of size.
-    pub apart: Option<(f64, &'static str)>,
+    #[serde(rename = "apart")]
+    pub separation: Option<(f64, &'static str)>,
     /// What it means.
     pub meaning: String,
 }
@@ -86,7 +87,7 @@ fn printed_sigmas() -> Finding {
             "table 1: σ_L {left}, σ_R {right}; doubled and rounded {} and {}",
             doubled.left, doubled.right
         ),
-        apart: Some((sigma.right / right, "times table 1's σ_R")),
+        separation: Some((sigma.right / right, "times table 1's σ_R")),
         meaning: verdict.to_owned(),
     }
 }
@@ -106,7 +107,7 @@ fn umbmark_base(base: &Scenario, table_2: &Table2) -> Result<Finding, Simulation
             "from the direct parameters, noise-free: C_L {:.5}, C_R {:.5}, B {base_mm:.2} mm (y form: {base_y_mm:.2} mm)",
             sensitivity.left, sensitivity.right
         ),
-        apart: away,
+        separation: away,
         meaning: format!(
             "a scale error of 3.3 % turns every corner 3.3 % too far, and UMBmark must read a short wheelbase; the paper measured {:.1} mm more than its own \
              parameters predict",
@@ -130,7 +131,7 @@ fn umbmark_ratio(table_2: &Table2) -> Finding {
         derived: format!(
             "table 1: {direct:.5} ± {error:.5} (standard errors of its means); UMBmark's own simulated scatter is {own:.5}"
         ),
-        apart: Some(((direct - measured) / error, "standard errors of table 1's means")),
+        separation: Some(((direct - measured) / error, "standard errors of table 1's means")),
         meaning: format!(
             "with UMBmark's scatter joined the two are {:.1} standard deviations apart",
             (direct - measured) / error.hypot(own)
@@ -154,7 +155,7 @@ fn clockwise_spins(base: &Scenario) -> Finding {
         derived: format!(
             "a spin 3.3 % too far gives B = {counter_clockwise_mm:.1} mm counter-clockwise and {clockwise_mm:.1} mm clockwise"
         ),
-        apart: Some((clockwise_mm - counter_clockwise_mm, "mm")),
+        separation: Some((clockwise_mm - counter_clockwise_mm, "mm")),
         meaning:
             "clockwise it is −2π + asin[…]; with signed counts and angles B = (C_R ΔN_R − C_L ΔN_L)/θ holds for both"
                 .to_owned(),
@@ -168,7 +169,7 @@ fn folding_arcsine() -> Finding {
         id: "folding_arcsine",
         printed: "Δθ = asin[…]/(d+m1+m2)² (eq. 8, 14)".to_owned(),
         derived: format!("a residual turn of 100° comes out as {folded_deg:.1}°"),
-        apart: Some((100.0 - folded_deg, "degrees at 100°")),
+        separation: Some((100.0 - folded_deg, "degrees at 100°")),
         meaning: "the two-argument arctangent of cross and dot product does not fold, and needs no m1+m2+d".to_owned(),
     }
 }
@@ -187,7 +188,7 @@ fn unsigned_chords(base: &Scenario) -> Finding {
         id: "unsigned_chords_of_eq_6",
         printed: "S_L = L_L/sinc(Δθ/2) + m2 Δθ with a length L_L (eq. 6)".to_owned(),
         derived: format!("backward, with m2 = {:.0} mm, C_L comes out {percent:+.3} % off", outside_m * MM_PER_M),
-        apart: Some((percent, "%")),
+        separation: Some((percent, "%")),
         meaning: "the chord must carry the sign of the direction of travel".to_owned(),
     }
 }
@@ -212,7 +213,7 @@ fn runs_before_rejection() -> Finding {
             "if both wheels lose the same share by chance, {best} runs with {share:.1} % rejected make it likeliest; {low} to {high} runs are within 2 of it in \
              log likelihood"
         ),
-        apart: None,
+        separation: None,
         meaning: "a rule that cuts at 3.5 robust standard deviations takes about 0.05 % of normal values: what was rejected were real outliers".to_owned(),
     }
 }
@@ -232,7 +233,7 @@ fn pulses_of_a_turn(base: &Scenario) -> Finding {
             "{circumference_mm:.2} pulses a turn; with 500 the nominal would be {:.4} mm/pulse",
             circumference_mm / 500.0
         ),
-        apart: None,
+        separation: None,
         meaning:
             "the pulse is a rounded number of finer counts: at 1 mm a count the controller could not command the speeds"
                 .to_owned(),

@@ -47,7 +47,7 @@ pub enum Extension {
 }
 
 /// Name, what it says, the unit of its size, and the sizes that are physically plausible with the reason.
-struct Words {
+struct Description {
     says: &'static str,
     unit: &'static str,
     scale: f64,
@@ -66,8 +66,8 @@ impl Extension {
         Self::ScaleOnSquares,
     ];
 
-    fn words(self) -> Words {
-        let words = |says, unit, scale, prior_sigma, because| Words { says, unit, scale, prior_sigma, because };
+    fn words(self) -> Description {
+        let words = |says, unit, scale, prior_sigma, because| Description { says, unit, scale, prior_sigma, because };
         match self {
             Self::None => words("the paper's model as it stands", "", 1.0, (0.0, 0.0), "nothing is assumed"),
             Self::CornerWheelbase => words(
@@ -151,7 +151,8 @@ pub struct Experiment {
     /// What each extension of [`Causes::fitted`] predicts, in their order.
     pub predicts: Vec<f64>,
     /// Smallest difference between two extensions that fit equally well, in standard deviations.
-    pub tells_apart: f64,
+    #[serde(rename = "tells_apart")]
+    pub discriminates_by: f64,
 }
 
 /// What could reconcile the paper's numbers.
@@ -164,7 +165,8 @@ pub struct Causes {
     /// Each extension, fitted.
     pub fitted: Vec<Fitted>,
     /// Extensions whose misfit is within a likelihood ratio of 20 of the best: the published numbers cannot tell these apart.
-    pub not_told_apart: Vec<Extension>,
+    #[serde(rename = "not_told_apart")]
+    pub not_discriminated: Vec<Extension>,
     /// Further measurements on the robot, the one that tells most first.
     pub experiments: Vec<Experiment>,
 }
@@ -377,7 +379,7 @@ pub fn causes(base: &Scenario, table_2: &Table2, reading_sigma_m: f64) -> Result
         .map(|extension| fit(base, *extension, &published, &sigma))
         .collect::<Result<Vec<_>, _>>()?;
     let best = fitted.iter().map(|fitted| fitted.misfit).fold(f64::INFINITY, f64::min);
-    let not_told_apart: Vec<Extension> = fitted
+    let not_discriminated: Vec<Extension> = fitted
         .iter()
         .filter(|fitted| fitted.misfit - best < DISCRIMINATION_LEVEL)
         .map(|fitted| fitted.extension)
@@ -389,13 +391,13 @@ pub fn causes(base: &Scenario, table_2: &Table2, reading_sigma_m: f64) -> Result
         let group: Vec<f64> = fitted
             .iter()
             .zip(&predicts)
-            .filter(|(fitted, _)| not_told_apart.contains(&fitted.extension))
+            .filter(|(fitted, _)| not_discriminated.contains(&fitted.extension))
             .map(|(_, predicts)| *predicts)
             .collect();
-        let mut tells_apart = f64::INFINITY;
+        let mut discriminates_by = f64::INFINITY;
         for (k, a) in group.iter().enumerate() {
             for b in &group[..k] {
-                tells_apart = tells_apart.min((a - b).abs() / candidate.sigma);
+                discriminates_by = discriminates_by.min((a - b).abs() / candidate.sigma);
             }
         }
         experiments.push(Experiment {
@@ -403,11 +405,11 @@ pub fn causes(base: &Scenario, table_2: &Table2, reading_sigma_m: f64) -> Result
             shows: candidate.shows,
             sigma: candidate.sigma,
             predicts,
-            tells_apart,
+            discriminates_by,
         });
     }
-    experiments.sort_by(|a, b| b.tells_apart.total_cmp(&a.tells_apart));
-    Ok(Causes { published, sigma, fitted, not_told_apart, experiments })
+    experiments.sort_by(|a, b| b.discriminates_by.total_cmp(&a.discriminates_by));
+    Ok(Causes { published, sigma, fitted, not_discriminated, experiments })
 }
 
 struct Candidate {

@@ -238,7 +238,7 @@ impl Reproduction {
                 experiment.shows,
                 experiment.sigma,
                 predicts.join(" | "),
-                experiment.tells_apart
+                experiment.discriminates_by
             )?;
         }
         writeln!(
@@ -258,7 +258,7 @@ impl Reproduction {
                 finding.printed,
                 finding.derived
             )?;
-            if let Some((size, unit)) = finding.apart {
+            if let Some((size, unit)) = finding.separation {
                 let decimals = if size.abs() < 1.0 { 3 } else { 1 };
                 writeln!(page, "  Apart by {size:.decimals$} {unit}.")?;
             }
@@ -276,7 +276,7 @@ impl Causes {
         let prior_sigma: Vec<Extension> = self
             .fitted
             .iter()
-            .filter(|fitted| fitted.prior_sigma && self.not_told_apart.contains(&fitted.extension))
+            .filter(|fitted| fitted.prior_sigma && self.not_discriminated.contains(&fitted.extension))
             .map(|fitted| fitted.extension)
             .collect();
         let of_these = match prior_sigma.as_slice() {
@@ -284,7 +284,7 @@ impl Causes {
             [one] => format!("Of these only **{}** has a plausible size.", spoken(*one)),
             several => format!("Of these {} have a plausible size.", names(several)),
         };
-        format!("The published numbers alone cannot tell apart: {}. {of_these}", names(&self.not_told_apart))
+        format!("The published numbers alone cannot tell apart: {}. {of_these}", names(&self.not_discriminated))
     }
 }
 

@@ -5,12 +5,12 @@ use effects::{Command, Forward, PoseReading, Readout, RunStart, SampleClock, Ste
 /// Effects in the order in which they act.
 pub(crate) struct ActiveEffects {
     effects: Vec<(StreamName, Box<dyn Forward>)>,
-    at: Roster,
+    at: HookIndex,
 }
 
 /// Who acts at which hook: positions, in order.
 #[derive(Debug, Default)]
-struct Roster {
+struct HookIndex {
     on_run_start: Vec<usize>,
     seed_run: Vec<usize>,
     start_motion: Vec<usize>,
@@ -42,7 +42,7 @@ macro_rules! calls {
 impl ActiveEffects {
     /// Effects by the names of their streams.
     pub(crate) fn new(effects: Vec<(StreamName, Box<dyn Forward>)>) -> Self {
-        let mut at = Roster::default();
+        let mut at = HookIndex::default();
         for (position, (_, effect)) in effects.iter().enumerate() {
             let hooks = effect.hooks();
             for (acts, roster) in [

@@ -33,9 +33,9 @@ pub(crate) enum Actuator {
 impl Actuator {
     /// Starts a piece of a motion, which only the closed form has.
     #[inline]
-    pub(crate) fn begin_piece(&mut self, piece: Piece) {
+    pub(crate) fn begin_segment(&mut self, segment: RateSegment) {
         if let Self::ClosedForm(drive) = self {
-            drive.begin(piece);
+            drive.begin(segment);
         }
     }
 
@@ -43,8 +43,8 @@ impl Actuator {
     pub(crate) fn hold(&mut self, duration_s: f64) {
         match self {
             Self::ClosedForm(drive) => {
-                if let Some(piece) = Piece::at_rest(duration_s) {
-                    drive.begin(piece);
+                if let Some(segment) = RateSegment::at_rest(duration_s) {
+                    drive.begin(segment);
                 }
             }
             Self::Stepping(pair) => {
@@ -127,9 +127,9 @@ impl ConstantSpeed {
         Self { counts_per_rad, counts: start_counts, rate_rad_s, remaining_s: 0.0 }
     }
 
-    const fn begin(&mut self, piece: Piece) {
-        self.rate_rad_s = piece.rate_rad_s;
-        self.remaining_s = piece.duration_s;
+    const fn begin(&mut self, segment: RateSegment) {
+        self.rate_rad_s = segment.rate_rad_s;
+        self.remaining_s = segment.duration_s;
     }
 
     #[inline]
@@ -144,9 +144,9 @@ impl ConstantSpeed {
 
     /// Turns the shafts for a whole piece.
     #[inline]
-    pub(crate) fn whole(&mut self, piece: Piece) -> ShaftMotion {
-        self.begin(piece);
-        self.turn(piece.duration_s)
+    pub(crate) fn whole(&mut self, segment: RateSegment) -> ShaftMotion {
+        self.begin(segment);
+        self.turn(segment.duration_s)
     }
 
     #[inline]
@@ -171,7 +171,7 @@ pub(crate) struct Profile {
     ramp_counts_s2: Option<f64>,
 }
 
-const MAX_PIECES: usize = 5;
+const MAX_SEGMENTS: usize = 5;
 
 /// Nodes of the two-point Gauss–Legendre rule on [0, 1]: ½ ∓ 1/(2√3).
 const GAUSS_NODES: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
@@ -191,18 +191,18 @@ impl Profile {
 
     /// The pieces of a motion. `seen` is the share of a shaft's turn that its counter sees at a given rate: a controller drives *counts* to the target,
     /// so that a counter that misses some makes the wheel go farther.
-    pub(crate) fn pieces(&self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> Pieces {
+    pub(crate) fn segments(&self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> RateSegments {
         let travel = command.travel_counts;
         let speed = command.speed_counts_s.left.max(command.speed_counts_s.right);
         let longest = travel.left.abs().max(travel.right.abs());
-        let mut pieces = Pieces::default();
+        let mut segments = RateSegments::default();
         if longest <= 0.0 {
-            return pieces;
+            return segments;
         }
         let mut push = |speed: f64, duration_s: f64| {
             if duration_s > 0.0 {
                 let counted_rad_s = travel.map(|counts| counts / longest * speed / self.counts_per_rad);
-                pieces.push(Piece { rate_rad_s: shaft_rate(counted_rad_s, &mut seen), duration_s });
+                segments.push(RateSegment { rate_rad_s: shaft_rate(counted_rad_s, &mut seen), duration_s });
             }
         };
         match self.ramp_counts_s2 {
@@ -218,18 +218,18 @@ impl Profile {
                 push(slow * peak, 0.5 * ramp_s);
             }
         }
-        pieces
+        segments
     }
 }
 
 /// Constant rates for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Piece {
+pub(crate) struct RateSegment {
     rate_rad_s: Wheels<f64>,
     pub(crate) duration_s: f64,
 }
 
-impl Piece {
+impl RateSegment {
     /// Standing still, if only for a while.
     pub(crate) fn at_rest(duration_s: f64) -> Option<Self> {
         (duration_s > 0.0).then_some(Self { rate_rad_s: Wheels { left: 0.0, right: 0.0 }, duration_s })
@@ -238,26 +238,26 @@ impl Piece {
 
 /// A motion in pieces of constant speed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pieces {
-    pieces: [Piece; MAX_PIECES],
+pub(crate) struct RateSegments {
+    segments: [RateSegment; MAX_SEGMENTS],
     count: usize,
 }
 
-impl Default for Pieces {
+impl Default for RateSegments {
     fn default() -> Self {
-        Self { pieces: [Piece { rate_rad_s: Wheels::both(0.0), duration_s: 0.0 }; MAX_PIECES], count: 0 }
+        Self { segments: [RateSegment { rate_rad_s: Wheels::both(0.0), duration_s: 0.0 }; MAX_SEGMENTS], count: 0 }
     }
 }
 
-impl Pieces {
-    fn push(&mut self, piece: Piece) {
-        self.pieces[self.count] = piece;
+impl RateSegments {
+    fn push(&mut self, segment: RateSegment) {
+        self.segments[self.count] = segment;
         self.count += 1;
     }
 
     /// In the order in which they are driven.
-    pub(crate) fn as_slice(&self) -> &[Piece] {
-        &self.pieces[..self.count]
+    pub(crate) fn as_slice(&self) -> &[RateSegment] {
+        &self.segments[..self.count]
     }
 }
 

@@ -8,7 +8,7 @@ use effects::{Command, Readout, SampleClock};
 use kinematics::{Pose, Side, Wheels};
 
 use crate::active::ActiveEffects;
-use crate::actuator::{Actuator, Piece, Pieces, ShaftMotion};
+use crate::actuator::{Actuator, RateSegment, RateSegments, ShaftMotion};
 use crate::body::{Body, DriveSetup, DriveStreams, Start};
 use crate::instrument::Observer;
 use crate::planned_motion::PlannedMotion;
@@ -28,7 +28,7 @@ pub(crate) struct Drive<'a> {
     streams: &'a mut DriveStreams,
     log: Option<LogClock>,
     /// When the next instrument looks by itself.
-    next_look_s: f64,
+    next_measurement_s: f64,
     /// The instant of the last row, by the true clock.
     last_row_s: f64,
 }
@@ -69,7 +69,7 @@ impl<'a> Drive<'a> {
         observers: &'a mut [Observer],
         run: &'a mut Run,
     ) -> Self {
-        let next_look_s = next_look_s(observers);
+        let next_measurement_s = next_measurement_s(observers);
         // The row at t = 0 is a standing row; the clock's first is one interval later.
         let log = setup.log_interval_s.map(|interval_s| LogClock::schedule(interval_s, 1, effects));
         let body = Body::new(setup, &start);
@@ -82,7 +82,7 @@ impl<'a> Drive<'a> {
             body,
             streams,
             log,
-            next_look_s,
+            next_measurement_s,
             last_row_s: f64::NEG_INFINITY,
         }
     }
@@ -105,7 +105,7 @@ impl<'a> Drive<'a> {
                 self.actuator.hold(*duration_s);
                 self.travel();
             }
-            PlannedMotion::Go { command, pieces } => self.go(*command, pieces.as_deref())?,
+            PlannedMotion::Go { command, segments } => self.go(*command, segments.as_deref())?,
         }
         self.write_standing_row();
         Ok(())
@@ -114,7 +114,7 @@ impl<'a> Drive<'a> {
     /// The outside instruments read the standing robot.
     #[inline]
     pub(crate) fn stand(&mut self) {
-        self.look_if_due();
+        self.measure_if_due();
         if self.run.point_readings.last().is_none_or(|reading| self.body.t_s > reading.t_s + SAME_INSTANT_S) {
             let (t_s, world_from_body) = self.body.reading(self.effects, self.body.t_s);
             for observer in &mut *self.observers {
@@ -125,19 +125,19 @@ impl<'a> Drive<'a> {
     }
 
     #[inline]
-    fn go(&mut self, mut command: Command, foreseen: Option<&[Piece]>) -> Result<(), ServoError> {
+    fn go(&mut self, mut command: Command, planned_segments: Option<&[RateSegment]>) -> Result<(), ServoError> {
         self.effects.start_motion();
         self.effects.command(&mut command);
         self.body.start_motion(self.setup, self.streams);
-        match (&mut self.actuator, foreseen) {
+        match (&mut self.actuator, planned_segments) {
             (Actuator::Stepping(pair), _) => {
                 pair.begin(&command)?;
                 self.travel();
             }
-            (Actuator::ClosedForm(_), Some(pieces)) => self.travel_in(pieces),
+            (Actuator::ClosedForm(_), Some(segments)) => self.travel_in(segments),
             (Actuator::ClosedForm(_), None) => {
-                let pieces = self.pieces(&command);
-                self.travel_in(pieces.as_slice());
+                let segments = self.segments(&command);
+                self.travel_in(segments.as_slice());
             }
         }
         Ok(())
@@ -145,12 +145,12 @@ impl<'a> Drive<'a> {
 
     /// The closed form drives a motion's pieces.
     #[inline]
-    fn travel_in(&mut self, pieces: &[Piece]) {
-        let undisturbed = self.log.is_none() && self.next_look_s == f64::INFINITY;
-        for piece in pieces {
-            self.actuator.begin_piece(*piece);
+    fn travel_in(&mut self, segments: &[RateSegment]) {
+        let undisturbed = self.log.is_none() && self.next_measurement_s == f64::INFINITY;
+        for segment in segments {
+            self.actuator.begin_segment(*segment);
             if undisturbed {
-                self.advance(piece.duration_s);
+                self.advance(segment.duration_s);
             } else {
                 self.travel();
             }
@@ -158,9 +158,9 @@ impl<'a> Drive<'a> {
     }
 
     /// How the closed form turns the shafts for a command, given what the counters now see of them.
-    fn pieces(&mut self, command: &Command) -> Pieces {
+    fn segments(&mut self, command: &Command) -> RateSegments {
         let mut probe = self.body.step(self.setup, 0.0, &ShaftMotion::REST);
-        self.setup.profile.pieces(command, |rate_rad_s| {
+        self.setup.profile.segments(command, |rate_rad_s| {
             probe.rate_rad_s = rate_rad_s;
             probe.encoder_rad = Wheels::both(1.0);
             self.effects.encoder(&mut probe);
@@ -172,11 +172,11 @@ impl<'a> Drive<'a> {
     fn travel(&mut self) {
         while let Some(event_s) = self.actuator.next_event_s() {
             let log_s = self.log.as_ref().map_or(f64::INFINITY, LogClock::next_read_s);
-            let dt_s = event_s.min(log_s - self.body.t_s).min(self.next_look_s - self.body.t_s);
+            let dt_s = event_s.min(log_s - self.body.t_s).min(self.next_measurement_s - self.body.t_s);
             if dt_s > 0.0 {
                 self.advance(dt_s);
             }
-            self.look_if_due();
+            self.measure_if_due();
             self.read_counters_if_due();
         }
     }
@@ -189,22 +189,22 @@ impl<'a> Drive<'a> {
     }
 
     #[inline]
-    fn look_if_due(&mut self) {
-        if self.next_look_s <= self.body.t_s + SAME_INSTANT_S {
+    fn measure_if_due(&mut self) {
+        if self.next_measurement_s <= self.body.t_s + SAME_INSTANT_S {
             self.measurement();
         }
     }
 
     fn measurement(&mut self) {
         for k in 0..self.observers.len() {
-            let measurement_s = self.observers[k].next_look_s();
+            let measurement_s = self.observers[k].next_measurement_s();
             if measurement_s <= self.body.t_s + SAME_INSTANT_S {
                 // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
                 let (t_s, world_from_body) = self.body.reading(self.effects, measurement_s);
                 self.observers[k].measurement(t_s, world_from_body, self.body.ground_m, self.run);
             }
         }
-        self.next_look_s = next_look_s(self.observers);
+        self.next_measurement_s = next_measurement_s(self.observers);
     }
 
     fn read_counters_if_due(&mut self) {
@@ -256,6 +256,6 @@ impl<'a> Drive<'a> {
     }
 }
 
-fn next_look_s(observers: &[Observer]) -> f64 {
-    observers.iter().map(Observer::next_look_s).fold(f64::INFINITY, f64::min)
+fn next_measurement_s(observers: &[Observer]) -> f64 {
+    observers.iter().map(Observer::next_measurement_s).fold(f64::INFINITY, f64::min)
 }

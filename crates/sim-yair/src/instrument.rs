@@ -38,7 +38,7 @@ impl Observer {
     }
 
     /// When the instrument next looks by itself, seconds; the floor grid never does.
-    pub(crate) fn next_look_s(&self) -> f64 {
+    pub(crate) fn next_measurement_s(&self) -> f64 {
         match self.instrument {
             Instrument::FloorGrid { .. } => f64::INFINITY,
             Instrument::MotionCapture { rate_hz, .. } | Instrument::Tachometer { rate_hz, .. } => {
@@ -52,7 +52,7 @@ impl Observer {
         matches!(self.instrument, Instrument::MotionCapture { .. } | Instrument::Tachometer { .. })
     }
 
-    /// A measurement at the moving robot at [`Self::next_look_s`], whose contacts have gone so far over the ground.
+    /// A measurement at the moving robot at [`Self::next_measurement_s`], whose contacts have gone so far over the ground.
     pub(crate) fn measurement(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
         if let Instrument::Tachometer { rate_hz, sigma_m_s } = self.instrument {
             let mut speed = |now_m, before_m| (now_m - before_m) * rate_hz + sigma_m_s * self.stream.normal();

@@ -5,7 +5,7 @@ use kinematics::{DriveGeometry, Increment};
 use motion_programs::Motion;
 use scenario::Robot;
 
-use crate::actuator::{Piece, Pieces};
+use crate::actuator::{RateSegment, RateSegments};
 
 /// A motion with what follows from the robot's nominal values alone.
 #[derive(Debug, Clone)]
@@ -18,17 +18,17 @@ pub(crate) enum PlannedMotion {
     Go {
         command: Command,
         /// How the closed form turns the shafts, where no effect has a say in it.
-        pieces: Option<Vec<Piece>>,
+        segments: Option<Vec<RateSegment>>,
     },
 }
 
 impl PlannedMotion {
-    /// A motion by the robot's nominal geometry; `pieces` tells how the closed form would drive a command.
+    /// A motion by the robot's nominal geometry; `segments` tells how the closed form would drive a command.
     pub(crate) fn new(
         motion: &Motion,
         robot: &Robot,
         nominal_geometry: &DriveGeometry,
-        pieces: impl Fn(&Command) -> Option<Pieces>,
+        segments: impl Fn(&Command) -> Option<RateSegments>,
     ) -> Self {
         let increment = match *motion {
             Motion::Measure => return Self::Measure,
@@ -38,7 +38,7 @@ impl PlannedMotion {
             Motion::Arc { radius_m, turn_rad } => Increment { distance_m: radius_m * turn_rad.abs(), turn_rad },
         };
         let command = command(robot, nominal_geometry, increment);
-        Self::Go { command, pieces: pieces(&command).map(|pieces| pieces.as_slice().to_vec()) }
+        Self::Go { command, segments: segments(&command).map(|segments| segments.as_slice().to_vec()) }
     }
 }
 

@@ -10,10 +10,10 @@ use crate::active::ActiveEffects;
 use crate::actuator::{Actuator, ConstantSpeed, Profile, ServoPair};
 use crate::body::{DriveSetup, DriveStreams, Start};
 use crate::drive::Drive;
-use crate::foreseen::PrecomputedRun;
 use crate::instrument::Observer;
-use crate::plan::Plan;
 use crate::planned_motion::PlannedMotion;
+use crate::precomputed_run::PrecomputedRun;
+use crate::prepared_program::PreparedProgram;
 use crate::servo::ServoError;
 
 /// Why a scenario cannot be simulated.
@@ -176,27 +176,28 @@ impl SimulatedRobot {
         self.last_ends
     }
 
-    /// Makes a program ready: what its motions tell this robot's wheels is worked out once, and [`Self::drive_plan_into`] does not do it again.
+    /// Makes a program ready: what its motions tell this robot's wheels is worked out once, and [`Self::drive_prepared_into`] does not do it again.
     #[must_use]
-    pub fn plan(&self, program: MotionProgram) -> Plan {
-        let foreseen = self.setup.closed_form && self.effects.leave_commands_and_counters_alone();
-        let pieces = |command: &_| foreseen.then(|| self.setup.profile.pieces(command, |_| Wheels::both(1.0)));
-        let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, pieces);
+    pub fn prepare(&self, program: MotionProgram) -> PreparedProgram {
+        let planned_segments = self.setup.closed_form && self.effects.leave_commands_and_counters_alone();
+        let segments =
+            |command: &_| planned_segments.then(|| self.setup.profile.segments(command, |_| Wheels::both(1.0)));
+        let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, segments);
         let motions: Vec<_> = program.motions.iter().map(planned).collect();
         let undisturbed = self.setup.log_interval_s.is_none() && !self.observers.iter().any(Observer::free_running);
-        let precomputed_run = if foreseen && undisturbed && self.effects.leave_clocks_alone() {
+        let precomputed_run = if planned_segments && undisturbed && self.effects.leave_clocks_alone() {
             PrecomputedRun::new(&motions)
         } else {
             None
         };
-        Plan { program, motions, precomputed_run }
+        PreparedProgram { program, motions, precomputed_run }
     }
 
     /// Drives a program as [`Platform::drive_into`] does.
     ///
     /// # Errors
     /// [`SimulationError`] when the controllers cannot do what is asked of them.
-    pub fn drive_plan_into(&mut self, plan: &Plan, run: &mut Run) -> Result<(), SimulationError> {
+    pub fn drive_prepared_into(&mut self, plan: &PreparedProgram, run: &mut Run) -> Result<(), SimulationError> {
         // The streams first, all at once: none waits for another's draws.
         let streams = self.address.streams();
         let number = self.address.run;
@@ -294,7 +295,7 @@ impl Platform for SimulatedRobot {
     }
 
     fn drive_into(&mut self, program: &MotionProgram, run: &mut Run) -> Result<(), SimulationError> {
-        self.drive_plan_into(&self.plan(program.clone()), run)
+        self.drive_prepared_into(&self.prepare(program.clone()), run)
     }
 }
 

@@ -54,15 +54,15 @@ fn apart(found: &Dataset, faultless: &Dataset) -> f64 {
 #[test]
 fn one_rewriting_of_faulty_records_is_the_faultless_log_and_names_the_fault() {
     let faultless = drive(&perfect(), 2);
-    for (id, sizes, remains) in GROSS {
+    for (id, values, remains) in GROSS {
         let mut scenario = perfect();
-        let fault = effects::effect_from_estimates(id, sizes).expect("an effect");
+        let fault = effects::effect_from_estimates(id, values).expect("an effect");
         scenario.effects = vec![fault.clone()];
         let faulty = drive(&scenario, 2);
         let Some(Hypothesis::Records(rewrite)) = effects::hypothesis(id) else { panic!("{id} rewrites records") };
         // Rounding of angles in turns.
         let allowed = remains + 1e-9;
-        assert!(apart(&faulty, &faultless) > allowed, "{id} {sizes:?} harms nothing");
+        assert!(apart(&faulty, &faultless) > allowed, "{id} {values:?} harms nothing");
         let corrections = rewrite(&faulty);
         let right = corrections.iter().filter(|correction| apart(&correction.records, &faultless) <= allowed);
         let right: Vec<_> = right.collect();
@@ -70,16 +70,16 @@ fn one_rewriting_of_faulty_records_is_the_faultless_log_and_names_the_fault() {
             .iter()
             .map(|correction| (&correction.sentence, apart(&correction.records, &faultless)))
             .collect();
-        assert_eq!(right.len(), 1, "{id} {sizes:?}: {tried:?}");
-        let named = effects::effect_from_estimates(id, &right[0].sizes).expect("its sizes make an effect");
+        assert_eq!(right.len(), 1, "{id} {values:?}: {tried:?}");
+        let named = effects::effect_from_estimates(id, &right[0].values).expect("its sizes make an effect");
         named.physical().check().expect("and a physical one");
-        if sizes[0].0 == "probability" {
+        if values[0].0 == "probability" {
             // A share of 1000 rows and more, or of 2000 counts: five standard deviations.
-            let of = |sizes: &[(&str, f64)]| sizes[0].1;
+            let of = |values: &[(&str, f64)]| values[0].1;
             assert!(
-                (of(&right[0].sizes) - of(sizes)).abs() < 5.0 * (of(sizes) / 1000.0).sqrt(),
+                (of(&right[0].values) - of(values)).abs() < 5.0 * (of(values) / 1000.0).sqrt(),
                 "{:?}",
-                right[0].sizes
+                right[0].values
             );
         } else {
             assert_eq!(named, fault, "{:?}", right[0].sentence);

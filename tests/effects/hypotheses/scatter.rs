@@ -103,7 +103,7 @@ fn measure(sign: Sign, runs: &[Vec<Missed>]) -> f64 {
 
 /// Sizes at the upper end of what is usual.
 fn specimen(id: &str) -> Effect {
-    let sizes: &[(&str, f64)] = match id {
+    let values: &[(&str, f64)] = match id {
         "contact_patch_wheelbase" => &[("sigma_m", 4e-3)],
         "traction_loss" => &[("static_friction", 0.048), ("kinetic_friction", 0.03), ("stribeck_speed_m_s", 0.05)],
         "stick_slip" => &[("stick_speed_m_s", 0.05), ("breakaway_m", 1e-3)],
@@ -112,7 +112,7 @@ fn specimen(id: &str) -> Effect {
         "truth_outliers" => &[("probability", 0.02), ("jump_m", 0.05), ("jump_rad", 0.1)],
         other => panic!("no specimen of {other}"),
     };
-    effects::effect_from_estimates(id, sizes).expect("an effect")
+    effects::effect_from_estimates(id, values).expect("an effect")
 }
 
 /// Correlations of some thousand measurements have a standard error of 0.02; kurtosis has no upper bound.

@@ -89,8 +89,8 @@ pub(crate) fn rows(run: &Run, ticks_per_rev: f64) -> Vec<Row> {
 }
 
 /// Σ size × gradient.
-pub(crate) fn sum(gradient: &[Pose], sizes: &[f64]) -> Pose {
-    gradient.iter().zip(sizes).fold(Pose::IDENTITY, |sum, (gradient, size)| {
+pub(crate) fn sum(gradient: &[Pose], values: &[f64]) -> Pose {
+    gradient.iter().zip(values).fold(Pose::IDENTITY, |sum, (gradient, size)| {
         Pose::new(
             sum.x_m + size * gradient.x_m,
             sum.y_m + size * gradient.y_m,
@@ -112,18 +112,18 @@ pub(crate) enum Watch {
 }
 
 /// Largest difference, metres or radians, between what was seen and what the counts and a term of these sizes predict.
-pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64], watch: Watch) -> f64 {
+pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64], watch: Watch) -> f64 {
     let from_s = if watch == Watch::OnceMoving { 2.0 } else { 0.0 };
     let geometry = dataset.robot.geometry().expect("valid");
     let ticks_per_rev = dataset.robot.ticks_per_rev.expect("ticks");
     let (mut session_m, mut worst, mut squares, mut measurements) = (0.0, 0.0_f64, 0.0, 0.0);
     for run in &dataset.runs {
         term.restart(&run.info);
-        let mut gradient = vec![Pose::IDENTITY; sizes.len()];
+        let mut gradient = vec![Pose::IDENTITY; values.len()];
         let sighted = |term: &mut dyn ModelTerm, t_s, world_from_body, twist| {
-            let mut gradient = vec![Pose::IDENTITY; sizes.len()];
+            let mut gradient = vec![Pose::IDENTITY; values.len()];
             term.measurement(&Measurement { t_s, world_from_body, twist, run: &run.info }, &mut gradient);
-            sum(&gradient, sizes)
+            sum(&gradient, values)
         };
         let seen = |k: usize| {
             let sample = &run.truth[k];
@@ -154,7 +154,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, sizes: &[f64],
             gradient.fill(Pose::IDENTITY);
             term.motion(&interval, &mut gradient);
             let base = interval.increment();
-            let term_moves = sum(&gradient, sizes);
+            let term_moves = sum(&gradient, values);
             let share = |share: f64| {
                 let increment = Increment {
                     distance_m: share * (base.distance_m + term_moves.x_m),

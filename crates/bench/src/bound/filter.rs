@@ -70,7 +70,7 @@ impl<'a> Filter<'a> {
             match *event {
                 Event::Motion(travel) => filter.begin(travel),
                 Event::Drive { share } => filter.drive(share),
-                Event::Measurement { measurement, t_s } => filter.look(measurement, t_s)?,
+                Event::Measurement { measurement, t_s } => filter.measure(measurement, t_s)?,
             }
         }
         Ok(filter.innovations)
@@ -132,8 +132,8 @@ impl<'a> Filter<'a> {
         self.world_from_body = self.world_from_body * Increment::from_travel(driven_m, separation_m).arc();
     }
 
-    fn look(&mut self, measurement: usize, t_s: f64) -> Result<(), NoBound> {
-        let seen = self.model.sights[measurement].covariance(self.world_from_body);
+    fn measure(&mut self, measurement: usize, t_s: f64) -> Result<(), NoBound> {
+        let seen = self.model.instruments[measurement].covariance(self.world_from_body);
         if std::mem::take(&mut self.lost) {
             self.covariance.fixed_view_mut::<3, 3>(POSE, POSE).copy_from(&seen);
             self.largest_var = seen.diagonal();

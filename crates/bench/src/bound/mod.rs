@@ -46,10 +46,10 @@ const ROUNDING_SHARE: f64 = 1e-12;
 
 /// A parameter with more than this share in directions that are not seen at all is not seen. Rounding turns eigenvectors by 1e-16 of the gap between
 /// their eigenvalues; a parameter that takes part in what is not seen, as all do in the common scale, has a tenth or more.
-const UNSEEN_SHARE: f64 = 1e-9;
+const UNOBSERVABLE_SHARE: f64 = 1e-9;
 
 /// What is told without error has this many times the information of the best known direction: its own variance is then a millionth of any other.
-const TOLD_FACTOR: f64 = 1e6;
+const EXACT_INFORMATION_FACTOR: f64 = 1e6;
 
 /// What a protocol's runs can tell of the drive's geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +99,7 @@ impl FisherInformation {
     #[must_use]
     pub fn given_mean_diameter(&self) -> Self {
         let mean = Vector3::new(0.5, 0.5, 0.0);
-        let told = TOLD_FACTOR * self.matrix.symmetric_eigenvalues().max();
+        let told = EXACT_INFORMATION_FACTOR * self.matrix.symmetric_eigenvalues().max();
         Self { matrix: self.matrix + told * mean * mean.transpose(), ..*self }
     }
 
@@ -128,7 +128,7 @@ impl FisherInformation {
                 unobservable += share;
             }
         }
-        (unobservable < UNSEEN_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
+        (unobservable < UNOBSERVABLE_SHARE && variance < 1.0).then(|| variance * (self.geometry_m[row] * unit).powi(2))
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) struct Model {
     /// Controller counts in a recorded tick.
     pub(super) counts_per_tick: u32,
     /// What looks.
-    pub(super) sights: Vec<Sight>,
+    pub(super) instruments: Vec<PoseInstrument>,
     /// Whether speed is ramped up and down at the commanded acceleration, and not constant.
     pub(super) ramps: bool,
     robot: Robot,
@@ -39,9 +39,12 @@ pub(super) struct Model {
 impl Model {
     pub(super) fn of(scenario: &Scenario) -> Result<Self, NoBound> {
         let points = scenario.robot.marked_points();
-        let sights: Vec<Sight> =
-            scenario.instruments.iter().map(|instrument| Sight::of(instrument, &points)).collect::<Result<_, _>>()?;
-        if sights.is_empty() {
+        let instruments: Vec<PoseInstrument> = scenario
+            .instruments
+            .iter()
+            .map(|instrument| PoseInstrument::of(instrument, &points))
+            .collect::<Result<_, _>>()?;
+        if instruments.is_empty() {
             return Err(NoBound::NoInstrument);
         }
         let (mut separation_var_m2, mut counts_per_tick, mut on_speed) = (0.0, 1, false);
@@ -59,7 +62,7 @@ impl Model {
             sensitivity_sigma: scenario.noise.sensitivity_sigma,
             separation_var_m2,
             counts_per_tick,
-            sights,
+            instruments,
             ramps: on_speed || scenario.engine != Engine::ClosedForm,
             robot: scenario.robot.clone(),
             nominal_geometry: scenario.nominal_geometry()?,
@@ -100,14 +103,14 @@ impl Model {
 
 /// An instrument as the pose that its readings come to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sight {
+pub(super) struct PoseInstrument {
     /// Looks per second while time passes; `None` for one that reads the standing robot.
     pub(super) rate_hz: Option<f64>,
     /// Covariance of the pose in the body's frame, order x, y, θ.
     covariance: Matrix3<f64>,
 }
 
-impl Sight {
+impl PoseInstrument {
     fn of(instrument: &Instrument, points: &[MarkedPoint]) -> Result<Self, NoBound> {
         match *instrument {
             Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
@@ -160,18 +163,20 @@ mod tests {
     #[test]
     fn two_marks_across_the_axle_give_the_textbook_pose() {
         let grid = Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 2e-3 };
-        let measurement = Sight::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
+        let measurement = PoseInstrument::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
         let seen = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
         // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of them.
         let expected = Matrix3::from_diagonal(&Vector3::new(2e-6, 2e-6, 2.0 * 4e-6 / 0.16));
         assert!((seen - expected).abs().max() < 1e-18, "{seen}");
-        assert_eq!(Sight::of(&grid, &[mark(0.1, 0.2), mark(0.1, 0.2)]), Err(NoBound::NoHeading));
+        assert_eq!(PoseInstrument::of(&grid, &[mark(0.1, 0.2), mark(0.1, 0.2)]), Err(NoBound::NoHeading));
     }
 
     #[test]
     fn rounding_to_the_grid_adds_a_twelfth_of_its_square() {
         let marks = [mark(0.0, 0.2), mark(0.0, -0.2)];
-        let grid = |reading_sigma_m| Sight::of(&Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }, &marks);
+        let grid = |reading_sigma_m| {
+            PoseInstrument::of(&Instrument::FloorGrid { resolution_m: 1e-3, reading_sigma_m }, &marks)
+        };
         let measurement = grid(4e-4).expect("dithered");
         assert!((measurement.covariance(Pose::IDENTITY)[(0, 0)] / (0.5 * (1.6e-7 + 1e-6 / 12.0)) - 1.0).abs() < 1e-14);
         assert!(matches!(grid(3e-4), Err(NoBound::RoundedReadings { .. })));
@@ -189,13 +194,13 @@ mod tests {
             lever_theta_rad: 0.3,
         };
         // A marker 0.5 m ahead of a body that heads north: a heading too large puts the body too far east.
-        let ahead = Sight::of(&capture(0.5, 0.0), &[]).expect("always");
+        let ahead = PoseInstrument::of(&capture(0.5, 0.0), &[]).expect("always");
         let seen = ahead.covariance(Pose::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         assert!((seen[(0, 0)] - (9e-8 + 0.25 * 4e-6)).abs() < 1e-18);
         assert!((seen[(1, 1)] - 9e-8).abs() < 1e-18);
         assert!((seen[(0, 2)] - 0.5 * 4e-6).abs() < 1e-18, "{seen}");
         // To the left of a body that heads east: the same.
-        let left = Sight::of(&capture(0.0, 0.5), &[]).expect("always");
+        let left = PoseInstrument::of(&capture(0.0, 0.5), &[]).expect("always");
         assert!((left.covariance(Pose::IDENTITY)[(0, 2)] - 0.5 * 4e-6).abs() < 1e-18);
     }
 }

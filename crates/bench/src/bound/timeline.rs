@@ -58,12 +58,12 @@ impl Timeline {
             model,
             timeline: Self { events: Vec::new(), phases: Wheels::both(vec![0]) },
             t_s: 0.0,
-            looks: vec![0; model.sights.len()],
+            measurements: vec![0; model.instruments.len()],
             last_standing_s: None,
             counts: Wheels::both(0),
             phase: Wheels::both(0),
         };
-        run.look_until(0.0, None);
+        run.measure_until(0.0, None);
         run.stand();
         for motion in motions {
             match *motion {
@@ -87,7 +87,7 @@ struct Run<'a> {
     timeline: Timeline,
     t_s: f64,
     /// How often each instrument has looked by itself.
-    looks: Vec<u32>,
+    measurements: Vec<u32>,
     last_standing_s: Option<f64>,
     counts: Wheels<i64>,
     phase: Wheels<usize>,
@@ -100,7 +100,7 @@ impl Run<'_> {
             return;
         }
         self.last_standing_s = Some(self.t_s);
-        for (measurement, instrument) in self.model.sights.iter().enumerate() {
+        for (measurement, instrument) in self.model.instruments.iter().enumerate() {
             if instrument.rate_hz.is_none() {
                 self.timeline.events.push(Event::Measurement { measurement, t_s: self.t_s });
             }
@@ -133,12 +133,12 @@ impl Run<'_> {
 
     /// Time passes, standing or moving at a pace.
     fn pass(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
-        self.look_until(duration_s, time_scale);
+        self.measure_until(duration_s, time_scale);
         self.t_s += duration_s;
     }
 
     /// Every look that an instrument takes by itself until `duration_s` from now, and the driving up to there.
-    fn look_until(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
+    fn measure_until(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
         let mut driven = 0.0;
         let mut drive_to = |share: f64, events: &mut Vec<Event>| {
             if share > driven {
@@ -147,16 +147,19 @@ impl Run<'_> {
             }
         };
         loop {
-            let next = (0..self.looks.len())
+            let next = (0..self.measurements.len())
                 .filter_map(|measurement| {
-                    Some((f64::from(self.looks[measurement]) / self.model.sights[measurement].rate_hz?, measurement))
+                    Some((
+                        f64::from(self.measurements[measurement]) / self.model.instruments[measurement].rate_hz?,
+                        measurement,
+                    ))
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((t_s, measurement)) = next.filter(|(t_s, _)| *t_s <= self.t_s + duration_s + SAME_INSTANT_S)
             else {
                 break;
             };
-            self.looks[measurement] += 1;
+            self.measurements[measurement] += 1;
             if let Some(time_scale) = time_scale {
                 drive_to(time_scale.share(t_s - self.t_s), &mut self.timeline.events);
             }
@@ -248,7 +251,8 @@ mod tests {
         let timeline = Timeline::of(&model, &motions);
         assert_eq!(timeline.phases, Wheels::both(vec![0, 20]));
         // The grid reads at both ends only.
-        let looks: Vec<_> = timeline.events.iter().filter(|event| matches!(event, Event::Measurement { .. })).collect();
-        assert_eq!(looks.len(), 2);
+        let measurements: Vec<_> =
+            timeline.events.iter().filter(|event| matches!(event, Event::Measurement { .. })).collect();
+        assert_eq!(measurements.len(), 2);
     }
 }

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::plan::{ChunkOutcome, Stand, SweepPlan};
+use super::plan::{ChunkOutcome, PointSetup, SweepPlan};
 use super::result::SweepResult;
 use super::rows::Spool;
-use super::state::{Place, STATE_FILE, Shard, State};
+use super::state::{ChunkIndex, STATE_FILE, Shard, State};
 use crate::error::BenchError;
 
 /// Time between two writings of the state: what a kill loses.
@@ -113,7 +113,7 @@ impl SweepPlan {
             let done: Vec<ChunkOutcome> = pool.install(|| {
                 chunks
                     .par_iter()
-                    .map_init(|| None, |stand, place| self.chunk(stand, *place))
+                    .map_init(|| None, |setup, place| self.chunk(setup, *place))
                     .collect::<Result<_, BenchError>>()
             })?;
             for (place, outcome) in chunks.iter().zip(done) {
@@ -158,12 +158,12 @@ impl SweepPlan {
     }
 
     /// The next chunks, at most `wave` of them; over several points, unless a precision has to be judged at each one's end.
-    fn next_chunks(&self, state: &State, wave: usize) -> Vec<Place> {
+    fn next_chunks(&self, state: &State, wave: usize) -> Vec<ChunkIndex> {
         let mut chunks = Vec::with_capacity(wave);
         let mut place = state.next;
         while chunks.len() < wave && place < state.end {
             let open = state.open.iter().find(|(point, _)| *point == place.point);
-            let last = open.map_or_else(|| self.first_look(), |(_, sum)| sum.look);
+            let last = open.map_or_else(|| self.first_decision(), |(_, sum)| sum.decision_chunk);
             let last = if place.point == state.end.point { last.min(state.end.chunk) } else { last };
             while chunks.len() < wave && place.chunk < last {
                 chunks.push(place);
@@ -173,24 +173,24 @@ impl SweepPlan {
                 break;
             }
             if place.chunk >= self.chunks() {
-                place = Place { point: place.point + 1, chunk: 0 };
+                place = ChunkIndex { point: place.point + 1, chunk: 0 };
             }
         }
         chunks
     }
 
-    fn chunk(&self, stand: &mut Option<Stand>, place: Place) -> Result<ChunkOutcome, BenchError> {
-        if !stand.as_ref().is_some_and(|stand| stand.is_at(place.point)) {
-            *stand = Some(Stand::new(self, place.point)?);
+    fn chunk(&self, setup: &mut Option<PointSetup>, place: ChunkIndex) -> Result<ChunkOutcome, BenchError> {
+        if !setup.as_ref().is_some_and(|setup| setup.is_at(place.point)) {
+            *setup = Some(PointSetup::new(self, place.point)?);
         }
-        match stand {
-            Some(stand) => stand.drive(self, place.chunk),
-            None => Stand::new(self, place.point)?.drive(self, place.chunk),
+        match setup {
+            Some(setup) => setup.drive(self, place.chunk),
+            None => PointSetup::new(self, place.point)?.drive(self, place.chunk),
         }
     }
 
     /// Adds the next chunk to the state.
-    fn take(&self, state: &mut State, place: Place, outcome: ChunkOutcome) {
+    fn take(&self, state: &mut State, place: ChunkIndex, outcome: ChunkOutcome) {
         let truth = self.truth[place.point];
         let sum = state.sum_of(place, self);
         for of_trial in outcome.outcomes.chunks_exact(self.estimates().max(1)) {
@@ -205,19 +205,20 @@ impl SweepPlan {
         state.next.chunk = place.chunk + 1;
         state.next.point = place.point;
         if self.precision.is_none() && state.next.chunk == self.chunks() {
-            state.next = Place { point: place.point + 1, chunk: 0 };
+            state.next = ChunkIndex { point: place.point + 1, chunk: 0 };
         }
     }
 
     /// Turns the sums of points that are done into results.
     fn finish_points(&self, state: &mut State, pool: &rayon::ThreadPool) -> Result<(), BenchError> {
-        let Place { point, chunk } = state.next;
+        let ChunkIndex { point, chunk } = state.next;
         if self.precision.is_some()
-            && let Some((_, sum)) = state.open.iter_mut().find(|(open, sum)| *open == point && sum.look == chunk)
+            && let Some((_, sum)) =
+                state.open.iter_mut().find(|(open, sum)| *open == point && sum.decision_chunk == chunk)
         {
-            match self.next_look(point, sum) {
-                Some(look) => sum.look = look,
-                None => state.next = Place { point: point + 1, chunk: 0 },
+            match self.next_decision(point, sum) {
+                Some(decision_chunk) => sum.decision_chunk = decision_chunk,
+                None => state.next = ChunkIndex { point: point + 1, chunk: 0 },
             }
         }
         let next = state.next.point;
@@ -239,12 +240,12 @@ impl SweepPlan {
         let finished: u64 = state.finished.iter().map(|(_, result)| result.trials).sum();
         let done = finished + trials(open);
         if self.precision.is_none() {
-            let unit = |place: Place| place.point as u64 * self.chunks() + place.chunk;
+            let unit = |place: ChunkIndex| place.point as u64 * self.chunks() + place.chunk;
             let planned = trials(unit(state.end) - unit(state.first));
             return Progress { done: done.min(planned), planned };
         }
         // A point to come needs as many as those before it did.
-        let under_way = state.open.first().map_or(0, |(_, sum)| sum.look);
+        let under_way = state.open.first().map_or(0, |(_, sum)| sum.decision_chunk);
         let known = state.finished.len() as u64 + u64::from(under_way > 0);
         let so_far = finished + trials(under_way);
         let points = (state.end.point - state.first.point) as u64;

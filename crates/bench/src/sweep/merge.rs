@@ -7,7 +7,7 @@ use scenario::Scenario;
 use super::plan::SweepPlan;
 use super::result::{PointResult, SweepResult};
 use super::rows::spool_in;
-use super::state::{Place, STATE_FILE, State};
+use super::state::{ChunkIndex, STATE_FILE, State};
 use super::tally::PointSum;
 use crate::error::BenchError;
 
@@ -44,7 +44,7 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, BenchError> {
     let plan = SweepPlan::new(&scenario, first.options())?;
     let whole = State::new(&plan, super::state::Shard::WHOLE, first.rows())?;
 
-    let mut reached = Place { point: 0, chunk: 0 };
+    let mut reached = ChunkIndex { point: 0, chunk: 0 };
     for (folder, state) in &shards {
         state.same_campaign_as(&whole, &folder.join(STATE_FILE))?;
         if !state.is_complete() {

@@ -35,7 +35,7 @@ const QUANTITIES: [Quantity; 4] = [
 ];
 
 /// What a method's calibration is worth and what it costs, where the scenario states a validation path.
-const WORTH: [Quantity; 3] = [
+const VALIDATION_QUANTITIES: [Quantity; 3] = [
     Quantity { name: "RMS drift", unit: "%", number: drift, ideal: None, share: false },
     Quantity { name: "time for calibration", unit: "min", number: minutes, ideal: None, share: false },
     Quantity { name: "way for calibration", unit: "m", number: metres, ideal: None, share: false },
@@ -96,8 +96,11 @@ pub(super) fn page(result: &SweepResult) -> Option<Figure> {
         }
         caption.push_str(&axis.caption(result));
         if result.points.iter().any(|point| !point.drift.is_empty()) {
-            panels
-                .extend(WORTH.iter().map(|quantity| axis.panel(result, quantity, "", quantity.name == WORTH[0].name)));
+            panels.extend(
+                VALIDATION_QUANTITIES
+                    .iter()
+                    .map(|quantity| axis.panel(result, quantity, "", quantity.name == VALIDATION_QUANTITIES[0].name)),
+            );
         }
         for quantity in &QUANTITIES {
             for (column, parameter) in TRACKED.into_iter().enumerate() {

@@ -23,7 +23,7 @@ pub(super) const TRIALS_PER_CHUNK: u64 = 16;
 const MAX_FOR_PRECISION: u64 = 1_000_000;
 
 /// Fewest trials from which the number that a precision needs is foretold: below, kurtoses are guesses.
-const FEWEST_FOR_PRECISION: u64 = 512;
+const MIN_FOR_PRECISION: u64 = 512;
 
 /// What takes the place of the scenario's own.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -126,15 +126,15 @@ impl SweepPlan {
     }
 
     /// Where a point is first looked at: with a precision, after the fewest trials that tell one; else at its end.
-    pub(super) const fn first_look(&self) -> u64 {
-        let fewest = FEWEST_FOR_PRECISION / TRIALS_PER_CHUNK;
+    pub(super) const fn first_decision(&self) -> u64 {
+        let fewest = MIN_FOR_PRECISION / TRIALS_PER_CHUNK;
         if self.precision.is_some() && fewest < self.chunks() { fewest } else { self.chunks() }
     }
 
     /// The chunk at which a point that has come to its look is looked at again; `None` when it is done. With a precision it is where the error, falling with the root
     /// of the number of trials, will have reached it, but no more than four times as far. Looks depend on the trials alone and never on when
     /// somebody looked: the number of trials is part of the result.
-    pub(super) fn next_look(&self, point: usize, sum: &PointSum) -> Option<u64> {
+    pub(super) fn next_decision(&self, point: usize, sum: &PointSum) -> Option<u64> {
         let done = sum.chunks.next();
         let excess = self.largest_error(point, sum) / self.precision?;
         if excess <= 1.0 || done >= self.chunks() {
@@ -148,12 +148,12 @@ impl SweepPlan {
     /// The account of a point all of whose trials are in `sum`.
     pub(super) fn point_result(&self, index: usize, sum: &PointSum) -> Result<PointResult, BenchError> {
         let point = &self.points[index];
-        let stand = Stand::new(self, index)?;
+        let setup = PointSetup::new(self, index)?;
         let total = sum.chunks.total().unwrap_or_default();
         let mut estimators: Vec<EstimatorResult> = Vec::with_capacity(self.estimates());
         let mut costs = Vec::new();
         for (number, method) in self.methods.iter().enumerate() {
-            let programs = stand.programs_of(number);
+            let programs = setup.programs_of(number);
             let information = match &programs {
                 Ok(programs) => FisherInformation::of(&point.scenario, programs).map_err(|why| why.to_string()),
                 Err(why) => Err((*why).to_owned()),
@@ -206,7 +206,7 @@ impl SweepPlan {
             precise: self.precision.map(|precision| self.largest_error(index, sum) <= precision),
             costs,
             estimators,
-            drift: if stand.validation.is_some() { drift.collect() } else { Vec::new() },
+            drift: if setup.validation.is_some() { drift.collect() } else { Vec::new() },
         })
     }
 
@@ -234,7 +234,7 @@ struct Group {
 }
 
 /// The bench set up for one point: its robot, what is driven, and for whom.
-pub(super) struct Stand {
+pub(super) struct PointSetup {
     point: usize,
     groups: Vec<Group>,
     /// By method: why it cannot be used here.
@@ -242,7 +242,7 @@ pub(super) struct Stand {
     validation: Option<Validation>,
 }
 
-impl Stand {
+impl PointSetup {
     pub(super) fn new(plan: &SweepPlan, point: usize) -> Result<Self, BenchError> {
         let scenario = &plan.points[point].scenario;
         let mut groups: Vec<Group> = Vec::new();

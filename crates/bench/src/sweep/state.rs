@@ -66,7 +66,7 @@ impl std::str::FromStr for Shard {
 
 /// A place in a campaign: chunk `chunk` of point `point`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(super) struct Place {
+pub(super) struct ChunkIndex {
     pub(super) point: usize,
     pub(super) chunk: u64,
 }
@@ -90,9 +90,9 @@ struct Identity {
 pub(super) struct State {
     campaign: Identity,
     pub(super) shard: Shard,
-    pub(super) first: Place,
-    pub(super) end: Place,
-    pub(super) next: Place,
+    pub(super) first: ChunkIndex,
+    pub(super) end: ChunkIndex,
+    pub(super) next: ChunkIndex,
     /// Points that are done, by their numbers.
     pub(super) finished: Vec<(usize, PointResult)>,
     /// Points of which this state has a part.
@@ -147,7 +147,7 @@ impl State {
         // A point that stops by itself cannot be cut.
         let chunks = if plan.precision.is_some() { 1 } else { plan.chunks() };
         let units = points as u64 * chunks;
-        let place = |unit: u64| Place { point: (unit / chunks) as usize, chunk: unit % chunks };
+        let place = |unit: u64| ChunkIndex { point: (unit / chunks) as usize, chunk: unit % chunks };
         let (first, end) = (place(shard.first(units)), place(shard.end(units)));
         Ok(Self {
             campaign: Identity::of(plan, rows)?,
@@ -216,10 +216,10 @@ impl State {
     }
 
     /// The sum of the point that is under way, a new one where there is none.
-    pub(super) fn sum_of(&mut self, place: Place, plan: &SweepPlan) -> &mut PointSum {
+    pub(super) fn sum_of(&mut self, place: ChunkIndex, plan: &SweepPlan) -> &mut PointSum {
         let known = self.open.iter().position(|(point, _)| *point == place.point);
         let at = known.unwrap_or_else(|| {
-            let sum = PointSum::starting_at(place.chunk, plan.estimates(), plan.first_look());
+            let sum = PointSum::starting_at(place.chunk, plan.estimates(), plan.first_decision());
             self.open.push((place.point, sum));
             self.open.len() - 1
         });

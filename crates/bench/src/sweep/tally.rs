@@ -121,13 +121,18 @@ pub(super) struct PointSum {
     /// Errors relative to the true values, as many as there are estimates.
     pub(super) histograms: Vec<Histogram>,
     /// The chunk before which it is looked at whether the point is done.
-    pub(super) look: u64,
+    #[serde(rename = "look")]
+    pub(super) decision_chunk: u64,
 }
 
 impl PointSum {
     /// Nothing yet, from chunk `first` on.
-    pub(super) fn starting_at(first: u64, estimates: usize, look: u64) -> Self {
-        Self { chunks: DyadicSum::starting_at(first), histograms: vec![Histogram::default(); estimates], look }
+    pub(super) fn starting_at(first: u64, estimates: usize, decision_chunk: u64) -> Self {
+        Self {
+            chunks: DyadicSum::starting_at(first),
+            histograms: vec![Histogram::default(); estimates],
+            decision_chunk,
+        }
     }
 
     /// Adds the trials that follow; false when they do not.

@@ -50,18 +50,18 @@ impl Validation {
             })
             .collect();
         let mut validation = Self { dataset: driven.dataset, true_motion, length_m: 0.0 };
-        validation.length_m = validation.reckon(&scenario.true_geometry()?).map(|(_, length_m)| length_m).sum();
+        validation.length_m = validation.dead_reckon(&scenario.true_geometry()?).map(|(_, length_m)| length_m).sum();
         Ok(Some(validation))
     }
 
     /// Final position errors over the path's length, per cent, of odometry that believes `geometry`.
     pub(super) fn drift_percent(&self, geometry: &DriveGeometry) -> f64 {
-        let errors = self.reckon(geometry).zip(&self.true_motion);
+        let errors = self.dead_reckon(geometry).zip(&self.true_motion);
         100.0 * errors.map(|((end, _), truth)| end.position().distance_m(truth.position())).sum::<f64>() / self.length_m
     }
 
     /// Each run's end, from the origin, and its way, metres.
-    fn reckon(&self, geometry: &DriveGeometry) -> impl Iterator<Item = (Pose, f64)> {
+    fn dead_reckon(&self, geometry: &DriveGeometry) -> impl Iterator<Item = (Pose, f64)> {
         let session = self.dataset.session();
         let ends: Vec<(Pose, f64)> = session
             .runs

@@ -230,7 +230,7 @@ pub(super) fn show(
         ids.join(", "),
         setting.within
     );
-    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
+    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::ParameterValues(predicts)))
 }
 
 fn from_size(smallest: &Smallest) -> String {
@@ -356,7 +356,8 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         shows.len() + blind_to.len(),
         setting.within
     );
-    let next_experiment = text::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
+    let next_experiment =
+        text::next_experiment(&parts, &setting, minutes, &why, Predictions::ParameterValues(predicts));
     Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
 }
 

@@ -64,7 +64,9 @@ pub(super) fn discriminate(
     let sigmas = discriminated.iter().filter_map(|pair| rivals.apart(&after, *pair)).map(|apart| apart.sigmas);
     let sigmas = sigmas.fold(f64::INFINITY, f64::min);
     let (what, predicts) = predictions(base, &without, &rivals, &before, &discriminated, &parts, setting)
-        .map_or((String::new(), Predictions::Sizes(BTreeMap::new())), |(what, of)| (what, Predictions::Of(of)));
+        .map_or((String::new(), Predictions::ParameterValues(BTreeMap::new())), |(what, of)| {
+            (what, Predictions::Of(of))
+        });
     let pairs = |pairs: &[(usize, usize)]| {
         let each: Vec<String> = pairs.iter().map(|(a, b)| format!("{} from {}", id(*a), id(*b))).collect();
         each.join(", ")

@@ -116,7 +116,7 @@ fn protocol(sessions: &[PlannedSession]) -> String {
 /// What is said of each name beforehand.
 pub(super) enum Predictions {
     /// From which size on it would show.
-    Sizes(BTreeMap<String, String>),
+    ParameterValues(BTreeMap<String, String>),
     /// What it will show.
     Of(Predicted),
 }
@@ -129,7 +129,7 @@ pub(super) fn next_experiment(
     predicts: Predictions,
 ) -> NextExperiment {
     let (predicts, predicted) = match predicts {
-        Predictions::Sizes(predicts) => (predicts, None),
+        Predictions::ParameterValues(predicts) => (predicts, None),
         Predictions::Of(predicted) => {
             let words = |(id, value): (&String, &Value)| (id.clone(), offset(value, &predicted.component));
             (predicted.values.iter().map(words).collect(), Some(predicted))

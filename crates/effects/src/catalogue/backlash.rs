@@ -9,11 +9,11 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, SizeLaw};
-use crate::description::{Description, Told};
+use crate::benchmark::{Benchmark, ParameterLaw};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -36,7 +36,7 @@ pub struct Backlash {
 
 impl PhysicalEffect for Backlash {
     fn check(&self) -> Result<(), EffectError> {
-        EffectError::unless_sizes("backlash", [("left_gap_m", self.left_gap_m), ("right_gap_m", self.right_gap_m)])
+        EffectError::unless_negative("backlash", [("left_gap_m", self.left_gap_m), ("right_gap_m", self.right_gap_m)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
@@ -50,19 +50,19 @@ impl PhysicalEffect for Backlash {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let [left, right] = ["left_gap_m", "right_gap_m"].map(|name| sizes.shown(name, 1e3, "mm"));
+            summary: Summary::WithValues(|values| {
+                let [left, right] = ["left_gap_m", "right_gap_m"].map(|name| values.shown(name, 1e3, "mm"));
                 format!("{MEANING}: {left} on the left, {right} on the right")
             }),
             benchmark: Benchmark {
                 // No width is held: the gaps themselves are the sizes.
-                sizes: SizeLaw::Direction { held: |_, _, _| Vec::new(), positive: true },
+                values: ParameterLaw::Direction { fixed: |_, _, _| Vec::new(), positive: true },
                 // Where in its gap a wheel was left.
                 has_random_signature: true,
                 ..Benchmark::OF_MEAN.with_form(
                     "play with a spring in it: the lead reaches its limit over the width of the gap",
-                    |sizes, _| {
-                        let half_gap_m = |name| 0.5 * size(sizes, name).unwrap_or(0.0);
+                    |values, _| {
+                        let half_gap_m = |name| 0.5 * value_of(values, name).unwrap_or(0.0);
                         let half_gap_m = Wheels { left: half_gap_m("left_gap_m"), right: half_gap_m("right_gap_m") };
                         Box::new(SpringyPlay { half_gap_m, lead_m: Wheels::default() })
                     },
@@ -73,8 +73,8 @@ impl PhysicalEffect for Backlash {
     }
 
     /// A wheel whose gap was found negative has none.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (left_gap_m, right_gap_m) = (size(sizes, "left_gap_m")?, size(sizes, "right_gap_m")?);
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (left_gap_m, right_gap_m) = (value_of(values, "left_gap_m")?, value_of(values, "right_gap_m")?);
         (left_gap_m > 0.0 || right_gap_m > 0.0)
             .then(|| Self { left_gap_m: left_gap_m.max(0.0), right_gap_m: right_gap_m.max(0.0) })
     }

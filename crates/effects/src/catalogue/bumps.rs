@@ -7,17 +7,17 @@
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, HostRobot, NamedSize};
+use crate::benchmark::{Benchmark, HostRobot, ParameterValue};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::hypothesis::{Hypothesis, Sign, value_of};
 use crate::stream::Stream;
 
 /// Height of a bump of scale 1 in the blind benchmark, metres.
 const LARGE_HEIGHT_M: f64 = 3e-3;
 /// Scales of the distance that a wheel loses over a bump, metres: from what no instrument shows to a sill.
-const LOST_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+const LOSS_SCALES_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 
 /// Bumps on the floor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,11 +31,11 @@ pub struct Bumps {
 
 impl PhysicalEffect for Bumps {
     fn check(&self) -> Result<(), EffectError> {
-        EffectError::unless_sizes("bumps", [("per_m", self.per_m), ("height_m", self.height_m)])
+        EffectError::unless_negative("bumps", [("per_m", self.per_m), ("height_m", self.height_m)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None, ahead_m: Wheels::both(f64::INFINITY) }))
+        Some(Box::new(State { effect: *self, stream: None, ahead_m: Wheels::both(f64::INFINITY) }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -44,7 +44,7 @@ impl PhysicalEffect for Bumps {
 
     fn description() -> Description {
         Description {
-            isolated_error: Some(IsolatedError::LostOnTheWay { scales_m: &LOST_M }),
+            isolated_error: Some(IsolatedError::LostOnTheWay { scales_m: &LOSS_SCALES_M }),
             benchmark: Benchmark {
                 ..Benchmark::of_scatter(|_, stream| {
                     (vec![("height_m", LARGE_HEIGHT_M)], vec![("per_m", stream.log_uniform(0.1, 1.0))])
@@ -54,18 +54,18 @@ impl PhysicalEffect for Bumps {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { per_m: size(sizes, "per_m")?, height_m: size(sizes, "height_m")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { per_m: value_of(values, "per_m")?, height_m: value_of(values, "height_m")? })
     }
 
     /// What a bump costs grows with the power 3/2 of its height.
-    fn at_scale(sizes: &[NamedSize], scale: f64, _: &HostRobot) -> Option<Self> {
-        Some(Self { per_m: size(sizes, "per_m")?, height_m: LARGE_HEIGHT_M * scale.powf(2.0 / 3.0) })
+    fn at_scale(values: &[ParameterValue], scale: f64, _: &HostRobot) -> Option<Self> {
+        Some(Self { per_m: value_of(values, "per_m")?, height_m: LARGE_HEIGHT_M * scale.powf(2.0 / 3.0) })
     }
 }
 
 struct State {
-    size: Bumps,
+    effect: Bumps,
     stream: Option<Stream>,
     /// Way to the next bump of each wheel, metres.
     ahead_m: Wheels<f64>,
@@ -88,7 +88,7 @@ impl Forward for State {
     }
 
     fn seed_run(&mut self, mut stream: Stream) {
-        self.ahead_m = Wheels::from_sides(|_| gap_m(&mut stream, self.size.per_m));
+        self.ahead_m = Wheels::from_sides(|_| gap_m(&mut stream, self.effect.per_m));
         self.stream = Some(stream);
     }
 
@@ -98,8 +98,8 @@ impl Forward for State {
             let travel_m = step.travel_m[side];
             self.ahead_m[side] -= travel_m.abs();
             while self.ahead_m[side] < 0.0 {
-                self.ahead_m[side] += gap_m(stream, self.size.per_m);
-                step.travel_m[side] -= travel_m.signum() * lost_m(step.radius_m[side], self.size.height_m);
+                self.ahead_m[side] += gap_m(stream, self.effect.per_m);
+                step.travel_m[side] -= travel_m.signum() * lost_m(step.radius_m[side], self.effect.height_m);
             }
         }
     }
@@ -129,8 +129,8 @@ mod tests {
 
     #[test]
     fn wheels_meet_the_stated_number_each() {
-        let size = Bumps { per_m: 2.0, height_m: 0.005 };
-        let mut state = size.forward().expect("acts on the floor");
+        let effect = Bumps { per_m: 2.0, height_m: 0.005 };
+        let mut state = effect.forward().expect("acts on the floor");
         state.seed_run(Address { seed: 4, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         let (mut met, distance_m) = (Wheels::both(0.0), 5000.0);
         for _ in 0..50_000 {

@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sin_cos, sinc};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, in_room, size};
+use crate::hypothesis::{Hypothesis, Variant, in_room, value_of};
 
 /// Pull of a carpet.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -35,7 +35,7 @@ impl PhysicalEffect for CarpetNap {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -44,23 +44,23 @@ impl PhysicalEffect for CarpetNap {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             ..Description::of("the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven")
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
-            drift_x: size(sizes, "drift_x")?,
-            drift_y: size(sizes, "drift_y")?,
-            yaw_sin_rad_m: size(sizes, "yaw_sin_rad_m")?,
-            yaw_cos_rad_m: size(sizes, "yaw_cos_rad_m")?,
+            drift_x: value_of(values, "drift_x")?,
+            drift_y: value_of(values, "drift_y")?,
+            yaw_sin_rad_m: value_of(values, "yaw_sin_rad_m")?,
+            yaw_cos_rad_m: value_of(values, "yaw_cos_rad_m")?,
         })
     }
 }
 
 struct State {
-    size: CarpetNap,
+    effect: CarpetNap,
 }
 
 impl Forward for State {
@@ -69,7 +69,7 @@ impl Forward for State {
     }
 
     fn floor(&mut self, step: &mut Step) {
-        let CarpetNap { drift_x, drift_y, yaw_sin_rad_m, yaw_cos_rad_m } = self.size;
+        let CarpetNap { drift_x, drift_y, yaw_sin_rad_m, yaw_cos_rad_m } = self.effect;
         let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right).abs();
         let half_rad = 0.5 * (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
         let (sin, cos) = (step.world_from_body.theta_rad + half_rad).sin_cos();
@@ -79,7 +79,7 @@ impl Forward for State {
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
-        (self.size.yaw_sin_rad_m != 0.0 || self.size.yaw_cos_rad_m != 0.0)
+        (self.effect.yaw_sin_rad_m != 0.0 || self.effect.yaw_cos_rad_m != 0.0)
             .then_some("its turn bends the path on the way")
     }
 }
@@ -119,12 +119,12 @@ mod tests {
 
     #[test]
     fn the_nap_pulls_the_same_way_at_every_heading_and_turns_by_it() {
-        let size = CarpetNap { drift_x: 0.002, drift_y: -0.001, yaw_sin_rad_m: 0.03, yaw_cos_rad_m: 0.0 };
+        let effect = CarpetNap { drift_x: 0.002, drift_y: -0.001, yaw_sin_rad_m: 0.03, yaw_cos_rad_m: 0.0 };
         for (heading_rad, turn_rad) in [(0.0, 0.0), (FRAC_PI_2, 0.03), (-FRAC_PI_2, -0.03)] {
             let mut step = specimen_step();
             step.world_from_body.theta_rad = heading_rad;
             step.travel_m = Wheels::both(-1.0);
-            State { size }.floor(&mut step);
+            State { effect }.floor(&mut step);
             assert_eq!(step.creep_m, [0.002, -0.001]);
             assert!((step.extra_turn_rad - turn_rad).abs() < 1e-17);
         }

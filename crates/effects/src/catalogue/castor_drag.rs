@@ -10,10 +10,10 @@ use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the castor resists rolling aside";
@@ -33,12 +33,12 @@ pub struct CastorDrag {
 
 impl PhysicalEffect for CastorDrag {
     fn check(&self) -> Result<(), EffectError> {
-        EffectError::unless_sizes("castor_drag", [("drag_rad_m", self.drag_rad_m)])?;
+        EffectError::unless_negative("castor_drag", [("drag_rad_m", self.drag_rad_m)])?;
         EffectError::unless_positive("castor_drag", [("castor_behind_m", self.castor_behind_m)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -49,8 +49,8 @@ impl PhysicalEffect for CastorDrag {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let lost = sizes.shown("drag_rad_m", 1e3, "mrad");
+            summary: Summary::WithValues(|values| {
+                let lost = values.shown("drag_rad_m", 1e3, "mrad");
                 format!("{MEANING}: {lost} of turn lost for each metre that it rolls so")
             }),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("castor_behind_m", stream.uniform_in(0.1, 0.4))]),
@@ -58,13 +58,13 @@ impl PhysicalEffect for CastorDrag {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { drag_rad_m: size(sizes, "drag_rad_m")?, castor_behind_m: size(sizes, "castor_behind_m")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { drag_rad_m: value_of(values, "drag_rad_m")?, castor_behind_m: value_of(values, "castor_behind_m")? })
     }
 }
 
 struct State {
-    size: CastorDrag,
+    effect: CastorDrag,
 }
 
 impl Forward for State {
@@ -74,11 +74,11 @@ impl Forward for State {
 
     fn floor(&mut self, step: &mut Step) {
         let Wheels { left, right } = step.travel_m;
-        let aside_m = self.size.castor_behind_m * (right - left) / step.wheel_separation_m;
+        let aside_m = self.effect.castor_behind_m * (right - left) / step.wheel_separation_m;
         let rolled_m = aside_m.hypot(0.5 * (left + right));
         if rolled_m > 0.0 {
             let tread_m = 0.5 * (left.abs() + right.abs());
-            step.extra_turn_rad -= self.size.drag_rad_m * tread_m * aside_m / rolled_m;
+            step.extra_turn_rad -= self.effect.drag_rad_m * tread_m * aside_m / rolled_m;
         }
     }
 }
@@ -112,7 +112,7 @@ mod tests {
         let lost = |left: f64, right: f64| {
             let mut step = specimen_step();
             step.travel_m = Wheels { left, right };
-            State { size: CastorDrag { drag_rad_m: 0.1, castor_behind_m: 0.25 } }.floor(&mut step);
+            State { effect: CastorDrag { drag_rad_m: 0.1, castor_behind_m: 0.25 } }.floor(&mut step);
             step.extra_turn_rad
         };
         assert!((lost(-0.1, 0.1) + 0.1 * 0.1).abs() < 1e-16, "sin δ = 1 over 0.1 m of tread");

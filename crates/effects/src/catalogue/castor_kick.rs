@@ -11,10 +11,10 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::motion_history::{Hysteresis, Reversals, TURN_RAD};
 use crate::stream::Stream;
 
@@ -41,7 +41,7 @@ impl PhysicalEffect for CastorKick {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, flips: Flips::NONE }))
+        Some(Box::new(State { effect: *self, flips: FlipState::NONE }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -50,11 +50,11 @@ impl PhysicalEffect for CastorKick {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| format!("{MEANING} by {}", sizes.shown("kick_rad", 1e3, "mrad"))),
+            summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kick_rad", 1e3, "mrad"))),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("decay_m", stream.log_uniform(0.02, 0.2))]).with_form(
                 "a castor by its differential equation, which turns the robot as it flips",
-                |sizes, _| {
-                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                |values, _| {
+                    let of = |name| value_of(values, name).unwrap_or(0.0);
                     let (gain, trail_m) = (of("kick_rad") / std::f64::consts::PI, 0.5 * of("decay_m"));
                     Box::new(RollingCastor { gain, trail_m, psi_rad: 0.0 })
                 },
@@ -63,20 +63,20 @@ impl PhysicalEffect for CastorKick {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { kick_rad: size(sizes, "kick_rad")?, decay_m: size(sizes, "decay_m")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { kick_rad: value_of(values, "kick_rad")?, decay_m: value_of(values, "decay_m")? })
     }
 }
 
 /// Where a castor is in its flip.
 #[derive(Debug, Clone, Copy)]
-struct Flips {
+struct FlipState {
     /// A turn makes it lean.
     leans: Hysteresis,
     reversals: Reversals,
 }
 
-impl Flips {
+impl FlipState {
     const NONE: Self = Self { leans: Hysteresis::beyond(TURN_RAD), reversals: Reversals::NONE };
 
     /// The share of a kick that a way and a turn bring, with the sense of the last turn.
@@ -88,8 +88,8 @@ impl Flips {
 }
 
 struct State {
-    size: CastorKick,
-    flips: Flips,
+    effect: CastorKick,
+    flips: FlipState,
 }
 
 impl Forward for State {
@@ -98,13 +98,13 @@ impl Forward for State {
     }
 
     fn seed_run(&mut self, _stream: Stream) {
-        self.flips = Flips::NONE;
+        self.flips = FlipState::NONE;
     }
 
     fn floor(&mut self, step: &mut Step) {
         let distance_m = 0.5 * (step.travel_m.left + step.travel_m.right);
         let turn_rad = (step.travel_m.right - step.travel_m.left) / step.wheel_separation_m;
-        step.extra_turn_rad += self.size.kick_rad * self.flips.after(distance_m, turn_rad, self.size.decay_m);
+        step.extra_turn_rad += self.effect.kick_rad * self.flips.after(distance_m, turn_rad, self.effect.decay_m);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
@@ -116,12 +116,12 @@ impl Forward for State {
 #[derive(Clone)]
 struct Term {
     decay_m: f64,
-    flips: Flips,
+    flips: FlipState,
 }
 
 impl Term {
     const fn new(decay_m: f64) -> Self {
-        Self { decay_m, flips: Flips::NONE }
+        Self { decay_m, flips: FlipState::NONE }
     }
 }
 
@@ -184,8 +184,8 @@ mod tests {
 
     #[test]
     fn a_reversal_kicks_once_to_the_side_of_the_last_turn_and_a_new_start_does_not() {
-        let size = CastorKick { kick_rad: 0.02, decay_m: 0.05 };
-        let mut state = size.forward().expect("acts on the floor");
+        let effect = CastorKick { kick_rad: 0.02, decay_m: 0.05 };
+        let mut state = effect.forward().expect("acts on the floor");
         let mut drive = |left_m: f64, right_m: f64| -> f64 {
             (0..1000)
                 .map(|_| {

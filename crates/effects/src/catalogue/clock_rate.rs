@@ -8,10 +8,10 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Excitation, Told};
+use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "one clock runs fast";
@@ -31,7 +31,7 @@ impl PhysicalEffect for ClockRate {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -40,19 +40,19 @@ impl PhysicalEffect for ClockRate {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| format!("{MEANING}, by {}", sizes.shown("rate", 100.0, "%"))),
+            summary: Summary::WithValues(|values| format!("{MEANING}, by {}", values.shown("rate", 100.0, "%"))),
             excitation: Excitation::Conditions("log speeds beside an instrument with a clock of its own"),
             ..Description::of(MEANING)
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { rate: size(sizes, "rate")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { rate: value_of(values, "rate")? })
     }
 }
 
 struct State {
-    size: ClockRate,
+    effect: ClockRate,
 }
 
 impl Forward for State {
@@ -61,7 +61,7 @@ impl Forward for State {
     }
 
     fn clock(&mut self, sample: &mut SampleClock) {
-        sample.stamp_s *= 1.0 + self.size.rate;
+        sample.stamp_s *= 1.0 + self.effect.rate;
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn stamps_gain_and_readings_do_not() {
         let mut sample = SampleClock { stamp_s: 2.0, read_s: Wheels::both(2.0) };
-        State { size: ClockRate { rate: 0.01 } }.clock(&mut sample);
+        State { effect: ClockRate { rate: 0.01 } }.clock(&mut sample);
         assert_eq!(sample, SampleClock { stamp_s: 2.02, read_s: Wheels::both(2.0) });
     }
 }

@@ -11,7 +11,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::hypothesis::{Hypothesis, Sign, value_of};
 use crate::stream::Stream;
 
 /// Scatter of the effective wheelbase.
@@ -48,7 +48,7 @@ impl PhysicalEffect for ContactPatchWheelbase {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None, motion_m: 0.0, slow_m: 0.0 }))
+        Some(Box::new(State { effect: *self, stream: None, motion_m: 0.0, slow_m: 0.0 }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -62,15 +62,15 @@ impl PhysicalEffect for ContactPatchWheelbase {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let slow = |name| size(sizes, name).unwrap_or(0.0);
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let slow = |name| value_of(values, name).unwrap_or(0.0);
         let (slow_sigma_m, slow_length_m) = (slow("slow_sigma_m"), slow("slow_length_m"));
-        Some(Self { sigma_m: size(sizes, "sigma_m")?, slow_sigma_m, slow_length_m })
+        Some(Self { sigma_m: value_of(values, "sigma_m")?, slow_sigma_m, slow_length_m })
     }
 }
 
 struct State {
-    size: ContactPatchWheelbase,
+    effect: ContactPatchWheelbase,
     stream: Option<Stream>,
     motion_m: f64,
     slow_m: f64,
@@ -82,29 +82,29 @@ impl Forward for State {
     }
 
     fn seed_run(&mut self, mut stream: Stream) {
-        self.slow_m = self.size.slow_sigma_m * stream.normal();
+        self.slow_m = self.effect.slow_sigma_m * stream.normal();
         self.stream = Some(stream);
     }
 
     fn start_motion(&mut self) {
         if let Some(stream) = &mut self.stream {
-            self.motion_m = self.size.sigma_m * stream.normal();
+            self.motion_m = self.effect.sigma_m * stream.normal();
         }
     }
 
     fn floor(&mut self, step: &mut Step) {
-        if self.size.slow_sigma_m > 0.0
+        if self.effect.slow_sigma_m > 0.0
             && let Some(stream) = &mut self.stream
         {
             let travel_m = 0.5 * (step.travel_m.left.abs() + step.travel_m.right.abs());
-            let kept = (-travel_m / self.size.slow_length_m).exp();
-            self.slow_m = kept * self.slow_m + self.size.slow_sigma_m * (1.0 - kept * kept).sqrt() * stream.normal();
+            let kept = (-travel_m / self.effect.slow_length_m).exp();
+            self.slow_m = kept * self.slow_m + self.effect.slow_sigma_m * (1.0 - kept * kept).sqrt() * stream.normal();
         }
         step.wheel_separation_m += self.motion_m + self.slow_m;
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {
-        (self.size.slow_sigma_m > 0.0).then_some(SLOW_PART_VARIES)
+        (self.effect.slow_sigma_m > 0.0).then_some(SLOW_PART_VARIES)
     }
 }
 
@@ -116,8 +116,8 @@ mod tests {
 
     #[test]
     fn paper_eq_11_the_wheelbase_is_normal_from_motion_to_motion() {
-        let size = ContactPatchWheelbase { sigma_m: 1e-3, slow_sigma_m: 0.0, slow_length_m: 0.0 };
-        let mut state = size.forward().expect("acts in steps");
+        let effect = ContactPatchWheelbase { sigma_m: 1e-3, slow_sigma_m: 0.0, slow_length_m: 0.0 };
+        let mut state = effect.forward().expect("acts in steps");
         state.seed_run(Address { seed: 5, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         let (n, mut sum, mut squares) = (20_000, 0.0, 0.0);
         for _ in 0..n {
@@ -131,17 +131,17 @@ mod tests {
         let n = f64::from(n);
         // Five standard errors of a mean and of a variance.
         assert!((sum / n).abs() < 5.0 * 1e-3 / n.sqrt());
-        let stated_m = size.wheel_separation_sigma_m().expect("no slow part");
+        let stated_m = effect.wheel_separation_sigma_m().expect("no slow part");
         assert!((squares / n / (stated_m * stated_m) - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
-        let slow = ContactPatchWheelbase { slow_sigma_m: 1e-4, slow_length_m: 0.2, ..size };
+        let slow = ContactPatchWheelbase { slow_sigma_m: 1e-4, slow_length_m: 0.2, ..effect };
         assert_eq!(slow.wheel_separation_sigma_m(), Err(SLOW_PART_VARIES));
     }
 
     #[test]
     fn the_slow_part_has_the_same_variance_however_the_path_is_cut() {
         for parts in [1_u32, 16] {
-            let size = ContactPatchWheelbase { sigma_m: 0.0, slow_sigma_m: 1e-3, slow_length_m: 0.2 };
-            let mut state = size.forward().expect("acts in steps");
+            let effect = ContactPatchWheelbase { sigma_m: 0.0, slow_sigma_m: 1e-3, slow_length_m: 0.2 };
+            let mut state = effect.forward().expect("acts in steps");
             let (runs, mut squares, mut products) = (4000_u32, 0.0, 0.0);
             for run in 0..runs {
                 state.seed_run(

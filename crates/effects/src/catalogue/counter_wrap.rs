@@ -10,7 +10,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, value_of};
 
 /// Width of the recorded counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ impl PhysicalEffect for CounterWrap {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -41,13 +41,13 @@ impl PhysicalEffect for CounterWrap {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { bits: size(sizes, "bits")? as u32 })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { bits: value_of(values, "bits")? as u32 })
     }
 }
 
 struct State {
-    size: CounterWrap,
+    effect: CounterWrap,
 }
 
 impl Forward for State {
@@ -56,7 +56,7 @@ impl Forward for State {
     }
 
     fn readout(&mut self, readout: &mut Readout) {
-        let unused = 64 - self.size.bits;
+        let unused = 64 - self.effect.bits;
         readout.ticks = readout.ticks.map(|ticks| (ticks << unused) >> unused);
     }
 }
@@ -72,7 +72,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     shown.sort_unstable();
     shown.dedup();
     let without = |bits: u8| RecordCorrection {
-        sizes: vec![("bits", f64::from(bits))],
+        values: vec![("bits", f64::from(bits))],
         sentence: format!("the log keeps {bits} bits of the counters, which wrap"),
         visible_in_log: true,
         records: rewrite_wheels(
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn the_low_bits_are_kept_with_their_sign() {
-        let mut state = State { size: CounterWrap { bits: 24 } };
+        let mut state = State { effect: CounterWrap { bits: 24 } };
         let ticks = Wheels { left: (1 << 23) - 1, right: 1 << 23 };
         let mut readout = Readout { ticks, m_per_count: Wheels::both(1e-5), written: true };
         state.readout(&mut readout);

@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "forward and backward metres count differently";
@@ -46,16 +46,16 @@ impl PhysicalEffect for DirectionAsymmetry {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let [left, right] = ["left_asymmetry", "right_asymmetry"].map(|name| sizes.shown(name, 100.0, "%"));
+            summary: Summary::WithValues(|values| {
+                let [left, right] = ["left_asymmetry", "right_asymmetry"].map(|name| values.shown(name, 100.0, "%"));
                 format!("{MEANING}: by {left} on the left wheel, {right} on the right")
             }),
             ..Description::of(MEANING)
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { left_asymmetry: size(sizes, "left_asymmetry")?, right_asymmetry: size(sizes, "right_asymmetry")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { left_asymmetry: value_of(values, "left_asymmetry")?, right_asymmetry: value_of(values, "right_asymmetry")? })
     }
 }
 
@@ -99,8 +99,8 @@ mod tests {
 
     #[test]
     fn there_and_back_drifts_by_the_asymmetry() {
-        let size = DirectionAsymmetry { left_asymmetry: 0.0, right_asymmetry: 0.004 };
-        let mut state = size.forward().expect("acts on the floor");
+        let effect = DirectionAsymmetry { left_asymmetry: 0.0, right_asymmetry: 0.004 };
+        let mut state = effect.forward().expect("acts on the floor");
         let mut sum_m = Wheels::both(0.0);
         for travel_m in [1.0, -1.0] {
             let mut step = specimen_step();

@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
 use crate::stream::Stream;
 
 /// Rows lost with their counts.
@@ -31,7 +31,7 @@ impl PhysicalEffect for DroppedSamples {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None, last: None, lost: Wheels::both(0) }))
+        Some(Box::new(State { effect: *self, stream: None, last: None, lost: Wheels::both(0) }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -46,13 +46,13 @@ impl PhysicalEffect for DroppedSamples {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { probability: size(sizes, "probability")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { probability: value_of(values, "probability")? })
     }
 }
 
 struct State {
-    size: DroppedSamples,
+    effect: DroppedSamples,
     stream: Option<Stream>,
     last: Option<Wheels<i64>>,
     lost: Wheels<i64>,
@@ -64,14 +64,14 @@ impl Forward for State {
     }
 
     fn seed_run(&mut self, stream: Stream) {
-        *self = Self { size: self.size, stream: Some(stream), last: None, lost: Wheels::both(0) };
+        *self = Self { effect: self.effect, stream: Some(stream), last: None, lost: Wheels::both(0) };
     }
 
     fn readout(&mut self, readout: &mut Readout) {
         let Some(stream) = &mut self.stream else { return };
         let (counts, chance) = (readout.ticks, stream.uniform());
         if let Some(last) = self.last
-            && chance < self.size.probability
+            && chance < self.effect.probability
         {
             readout.written = false;
             let since = counts.zip_with(last, |counts, last| counts - last);
@@ -83,11 +83,11 @@ impl Forward for State {
 }
 
 /// An interval longer than the usual one by this factor is nearer to two of them: it may be a gap, or a pause of the log, and the counts tell.
-const GAP: f64 = 1.5;
+const GAP_RATIO: f64 = 1.5;
 /// With a smaller share of the counts that the speed around it asks for, a gap has lost some: one row in two leaves a half.
-const KEPT: f64 = 0.8;
+const MIN_KEPT_SHARE: f64 = 0.8;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
-const EVIDENT: usize = 3;
+const MIN_VISIBLE_FAULTS: usize = 3;
 
 /// What was missing of some runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -107,11 +107,11 @@ fn fill(odometry: &mut Odometry) -> Missing {
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return missing };
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let Some(usual_s) = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0) else { return missing };
-    let is_gap = |k: usize| lengths_s[k] > GAP * usual_s;
+    let is_gap = |k: usize| lengths_s[k] > GAP_RATIO * usual_s;
     let shown =
         ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
     // What came by itself, between two rows, is none.
-    let is_row = |k: &usize| !is_gap(*k) && lengths_s[*k] * GAP > usual_s;
+    let is_row = |k: &usize| !is_gap(*k) && lengths_s[*k] * GAP_RATIO > usual_s;
     let mut lost = Wheels::both(0.0);
     for (k, &length_s) in lengths_s.iter().enumerate() {
         if is_gap(k) {
@@ -125,7 +125,7 @@ fn fill(odometry: &mut Odometry) -> Missing {
             });
             let [due_of_both, shown_of_both] =
                 [due.left.abs() + due.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
-            if shown_of_both < KEPT * due_of_both {
+            if shown_of_both < MIN_KEPT_SHARE * due_of_both {
                 for side in Side::BOTH {
                     lost[side] += due[side] - shown[side][k];
                 }
@@ -157,9 +157,9 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         return Vec::new();
     }
     vec![RecordCorrection {
-        sizes: vec![("probability", missing.rows / (missing.rows + rows))],
+        values: vec![("probability", missing.rows / (missing.rows + rows))],
         sentence: format!("{} rows are missing, and their counts with them", missing.rows),
-        visible_in_log: missing.lost >= EVIDENT && missing.lost > missing.kept,
+        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && missing.lost > missing.kept,
         records,
     }]
 }

@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, LastAngle, Variant, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
 
 /// Cycles a turn that are tried; one a turn is an eccentric wheel to any data.
 const CYCLES: [f64; 11] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0];
@@ -65,20 +65,20 @@ impl PhysicalEffect for EncoderCycle {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let cycles = sizes.value("cycles").map_or_else(|| "some".to_owned(), |cycles| format!("{cycles:.0}"));
-                let off = sizes.amplitudes("_rad", 1e3, "mrad", "encoder is off");
+            summary: Summary::WithValues(|values| {
+                let cycles = values.value("cycles").map_or_else(|| "some".to_owned(), |cycles| format!("{cycles:.0}"));
+                let off = values.amplitudes("_rad", 1e3, "mrad", "encoder is off");
                 format!("an encoder errs {cycles} times a turn: {off}")
             }),
             ..Description::of("an encoder errs several times a turn")
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (left_sin, left_cos) = (size(sizes, "left_sin_rad")?, size(sizes, "left_cos_rad")?);
-        let (right_sin, right_cos) = (size(sizes, "right_sin_rad")?, size(sizes, "right_cos_rad")?);
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (left_sin, left_cos) = (value_of(values, "left_sin_rad")?, value_of(values, "left_cos_rad")?);
+        let (right_sin, right_cos) = (value_of(values, "right_sin_rad")?, value_of(values, "right_cos_rad")?);
         Some(Self {
-            cycles: size(sizes, "cycles")? as u32,
+            cycles: value_of(values, "cycles")? as u32,
             left_amplitude_rad: left_sin.hypot(left_cos),
             left_phase_rad: left_cos.atan2(left_sin),
             right_amplitude_rad: right_sin.hypot(right_cos),
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_cycle_shows_nothing_when_it_is_whole_and_twice_the_amplitude_at_its_half() {
-        let size = EncoderCycle {
+        let effect = EncoderCycle {
             cycles: 5,
             left_amplitude_rad: 0.01,
             left_phase_rad: 0.0,
@@ -171,7 +171,7 @@ mod tests {
             step.wheel_angle_rad = Wheels::both(from_rad);
             step.shaft_rad = Wheels::both(turned_rad);
             step.encoder_rad = step.shaft_rad;
-            size.forward().expect("acts on encoders").encoder(&mut step);
+            effect.forward().expect("acts on encoders").encoder(&mut step);
             assert_eq!(step.encoder_rad.right, turned_rad);
             step.encoder_rad.left - turned_rad
         };

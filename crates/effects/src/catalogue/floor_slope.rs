@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, in_room, size};
+use crate::hypothesis::{Hypothesis, Variant, in_room, value_of};
 
 /// Creep down a slope.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -35,24 +35,24 @@ impl PhysicalEffect for FloorSlope {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
-        let by = |way| Variant { held: Vec::new(), term: Box::new(Term { way }), at: None };
+        let by = |way| Variant { fixed: Vec::new(), term: Box::new(Term { way }), at: None };
         Hypothesis::Terms(vec![by(false), by(true)])
     }
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             ..Description::of("the floor slopes: the robot creeps in one direction of the room, whatever its heading")
         }
     }
 
     /// Creep with time or with the way, by which of them is named.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let pair = |x, y| size(sizes, x).zip(size(sizes, y));
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let pair = |x, y| value_of(values, x).zip(value_of(values, y));
         let (creep, slide) = (pair("creep_x_m_s", "creep_y_m_s"), pair("slide_x", "slide_y"));
         let ((creep_x_m_s, creep_y_m_s), (slide_x, slide_y)) = match (creep, slide) {
             (None, None) => return None,
@@ -63,7 +63,7 @@ impl PhysicalEffect for FloorSlope {
 }
 
 struct State {
-    size: FloorSlope,
+    effect: FloorSlope,
 }
 
 impl Forward for State {
@@ -72,7 +72,7 @@ impl Forward for State {
     }
 
     fn floor(&mut self, step: &mut Step) {
-        let FloorSlope { creep_x_m_s, creep_y_m_s, slide_x, slide_y } = self.size;
+        let FloorSlope { creep_x_m_s, creep_y_m_s, slide_x, slide_y } = self.effect;
         // At rest friction holds the wheels.
         let tread_m = 0.5 * (step.travel_m.left.abs() + step.travel_m.right.abs());
         let moving_s = if tread_m > 0.0 { step.dt_s } else { 0.0 };
@@ -82,7 +82,7 @@ impl Forward for State {
 
     /// Through the time that ramps take.
     fn depends_on_speed(&self) -> bool {
-        self.size.creep_x_m_s != 0.0 || self.size.creep_y_m_s != 0.0
+        self.effect.creep_x_m_s != 0.0 || self.effect.creep_y_m_s != 0.0
     }
 }
 
@@ -128,11 +128,11 @@ mod tests {
 
     #[test]
     fn a_robot_at_rest_stays_and_a_moving_one_creeps_whichever_way_it_drives() {
-        let size = FloorSlope { creep_x_m_s: 1e-3, creep_y_m_s: 0.0, slide_x: 0.0, slide_y: -2e-3 };
+        let effect = FloorSlope { creep_x_m_s: 1e-3, creep_y_m_s: 0.0, slide_x: 0.0, slide_y: -2e-3 };
         let creep_m = |travel_m: f64| {
             let mut step = specimen_step();
             step.travel_m = Wheels::both(travel_m);
-            State { size }.floor(&mut step);
+            State { effect }.floor(&mut step);
             step.creep_m
         };
         assert_eq!(creep_m(0.0), [0.0, 0.0]);

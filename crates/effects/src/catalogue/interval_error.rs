@@ -13,11 +13,11 @@ use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, Needs};
-use crate::description::{Description, Excitation, Told};
+use crate::description::{Description, Excitation, Summary};
 use crate::sampling_period::SamplingPeriodEstimator;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::stream::Stream;
 
 /// Irregular stamps.
@@ -32,18 +32,18 @@ pub struct IntervalError {
 
 impl IntervalError {
     /// The irregularity of a fitted effect, seconds: data show the share that is false, and their own irregularity.
-    pub(crate) const USUAL_JITTER_S: f64 = 0.005;
+    pub(crate) const TYPICAL_JITTER_S: f64 = 0.005;
 }
 
 impl PhysicalEffect for IntervalError {
     fn check(&self) -> Result<(), EffectError> {
         let id = "interval_error";
         EffectError::unless((0.0..=1.0).contains(&self.share), id, "share", self.share, "from 0 to 1")?;
-        EffectError::unless_sizes(id, [("jitter_s", self.jitter_s)])
+        EffectError::unless_negative(id, [("jitter_s", self.jitter_s)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None }))
+        Some(Box::new(State { effect: *self, stream: None }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -52,7 +52,7 @@ impl PhysicalEffect for IntervalError {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             excitation: Excitation::Conditions("log at intervals that differ"),
             goes_by_rows: true,
             benchmark: Benchmark {
@@ -66,10 +66,10 @@ impl PhysicalEffect for IntervalError {
     }
 
     /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
-            share: size(sizes, "share")?.min(1.0),
-            jitter_s: size(sizes, "jitter_s").unwrap_or(Self::USUAL_JITTER_S),
+            share: value_of(values, "share")?.min(1.0),
+            jitter_s: value_of(values, "jitter_s").unwrap_or(Self::TYPICAL_JITTER_S),
         })
     }
 
@@ -79,7 +79,7 @@ impl PhysicalEffect for IntervalError {
 }
 
 struct State {
-    size: IntervalError,
+    effect: IntervalError,
     stream: Option<Stream>,
 }
 
@@ -94,9 +94,9 @@ impl Forward for State {
 
     fn clock(&mut self, sample: &mut SampleClock) {
         let Some(stream) = &mut self.stream else { return };
-        let late_s = stream.uniform_about_zero(self.size.jitter_s);
+        let late_s = stream.uniform_about_zero(self.effect.jitter_s);
         sample.stamp_s += late_s;
-        sample.read_s = sample.read_s.map(|read_s| read_s + (1.0 - self.size.share) * late_s);
+        sample.read_s = sample.read_s.map(|read_s| read_s + (1.0 - self.effect.share) * late_s);
     }
 }
 
@@ -124,9 +124,9 @@ struct Row {
 }
 
 /// Rows whose speed is taken for that of the wheels, the last of them left out.
-const RECENT: usize = 5;
+const RECENT_ROWS: usize = 5;
 /// A wheel that went faster by this than it goes now has changed its speed.
-const CHANGES: f64 = 1.5;
+const SPEED_CHANGE_RATIO: f64 = 1.5;
 
 impl Term {
     /// The speed of the wheels by rows that have nothing to do with when this one and the one before were stamped: the speed of an interval by its own stamps goes
@@ -141,7 +141,7 @@ impl Term {
         }
         // At a start or a stop the rows before say little.
         travel_m
-            .zip_with(now_m_s, |travel_m, now| (travel_m / length_s).clamp(-CHANGES * now.abs(), CHANGES * now.abs()))
+            .zip_with(now_m_s, |travel_m, now| (travel_m / length_s).clamp(-SPEED_CHANGE_RATIO * now.abs(), SPEED_CHANGE_RATIO * now.abs()))
     }
 }
 
@@ -160,7 +160,7 @@ impl ModelTerm for Term {
         if self.row.is_none_or(|row| row.end_s != row_s) {
             if let Some(Row { length_s, travel_m, .. }) = self.row.take() {
                 self.recent.push_back((length_s, travel_m));
-                if self.recent.len() > RECENT {
+                if self.recent.len() > RECENT_ROWS {
                     self.recent.pop_front();
                 }
             }
@@ -186,8 +186,8 @@ mod tests {
 
     #[test]
     fn a_false_share_of_the_stamp_is_not_in_the_reading() {
-        let size = IntervalError { share: 0.25, jitter_s: 0.004 };
-        let mut state = size.forward().expect("acts on the clock");
+        let effect = IntervalError { share: 0.25, jitter_s: 0.004 };
+        let mut state = effect.forward().expect("acts on the clock");
         state.seed_run(Address { seed: 1, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         for row in 0..1000 {
             let due_s = f64::from(row);

@@ -9,10 +9,10 @@ use kinematics::{Pose, sinc};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the robot slides outwards in bends";
@@ -31,7 +31,7 @@ impl PhysicalEffect for LateralSkid {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -40,12 +40,12 @@ impl PhysicalEffect for LateralSkid {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING}, by {} times speed times yaw rate", sizes.shown("skid_s", 1e3, "ms"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}, by {} times speed times yaw rate", values.shown("skid_s", 1e3, "ms"))
             }),
             // Pacejka 2012: the side force of a tyre saturates with its slip angle.
-            benchmark: Benchmark::OF_MEAN.with_form("skid that saturates with the centripetal acceleration", |sizes, _| {
-                let (skid_s, knee_m_s2) = (size(sizes, "skid_s").unwrap_or(0.0), 0.3);
+            benchmark: Benchmark::OF_MEAN.with_form("skid that saturates with the centripetal acceleration", |values, _| {
+                let (skid_s, knee_m_s2) = (value_of(values, "skid_s").unwrap_or(0.0), 0.3);
                 FloorForm::boxed(move |step| {
                     let (v_m_s, omega_rad_s) = contact_twist(step);
                     let centripetal_m_s2 = v_m_s * omega_rad_s;
@@ -58,14 +58,14 @@ impl PhysicalEffect for LateralSkid {
     }
 
     /// A robot slides out of its bend: found negative it is something else.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let skid_s = size(sizes, "skid_s")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let skid_s = value_of(values, "skid_s")?;
         (skid_s >= 0.0).then_some(Self { skid_s })
     }
 }
 
 struct State {
-    size: LateralSkid,
+    effect: LateralSkid,
 }
 
 impl Forward for State {
@@ -79,11 +79,11 @@ impl Forward for State {
         let v_m_s = 0.5 * (speed_m_s.left + speed_m_s.right);
         let omega_rad_s = (speed_m_s.right - speed_m_s.left) / step.wheel_separation_m;
         let shortened = sinc(0.5 * omega_rad_s * step.dt_s);
-        step.lateral_m -= self.size.skid_s * v_m_s * omega_rad_s * step.dt_s * shortened;
+        step.lateral_m -= self.effect.skid_s * v_m_s * omega_rad_s * step.dt_s * shortened;
     }
 
     fn depends_on_speed(&self) -> bool {
-        self.size.skid_s != 0.0
+        self.effect.skid_s != 0.0
     }
 }
 
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn the_robot_slides_outwards_in_both_bends() {
-        let mut state = State { size: LateralSkid { skid_s: 5e-3 } };
+        let mut state = State { effect: LateralSkid { skid_s: 5e-3 } };
         for sense in [-1.0, 1.0] {
             let mut step = specimen_step();
             let half_m_s = 0.5 * 0.5 * sense * step.wheel_separation_m;

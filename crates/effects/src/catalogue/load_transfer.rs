@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "in bends the outer tyre is pressed flatter";
@@ -30,7 +30,7 @@ impl PhysicalEffect for LoadTransfer {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -39,8 +39,8 @@ impl PhysicalEffect for LoadTransfer {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let differ = sizes.shown("compression_s2_m", 100.0, "%");
+            summary: Summary::WithValues(|values| {
+                let differ = values.shown("compression_s2_m", 100.0, "%");
                 format!("{MEANING}: radii differ by {differ} for each m/s² of side acceleration, each way")
             }),
             ..Description::of(MEANING)
@@ -48,14 +48,14 @@ impl PhysicalEffect for LoadTransfer {
     }
 
     /// The tyre that carries more is pressed flatter: found negative it is something else.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let compression_s2_m = size(sizes, "compression_s2_m")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let compression_s2_m = value_of(values, "compression_s2_m")?;
         (compression_s2_m >= 0.0).then_some(Self { compression_s2_m })
     }
 }
 
 struct State {
-    size: LoadTransfer,
+    effect: LoadTransfer,
 }
 
 impl Forward for State {
@@ -66,13 +66,13 @@ impl Forward for State {
     fn wheel(&mut self, step: &mut Step) {
         let Wheels { left, right } = step.contact_speed_m_s();
         let centripetal_m_s2 = 0.5 * (left + right) * (right - left) / step.wheel_separation_m;
-        let pressed = self.size.compression_s2_m * centripetal_m_s2;
+        let pressed = self.effect.compression_s2_m * centripetal_m_s2;
         step.radius_m.left *= 1.0 + pressed;
         step.radius_m.right *= 1.0 - pressed;
     }
 
     fn depends_on_speed(&self) -> bool {
-        self.size.compression_s2_m != 0.0
+        self.effect.compression_s2_m != 0.0
     }
 }
 
@@ -103,7 +103,7 @@ mod tests {
         let radius_m = |left_m_s: f64, right_m_s: f64| {
             let mut step = specimen_step();
             step.rate_rad_s = Wheels { left: left_m_s, right: right_m_s }.map(|speed_m_s| speed_m_s / 0.08);
-            State { size: LoadTransfer { compression_s2_m: 0.004 } }.wheel(&mut step);
+            State { effect: LoadTransfer { compression_s2_m: 0.004 } }.wheel(&mut step);
             step.radius_m
         };
         let curvature = radius_m(0.3, 0.5);

@@ -11,10 +11,10 @@ use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -31,17 +31,17 @@ pub struct LowSpeedTruncation {
 }
 
 /// The cycle of a fitted effect, seconds: data show the loss per second alone.
-const USUAL_CYCLE_S: f64 = 0.02;
+const TYPICAL_CYCLE_S: f64 = 0.02;
 
 impl PhysicalEffect for LowSpeedTruncation {
     fn check(&self) -> Result<(), EffectError> {
-        EffectError::unless_sizes("low_speed_truncation", [("loss_m_s", self.loss_m_s)])?;
+        EffectError::unless_negative("low_speed_truncation", [("loss_m_s", self.loss_m_s)])?;
         EffectError::unless_positive("low_speed_truncation", [("cycle_s", self.cycle_s)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         let none = Wheels::both(0.0);
-        Some(Box::new(State { size: *self, stream: None, cycle_ends_s: 0.0, in_cycle_m: none, lost_m: none }))
+        Some(Box::new(State { effect: *self, stream: None, cycle_ends_s: 0.0, in_cycle_m: none, lost_m: none }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -50,8 +50,8 @@ impl PhysicalEffect for LowSpeedTruncation {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING}: {} of speed lost", sizes.shown("loss_m_s", 1e3, "mm/s"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}: {} of speed lost", values.shown("loss_m_s", 1e3, "mm/s"))
             }),
             benchmark: Benchmark {
                 // Which fraction of a count was lost.
@@ -62,13 +62,13 @@ impl PhysicalEffect for LowSpeedTruncation {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { loss_m_s: size(sizes, "loss_m_s")?, cycle_s: size(sizes, "cycle_s").unwrap_or(USUAL_CYCLE_S) })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { loss_m_s: value_of(values, "loss_m_s")?, cycle_s: value_of(values, "cycle_s").unwrap_or(TYPICAL_CYCLE_S) })
     }
 }
 
 struct State {
-    size: LowSpeedTruncation,
+    effect: LowSpeedTruncation,
     stream: Option<Stream>,
     cycle_ends_s: f64,
     in_cycle_m: Wheels<f64>,
@@ -82,7 +82,7 @@ impl Forward for State {
 
     fn seed_run(&mut self, stream: Stream) {
         self.stream = Some(stream);
-        self.cycle_ends_s = self.size.cycle_s;
+        self.cycle_ends_s = self.effect.cycle_s;
         self.in_cycle_m = Wheels::both(0.0);
         self.lost_m = Wheels::both(0.0);
     }
@@ -90,7 +90,7 @@ impl Forward for State {
     /// Watches what the counters see; the controllers, which count whole, are not disturbed.
     fn encoder(&mut self, step: &mut Step) {
         let Some(stream) = &mut self.stream else { return };
-        let unit_m = 2.0 * self.size.loss_m_s * self.size.cycle_s;
+        let unit_m = 2.0 * self.effect.loss_m_s * self.effect.cycle_s;
         let step_m = step.encoder_rad.zip_with(step.nominal_radius_m, |rad, radius_m| rad * radius_m);
         let (mut from_s, end_s) = (step.t_s, step.t_s + step.dt_s);
         // Cycles end between the engine's steps too: way by whole steps would make few fractions, the same ones over and over.
@@ -101,7 +101,7 @@ impl Forward for State {
             self.lost_m = self.lost_m.zip_with(in_cycle_m, |lost_m, distance_m| lost_m + fraction_m(distance_m));
             self.in_cycle_m = Wheels::both(0.0);
             from_s = self.cycle_ends_s;
-            self.cycle_ends_s += self.size.cycle_s * (0.5 + stream.uniform());
+            self.cycle_ends_s += self.effect.cycle_s * (0.5 + stream.uniform());
         }
         let rest = (end_s - from_s) / step.dt_s;
         self.in_cycle_m = self.in_cycle_m.zip_with(step_m, |distance_m, step_m| distance_m + rest * step_m);
@@ -143,8 +143,8 @@ mod tests {
     #[test]
     fn half_a_unit_is_lost_a_cycle_in_both_directions_and_the_controller_is_left_alone() {
         for sense in [-1.0, 1.0] {
-            let size = LowSpeedTruncation { loss_m_s: 2e-3, cycle_s: 0.02 };
-            let mut state = size.forward().expect("acts on the record");
+            let effect = LowSpeedTruncation { loss_m_s: 2e-3, cycle_s: 0.02 };
+            let mut state = effect.forward().expect("acts on the record");
             state.seed_run(Address { seed: 7, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
             let (steps, dt_s) = (100_000, 1e-3); // 5000 cycles
             for k in 0..steps {

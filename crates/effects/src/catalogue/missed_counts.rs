@@ -8,11 +8,11 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, SizeLaw};
-use crate::description::{Description, Told};
+use crate::benchmark::{Benchmark, ParameterLaw};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "counts are lost at high speed";
@@ -37,7 +37,7 @@ pub struct MissedCounts {
 impl PhysicalEffect for MissedCounts {
     fn check(&self) -> Result<(), EffectError> {
         let id = "missed_counts";
-        EffectError::unless_sizes(id, [("hinge_speed_m_s", self.hinge_speed_m_s)])?;
+        EffectError::unless_negative(id, [("hinge_speed_m_s", self.hinge_speed_m_s)])?;
         for (name, value) in [("left_lost_share", self.left_lost_share), ("right_lost_share", self.right_lost_share)] {
             EffectError::unless((0.0..1.0).contains(&value), id, name, value, "in [0, 1)")?;
         }
@@ -55,21 +55,21 @@ impl PhysicalEffect for MissedCounts {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let [left, right] = ["left_lost_share", "right_lost_share"].map(|name| sizes.shown(name, 100.0, "%"));
-                let hinge = sizes.value("hinge_speed_m_s");
+            summary: Summary::WithValues(|values| {
+                let [left, right] = ["left_lost_share", "right_lost_share"].map(|name| values.shown(name, 100.0, "%"));
+                let hinge = values.value("hinge_speed_m_s");
                 let hinge = hinge.map_or_else(|| "some speed".to_owned(), |hinge| format!("{hinge:.2} m/s"));
                 format!("{MEANING}: {left} on the left, {right} on the right above {hinge}")
             }),
             benchmark: Benchmark {
-                sizes: SizeLaw::Direction {
-                    held: |_, robot, stream| {
+                values: ParameterLaw::Direction {
+                    fixed: |_, robot, stream| {
                         vec![("hinge_speed_m_s", stream.uniform_in(0.3, 0.8) * robot.cruise_speed_m_s)]
                     },
                     positive: true,
                 },
-                ..Benchmark::OF_MEAN.with_form("a hinge that is round over a tenth of the cruise speed", |sizes, robot| {
-                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                ..Benchmark::OF_MEAN.with_form("a hinge that is round over a tenth of the cruise speed", |values, robot| {
+                    let of = |name| value_of(values, name).unwrap_or(0.0);
                     Box::new(RoundHinge {
                         lost_share: Wheels { left: of("left_lost_share"), right: of("right_lost_share") },
                         hinge_m_s: of("hinge_speed_m_s"),
@@ -82,9 +82,9 @@ impl PhysicalEffect for MissedCounts {
     }
 
     /// A counter whose lost share was found negative loses none.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (left, right) = (size(sizes, "left_lost_share")?, size(sizes, "right_lost_share")?);
-        let hinge_speed_m_s = size(sizes, "hinge_speed_m_s")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (left, right) = (value_of(values, "left_lost_share")?, value_of(values, "right_lost_share")?);
+        let hinge_speed_m_s = value_of(values, "hinge_speed_m_s")?;
         (left > 0.0 || right > 0.0).then(|| Self {
             hinge_speed_m_s,
             left_lost_share: left.max(0.0),

@@ -9,11 +9,11 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, HostRobot, NamedSize, Needs};
-use crate::description::{Description, Excitation, Told};
+use crate::benchmark::{Benchmark, HostRobot, ParameterValue, Needs};
+use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// The run's covariate that says what the robot carries; a run without it carries nothing.
 const PAYLOAD: &str = "payload_kg";
@@ -40,18 +40,18 @@ impl PayloadCompression {
 impl PhysicalEffect for PayloadCompression {
     fn check(&self) -> Result<(), EffectError> {
         let id = "payload_compression";
-        let sizes = [("common_per_kg", self.common_per_kg), ("mismatch_per_kg", self.mismatch_per_kg)];
-        EffectError::unless_finite(id, sizes)?;
+        let values = [("common_per_kg", self.common_per_kg), ("mismatch_per_kg", self.mismatch_per_kg)];
+        EffectError::unless_finite(id, values)?;
         EffectError::unless(!self.payload_kg.is_empty(), id, PAYLOAD, 0.0, "one payload or more")?;
         self.payload_kg.iter().try_for_each(|&payload_kg| {
-            EffectError::unless_sizes(id, [(PAYLOAD, payload_kg)])?;
+            EffectError::unless_negative(id, [(PAYLOAD, payload_kg)])?;
             let most = Self::per_kg(self.common_per_kg, self.mismatch_per_kg).map(|per_kg| payload_kg * per_kg);
             EffectError::unless(most.left.max(most.right) < 1.0, id, PAYLOAD, payload_kg, "less than flattens a tyre")
         })
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: self.clone(), factor: Wheels::both(1.0) }))
+        Some(Box::new(State { effect: self.clone(), factor: Wheels::both(1.0) }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -60,7 +60,7 @@ impl PhysicalEffect for PayloadCompression {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             excitation: Excitation::Conditions("drive the same runs with another payload, its covariate stated"),
             benchmark: Benchmark {
                 needs: Needs { payload: true, ..Needs::NONE },
@@ -71,13 +71,13 @@ impl PhysicalEffect for PayloadCompression {
     }
 
     /// Unloaded: what the runs carry is the experiment's.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (common_per_kg, mismatch_per_kg) = (size(sizes, "common_per_kg")?, size(sizes, "mismatch_per_kg")?);
-        Some(Self { common_per_kg, mismatch_per_kg, payload_kg: vec![size(sizes, PAYLOAD).unwrap_or(0.0)] })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (common_per_kg, mismatch_per_kg) = (value_of(values, "common_per_kg")?, value_of(values, "mismatch_per_kg")?);
+        Some(Self { common_per_kg, mismatch_per_kg, payload_kg: vec![value_of(values, PAYLOAD).unwrap_or(0.0)] })
     }
 
-    fn at_scale(sizes: &[NamedSize], _: f64, robot: &HostRobot) -> Option<Self> {
-        Some(Self { payload_kg: robot.payload_kg.clone(), ..Self::from_estimates(sizes)? })
+    fn at_scale(values: &[ParameterValue], _: f64, robot: &HostRobot) -> Option<Self> {
+        Some(Self { payload_kg: robot.payload_kg.clone(), ..Self::from_estimates(values)? })
     }
 
     fn harmless(robot: &HostRobot) -> Option<Self> {
@@ -87,7 +87,7 @@ impl PhysicalEffect for PayloadCompression {
 }
 
 struct State {
-    size: PayloadCompression,
+    effect: PayloadCompression,
     /// Of each wheel's radius in this run.
     factor: Wheels<f64>,
 }
@@ -98,7 +98,7 @@ impl Forward for State {
     }
 
     fn on_run_start(&mut self, run: &mut RunStart<'_>) {
-        let PayloadCompression { common_per_kg, mismatch_per_kg, payload_kg } = &self.size;
+        let PayloadCompression { common_per_kg, mismatch_per_kg, payload_kg } = &self.effect;
         let payload_kg = payload_kg[run.number as usize % payload_kg.len()];
         if payload_kg > 0.0 {
             run.info.covariates.insert(PAYLOAD.to_owned(), payload_kg);
@@ -140,8 +140,8 @@ mod tests {
 
     #[test]
     fn runs_carry_their_loads_in_turn_and_say_so() {
-        let size = PayloadCompression { common_per_kg: 1e-3, mismatch_per_kg: 2e-4, payload_kg: vec![0.0, 5.0] };
-        let mut state = size.forward().expect("acts on wheels");
+        let effect = PayloadCompression { common_per_kg: 1e-3, mismatch_per_kg: 2e-4, payload_kg: vec![0.0, 5.0] };
+        let mut state = effect.forward().expect("acts on wheels");
         for (number, payload_kg) in [(0, 0.0), (1, 5.0), (2, 0.0), (3, 5.0)] {
             let mut info = RunInfo::default();
             state.on_run_start(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, size};
+use crate::hypothesis::{Hypothesis, value_of};
 
 /// Coarseness of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,7 +26,7 @@ impl PhysicalEffect for Quantization {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -37,13 +37,13 @@ impl PhysicalEffect for Quantization {
         Description::of("the log keeps whole ticks of several counts each")
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { counts_per_tick: size(sizes, "counts_per_tick")? as u32 })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { counts_per_tick: value_of(values, "counts_per_tick")? as u32 })
     }
 }
 
 struct State {
-    size: Quantization,
+    effect: Quantization,
 }
 
 impl Forward for State {
@@ -52,11 +52,11 @@ impl Forward for State {
     }
 
     fn readout(&mut self, readout: &mut Readout) {
-        readout.ticks = readout.ticks.map(|counts| counts.div_euclid(i64::from(self.size.counts_per_tick)));
+        readout.ticks = readout.ticks.map(|counts| counts.div_euclid(i64::from(self.effect.counts_per_tick)));
     }
 
     fn counts_per_tick(&self) -> Option<u32> {
-        Some(self.size.counts_per_tick)
+        Some(self.effect.counts_per_tick)
     }
 }
 
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn ticks_are_floors_on_both_sides_of_zero() {
-        let mut state = State { size: Quantization { counts_per_tick: 80 } };
+        let mut state = State { effect: Quantization { counts_per_tick: 80 } };
         let ticks = Wheels { left: 159, right: -1 };
         let mut readout = Readout { ticks, m_per_count: Wheels::both(1e-5), written: true };
         state.readout(&mut readout);

@@ -12,7 +12,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, value_of};
 
 /// Counters that run the other way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ impl PhysicalEffect for ReversedWheel {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -49,13 +49,13 @@ impl PhysicalEffect for ReversedWheel {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { left: size(sizes, "left")? != 0.0, right: size(sizes, "right")? != 0.0 })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { left: value_of(values, "left")? != 0.0, right: value_of(values, "right")? != 0.0 })
     }
 }
 
 struct State {
-    size: ReversedWheel,
+    effect: ReversedWheel,
 }
 
 impl Forward for State {
@@ -64,10 +64,10 @@ impl Forward for State {
     }
 
     fn readout(&mut self, readout: &mut Readout) {
-        if self.size.left {
+        if self.effect.left {
             readout.ticks.left = -readout.ticks.left;
         }
-        if self.size.right {
+        if self.effect.right {
             readout.ticks.right = -readout.ticks.right;
         }
     }
@@ -93,7 +93,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         let twist = |twist| by_wheels(&dataset.robot, twist, |speed_m_s| speed_m_s.zip_with(sign, |v, sign| sign * v));
         let flag = |reversed: bool| f64::from(u8::from(reversed));
         RecordCorrection {
-            sizes: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
+            values: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
             sentence: sentence.to_owned(),
             visible_in_log: false,
             records: rewrite_wheels(dataset, turned, twist),

@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// Delay of the right reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ impl PhysicalEffect for SamplingSkew {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -36,20 +36,20 @@ impl PhysicalEffect for SamplingSkew {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("the right counter is read {} after the left one", sizes.shown("right_delay_s", 1e3, "ms"))
+            summary: Summary::WithValues(|values| {
+                format!("the right counter is read {} after the left one", values.shown("right_delay_s", 1e3, "ms"))
             }),
             ..Description::of("the right counter is read later than the left one")
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { right_delay_s: size(sizes, "right_delay_s")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { right_delay_s: value_of(values, "right_delay_s")? })
     }
 }
 
 struct State {
-    size: SamplingSkew,
+    effect: SamplingSkew,
 }
 
 impl Forward for State {
@@ -58,7 +58,7 @@ impl Forward for State {
     }
 
     fn clock(&mut self, sample: &mut SampleClock) {
-        sample.read_s.right += self.size.right_delay_s;
+        sample.read_s.right += self.effect.right_delay_s;
     }
 }
 
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn only_the_right_reading_is_late() {
         let mut sample = SampleClock { stamp_s: 1.0, read_s: Wheels::both(1.0) };
-        State { size: SamplingSkew { right_delay_s: 0.5 } }.clock(&mut sample);
+        State { effect: SamplingSkew { right_delay_s: 0.5 } }.clock(&mut sample);
         assert_eq!(sample, SampleClock { stamp_s: 1.0, read_s: Wheels { left: 1.0, right: 1.5 } });
     }
 }

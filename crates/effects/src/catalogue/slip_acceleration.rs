@@ -9,10 +9,10 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the ground speed lags behind the wheels'";
@@ -31,7 +31,7 @@ impl PhysicalEffect for SlipAcceleration {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -40,9 +40,9 @@ impl PhysicalEffect for SlipAcceleration {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| format!("{MEANING} by {}", sizes.shown("kappa_s", 1e3, "ms"))),
-            benchmark: Benchmark::OF_MEAN.with_form("slip that saturates, as tanh of the acceleration", |sizes, robot| {
-                let (kappa_s, knee_m_s2) = (size(sizes, "kappa_s").unwrap_or(0.0), 0.7 * robot.acceleration_m_s2);
+            summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kappa_s", 1e3, "ms"))),
+            benchmark: Benchmark::OF_MEAN.with_form("slip that saturates, as tanh of the acceleration", |values, robot| {
+                let (kappa_s, knee_m_s2) = (value_of(values, "kappa_s").unwrap_or(0.0), 0.7 * robot.acceleration_m_s2);
                 FloorForm::boxed(move |step| {
                     let acceleration = step.contact_acceleration_m_s2();
                     let lost_m = |a: f64| kappa_s * knee_m_s2 * (a / knee_m_s2).tanh() * step.dt_s;
@@ -54,14 +54,14 @@ impl PhysicalEffect for SlipAcceleration {
     }
 
     /// The ground lags behind the wheel, and does not lead: found negative it is something else.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let kappa_s = size(sizes, "kappa_s")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let kappa_s = value_of(values, "kappa_s")?;
         (kappa_s >= 0.0).then_some(Self { kappa_s })
     }
 }
 
 struct State {
-    size: SlipAcceleration,
+    effect: SlipAcceleration,
 }
 
 impl Forward for State {
@@ -70,7 +70,7 @@ impl Forward for State {
     }
 
     fn floor(&mut self, step: &mut Step) {
-        let lost_m = step.contact_acceleration_m_s2().map(|a_m_s2| self.size.kappa_s * a_m_s2 * step.dt_s);
+        let lost_m = step.contact_acceleration_m_s2().map(|a_m_s2| self.effect.kappa_s * a_m_s2 * step.dt_s);
         step.travel_m = step.travel_m.zip_with(lost_m, |travel_m, lost_m| travel_m - lost_m);
     }
 
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_symmetric_start_and_stop_leaves_nothing() {
-        let mut state = State { size: SlipAcceleration { kappa_s: 5e-3 } };
+        let mut state = State { effect: SlipAcceleration { kappa_s: 5e-3 } };
         let mut lost_m = Vec::new();
         for acceleration_rad_s2 in [10.0, 0.0, -10.0] {
             let mut step = specimen_step();

@@ -9,10 +9,10 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the wheels lose distance in proportion to their speed";
@@ -31,7 +31,7 @@ impl PhysicalEffect for SlipSpeed {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -40,12 +40,12 @@ impl PhysicalEffect for SlipSpeed {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING}: {} of it for each m/s", sizes.shown("slip_s_m", 100.0, "%"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}: {} of it for each m/s", values.shown("slip_s_m", 100.0, "%"))
             }),
             // Pacejka 2012: the force of a tyre saturates with its slip.
-            benchmark: Benchmark::OF_MEAN.with_form("the share lost saturates, as tanh of the speed", |sizes, robot| {
-                let (lost, knee_m_s) = (size(sizes, "slip_s_m").unwrap_or(0.0), 0.7 * robot.cruise_speed_m_s);
+            benchmark: Benchmark::OF_MEAN.with_form("the share lost saturates, as tanh of the speed", |values, robot| {
+                let (lost, knee_m_s) = (value_of(values, "slip_s_m").unwrap_or(0.0), 0.7 * robot.cruise_speed_m_s);
                 FloorForm::boxed(move |step| {
                     let speed_m_s = step.contact_speed_m_s();
                     let share = |v: f64| 1.0 - lost * knee_m_s * (v.abs() / knee_m_s).tanh();
@@ -57,14 +57,14 @@ impl PhysicalEffect for SlipSpeed {
     }
 
     /// Contacts slip back, not ahead: found negative it is something else.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let slip_s_m = size(sizes, "slip_s_m")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let slip_s_m = value_of(values, "slip_s_m")?;
         (slip_s_m >= 0.0).then_some(Self { slip_s_m })
     }
 }
 
 struct State {
-    size: SlipSpeed,
+    effect: SlipSpeed,
 }
 
 impl Forward for State {
@@ -73,12 +73,12 @@ impl Forward for State {
     }
 
     fn floor(&mut self, step: &mut Step) {
-        let slip = step.contact_speed_m_s().map(|speed_m_s| self.size.slip_s_m * speed_m_s.abs());
+        let slip = step.contact_speed_m_s().map(|speed_m_s| self.effect.slip_s_m * speed_m_s.abs());
         step.travel_m = step.travel_m.zip_with(slip, |travel_m, slip| travel_m * (1.0 - slip));
     }
 
     fn depends_on_speed(&self) -> bool {
-        self.size.slip_s_m != 0.0
+        self.effect.slip_s_m != 0.0
     }
 }
 
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn slip_grows_with_the_square_of_speed_and_opposes_it() {
-        let mut state = State { size: SlipSpeed { slip_s_m: 0.02 } };
+        let mut state = State { effect: SlipSpeed { slip_s_m: 0.02 } };
         for rate_rad_s in [-6.0, 3.0] {
             let mut step = specimen_step();
             step.rate_rad_s.left = rate_rad_s;

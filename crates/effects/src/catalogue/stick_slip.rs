@@ -15,11 +15,11 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, Sign, size};
+use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
 use crate::stream::Stream;
 
 /// Scales of the distance by which a contact winds up, metres: from what no instrument shows to a sill.
-const WIND_UPS_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+const WIND_UP_SCALES_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 
 /// Sticking contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,8 +33,8 @@ pub struct StickSlip {
 
 impl PhysicalEffect for StickSlip {
     fn check(&self) -> Result<(), EffectError> {
-        let sizes = [("stick_speed_m_s", self.stick_speed_m_s), ("breakaway_m", self.breakaway_m)];
-        EffectError::unless_sizes("stick_slip", sizes)
+        let values = [("stick_speed_m_s", self.stick_speed_m_s), ("breakaway_m", self.breakaway_m)];
+        EffectError::unless_negative("stick_slip", values)
     }
 
     /// Of the age of a renewal process in its stationary state, `E[h³]/(3 E[h])` less the square of its mean.
@@ -44,7 +44,7 @@ impl PhysicalEffect for StickSlip {
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
         let none = Wheels::both(0.0);
-        Some(Box::new(State { size: *self, stream: None, wound_m: none, holds_m: none }))
+        Some(Box::new(State { effect: *self, stream: None, wound_m: none, holds_m: none }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -55,7 +55,7 @@ impl PhysicalEffect for StickSlip {
 
     fn description() -> Description {
         Description {
-            isolated_error: Some(IsolatedError::WoundUp { scales_m: &WIND_UPS_M }),
+            isolated_error: Some(IsolatedError::WoundUp { scales_m: &WIND_UP_SCALES_M }),
             benchmark: Benchmark::of_scatter(|robot, _| {
                 (vec![("breakaway_m", 1e-3)], vec![("stick_speed_m_s", 0.5 * robot.cruise_speed_m_s)])
             }),
@@ -63,13 +63,13 @@ impl PhysicalEffect for StickSlip {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { stick_speed_m_s: size(sizes, "stick_speed_m_s")?, breakaway_m: size(sizes, "breakaway_m")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { stick_speed_m_s: value_of(values, "stick_speed_m_s")?, breakaway_m: value_of(values, "breakaway_m")? })
     }
 }
 
 struct State {
-    size: StickSlip,
+    effect: StickSlip,
     stream: Option<Stream>,
     /// What each tread has gone without its contact, metres.
     wound_m: Wheels<f64>,
@@ -84,7 +84,7 @@ impl Forward for State {
 
     fn seed_run(&mut self, mut stream: Stream) {
         self.wound_m = Wheels::both(0.0);
-        self.holds_m = Wheels::from_sides(|_| 2.0 * self.size.breakaway_m * stream.uniform());
+        self.holds_m = Wheels::from_sides(|_| 2.0 * self.effect.breakaway_m * stream.uniform());
         self.stream = Some(stream);
     }
 
@@ -93,13 +93,13 @@ impl Forward for State {
         let speed_m_s = step.contact_speed_m_s();
         for side in Side::BOTH {
             let wound_m = self.wound_m[side] + step.travel_m[side];
-            if speed_m_s[side].abs() < self.size.stick_speed_m_s && wound_m.abs() < self.holds_m[side] {
+            if speed_m_s[side].abs() < self.effect.stick_speed_m_s && wound_m.abs() < self.holds_m[side] {
                 self.wound_m[side] = wound_m;
                 step.travel_m[side] = 0.0;
             } else if self.wound_m[side] != 0.0 {
                 self.wound_m[side] = 0.0;
                 step.travel_m[side] = wound_m;
-                self.holds_m[side] = 2.0 * self.size.breakaway_m * stream.uniform();
+                self.holds_m[side] = 2.0 * self.effect.breakaway_m * stream.uniform();
             }
         }
     }
@@ -114,9 +114,9 @@ const STICK_SPEEDS_M_S: [f64; 6] = [0.01, 0.025, 0.05, 0.1, 0.17, 0.3];
 /// Mean wind-up of a contact that creeps on and on, over the mean breakaway: `E[h²]/(2 E[h])` of a breakaway h that is uniform from nothing on.
 const MEAN_WIND_UP: f64 = 2.0 / 3.0;
 /// Way over which the mean wind-up comes to that, over the mean breakaway: by least squares over ways of up to two breakaways.
-const WINDS_UP_OVER: f64 = 0.5;
+const WIND_UP_RATIO: f64 = 0.5;
 /// A breakaway that is usual, metres: the way over which a wind-up comes about is taken from it, whatever its size.
-const USUAL_BREAKAWAY_M: f64 = 1e-3;
+const TYPICAL_BREAKAWAY_M: f64 = 1e-3;
 
 /// The mean wind-up for each unit of the mean breakaway.
 #[derive(Clone)]
@@ -139,20 +139,20 @@ impl Term {
             return wound;
         }
         // Forward is where the tread goes: what is wound up the other way unwinds first.
-        let (sense, way) = (travel_m.signum(), travel_m.abs() / USUAL_BREAKAWAY_M);
+        let (sense, way) = (travel_m.signum(), travel_m.abs() / TYPICAL_BREAKAWAY_M);
         let unwound = (sense * wound).min(0.0) + way;
         let wound = (sense * wound).max(0.0);
         if unwound <= 0.0 {
             return sense * unwound;
         }
-        sense * (MEAN_WIND_UP + (wound - MEAN_WIND_UP) * (-unwound / WINDS_UP_OVER).exp())
+        sense * (MEAN_WIND_UP + (wound - MEAN_WIND_UP) * (-unwound / WIND_UP_RATIO).exp())
     }
 }
 
 impl ModelTerm for Term {
     /// Plausible: a millimetre, what a soft tyre gives way; no one has measured it.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "breakaway_m", unit: "m", prior_sigma: USUAL_BREAKAWAY_M }]
+        &[TermParameter { name: "breakaway_m", unit: "m", prior_sigma: TYPICAL_BREAKAWAY_M }]
     }
 
     fn restart(&mut self, _run: &RunInfo) {
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn the_term_is_the_mean_of_many_contacts() {
-        let (breakaway_m, stick_speed_m_s, speed_m_s) = (USUAL_BREAKAWAY_M, 0.02, 0.01);
+        let (breakaway_m, stick_speed_m_s, speed_m_s) = (TYPICAL_BREAKAWAY_M, 0.02, 0.01);
         let mut step = specimen_step();
         step.rate_rad_s = Wheels::both(speed_m_s / 0.08);
         let each_m = speed_m_s * step.dt_s;

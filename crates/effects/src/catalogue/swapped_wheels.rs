@@ -11,7 +11,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, value_of};
 
 /// Columns that have changed places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,8 +42,8 @@ impl PhysicalEffect for SwappedWheels {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { swapped: size(sizes, "swapped")? != 0.0 })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { swapped: value_of(values, "swapped")? != 0.0 })
     }
 }
 
@@ -69,7 +69,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let turned =
         |twist: Twist| by_wheels(&dataset.robot, twist, |Wheels { left, right }| Wheels { left: right, right: left });
     vec![RecordCorrection {
-        sizes: vec![("swapped", 1.0)],
+        values: vec![("swapped", 1.0)],
         sentence: "the left and the right counter are swapped".to_owned(),
         visible_in_log: false,
         records: rewrite_wheels(dataset, changed, turned),

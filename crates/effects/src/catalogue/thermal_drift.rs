@@ -9,10 +9,10 @@ use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Excitation, Told};
+use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the scale drifts with the time of the session";
@@ -39,7 +39,7 @@ impl PhysicalEffect for ThermalDrift {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, session_s: 0.0 }))
+        Some(Box::new(State { effect: *self, session_s: 0.0 }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -48,14 +48,14 @@ impl PhysicalEffect for ThermalDrift {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING}, by {} in the end", sizes.shown("growth", 100.0, "%"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}, by {} in the end", values.shown("growth", 100.0, "%"))
             }),
             excitation: Excitation::Conditions("drive the same runs cold and an hour later"),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("tau_s", stream.log_uniform(60.0, 1000.0))]).with_form(
                 "wheels that warm up hyperbolically: t/(t + τ) for 1 − e^{−t/τ}",
-                |sizes, _| {
-                    let of = |name| size(sizes, name).unwrap_or(0.0);
+                |values, _| {
+                    let of = |name| value_of(values, name).unwrap_or(0.0);
                     Box::new(Warming { growth: of("growth"), tau_s: of("tau_s"), session_s: 0.0 })
                 },
             ),
@@ -63,13 +63,13 @@ impl PhysicalEffect for ThermalDrift {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { growth: size(sizes, "growth")?, tau_s: size(sizes, "tau_s")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { growth: value_of(values, "growth")?, tau_s: value_of(values, "tau_s")? })
     }
 }
 
 struct State {
-    size: ThermalDrift,
+    effect: ThermalDrift,
     session_s: f64,
 }
 
@@ -84,7 +84,7 @@ impl Forward for State {
 
     /// The mean over the step, exactly: e^{−t/τ} (1 − e^{−x})/x with x = Δt/τ.
     fn wheel(&mut self, step: &mut Step) {
-        let ThermalDrift { growth, tau_s } = self.size;
+        let ThermalDrift { growth, tau_s } = self.effect;
         let x = step.dt_s / tau_s;
         let mean = if x > 0.0 { -(-x).exp_m1() / x } else { 1.0 };
         let cold = (-(self.session_s + step.t_s) / tau_s).exp() * mean;
@@ -93,7 +93,7 @@ impl Forward for State {
 
     /// Through the time that ramps take.
     fn depends_on_speed(&self) -> bool {
-        self.size.growth != 0.0
+        self.effect.growth != 0.0
     }
 }
 
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn growth_comes_with_the_sessions_time_however_it_is_cut() {
-        let mut state = State { size: ThermalDrift { growth: 0.002, tau_s: 600.0 }, session_s: 0.0 };
+        let mut state = State { effect: ThermalDrift { growth: 0.002, tau_s: 600.0 }, session_s: 0.0 };
         let mut info = RunInfo::default();
         state.on_run_start(&mut RunStart { number: 3, session_s: 540.0, session_m: 0.0, info: &mut info });
         let mut mean_m = |from_s: f64, dt_s: f64| {

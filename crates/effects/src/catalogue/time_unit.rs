@@ -11,13 +11,13 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
 
 /// Factors between units of time that people use.
 const FACTORS: [f64; 6] = [1e3, 1e6, 1e9, 1e-3, 1e-6, 1e-9];
 
 /// How far from a factor a ratio of two spans may be: measurements need not begin and end with the log.
-const WITHIN: f64 = 4.0;
+const MAX_SPAN_RATIO: f64 = 4.0;
 
 /// The log's unit of time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,7 +33,7 @@ impl PhysicalEffect for TimeUnit {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -47,13 +47,13 @@ impl PhysicalEffect for TimeUnit {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { factor: size(sizes, "factor")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { factor: value_of(values, "factor")? })
     }
 }
 
 struct State {
-    size: TimeUnit,
+    effect: TimeUnit,
 }
 
 impl Forward for State {
@@ -62,7 +62,7 @@ impl Forward for State {
     }
 
     fn clock(&mut self, sample: &mut SampleClock) {
-        sample.stamp_s *= self.size.factor;
+        sample.stamp_s *= self.effect.factor;
     }
 }
 
@@ -75,7 +75,7 @@ fn seen_s(run: &Run) -> impl Iterator<Item = f64> {
 }
 
 /// The log's span over that of the measurements, by the middle run.
-fn ratio_of_spans(dataset: &Dataset) -> Option<f64> {
+fn span_ratio(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
         let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
         let (first_s, last_s) =
@@ -86,10 +86,10 @@ fn ratio_of_spans(dataset: &Dataset) -> Option<f64> {
 }
 
 /// Speed of a usual robot, m/s.
-const USUAL_M_S: f64 = 0.3;
+const TYPICAL_SPEED_M_S: f64 = 0.3;
 
 /// How far, in logarithms, the robot's mean speed by its log is from a usual robot's.
-fn off_usual(dataset: &Dataset) -> f64 {
+fn off_typical(dataset: &Dataset) -> f64 {
     let robot = &dataset.robot;
     let m_per_rad = 0.25 * (robot.left_wheel_diameter_m + robot.right_wheel_diameter_m);
     let (mut distance_m, mut time_s) = (0.0, 0.0);
@@ -112,12 +112,12 @@ fn off_usual(dataset: &Dataset) -> f64 {
         distance_m += m_per_rad * turned_rad;
         time_s += length_s;
     }
-    if distance_m > 0.0 && time_s > 0.0 { (distance_m / time_s / USUAL_M_S).ln().abs() } else { 0.0 }
+    if distance_m > 0.0 && time_s > 0.0 { (distance_m / time_s / TYPICAL_SPEED_M_S).ln().abs() } else { 0.0 }
 }
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
-    let Some(ratio) = ratio_of_spans(dataset) else { return Vec::new() };
-    let near = |factor: &f64| ratio / factor < WITHIN && factor / ratio < WITHIN;
+    let Some(ratio) = span_ratio(dataset) else { return Vec::new() };
+    let near = |factor: &f64| ratio / factor < MAX_SPAN_RATIO && factor / ratio < MAX_SPAN_RATIO;
     let Some(factor) = FACTORS.into_iter().find(near) else { return Vec::new() };
     let (mut log, mut measurements) = (dataset.clone(), dataset.clone());
     for run in &mut log.runs {
@@ -133,11 +133,11 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     }
     let mut forms = [(log, factor, "the log's"), (measurements, factor.recip(), "the instrument's")];
     // Which of the two is in seconds, the ratio does not say; the speed does.
-    forms.sort_by(|a, b| off_usual(&a.0).total_cmp(&off_usual(&b.0)));
+    forms.sort_by(|a, b| off_typical(&a.0).total_cmp(&off_typical(&b.0)));
     forms
         .into_iter()
         .map(|(records, factor, whose)| RecordCorrection {
-            sizes: vec![("factor", factor)],
+            values: vec![("factor", factor)],
             sentence: format!("{whose} times are off by a factor of {factor:e}"),
             visible_in_log: true,
             records,

@@ -12,11 +12,11 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
 use crate::stream::Stream;
 
 /// Steps of torn bytes, counts.
-const JUMPS: [i64; 2] = [1 << 8, 1 << 16];
+const TORN_STEPS_COUNTS: [i64; 2] = [1 << 8, 1 << 16];
 
 /// Torn reads.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,12 +32,12 @@ impl PhysicalEffect for TornRead {
     fn check(&self) -> Result<(), EffectError> {
         let (id, probability) = ("torn_read", self.probability);
         EffectError::unless((0.0..=1.0).contains(&probability), id, "probability", probability, "from 0 to 1")?;
-        let holds = JUMPS.contains(&i64::from(self.jump_counts));
+        let holds = TORN_STEPS_COUNTS.contains(&i64::from(self.jump_counts));
         EffectError::unless(holds, id, "jump_counts", f64::from(self.jump_counts), "256 or 65536")
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None }))
+        Some(Box::new(State { effect: *self, stream: None }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -53,14 +53,14 @@ impl PhysicalEffect for TornRead {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let jump_counts = size(sizes, "jump_counts")? as u32;
-        Some(Self { probability: size(sizes, "probability")?, jump_counts })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let jump_counts = value_of(values, "jump_counts")? as u32;
+        Some(Self { probability: value_of(values, "probability")?, jump_counts })
     }
 }
 
 struct State {
-    size: TornRead,
+    effect: TornRead,
     stream: Option<Stream>,
 }
 
@@ -77,8 +77,8 @@ impl Forward for State {
         let Some(stream) = &mut self.stream else { return };
         for side in Side::BOTH {
             let (chance, sense) = (stream.uniform(), stream.uniform());
-            if chance < self.size.probability {
-                let jump = i64::from(self.size.jump_counts);
+            if chance < self.effect.probability {
+                let jump = i64::from(self.effect.jump_counts);
                 readout.ticks[side] += if sense < 0.5 { jump } else { -jump };
             }
         }
@@ -86,25 +86,25 @@ impl Forward for State {
 }
 
 /// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median stands most of them.
-const AROUND: usize = 4;
+const NEIGHBOUR_ROWS: usize = 4;
 /// Rows that are torn one after the other, at most.
 const MAX_ROWS: usize = 2;
 
 /// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
 /// their neighbours, and jumps that are not undone, are none of this fault.
-fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
+fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     let step = jump as f64;
     let increment = |k: usize| (ticks[k + 1] - ticks[k]) as f64;
     let last = ticks.len().saturating_sub(1);
     let out_of_line = |k: usize| {
-        let near = k.saturating_sub(AROUND)..(k + AROUND + 1).min(last);
+        let near = k.saturating_sub(NEIGHBOUR_ROWS)..(k + NEIGHBOUR_ROWS + 1).min(last);
         let rate = median(near.map(|near| increment(near) / (t_s[near + 1] - t_s[near])).collect()).unwrap_or(0.0);
         increment(k) - rate * (t_s[k + 1] - t_s[k])
     };
     let all: Vec<f64> = (0..last).map(out_of_line).collect();
-    let usual = median(all.iter().map(|off| off.abs()).collect()).unwrap_or(f64::INFINITY);
-    if usual > step / 8.0 {
-        return Mended::default();
+    let typical = median(all.iter().map(|off| off.abs()).collect()).unwrap_or(f64::INFINITY);
+    if typical > step / 8.0 {
+        return Restored::default();
     }
     let jumps: Vec<f64> = all
         .into_iter()
@@ -113,7 +113,7 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
             if (off - jumps * step).abs() < step / 4.0 { jumps } else { 0.0 }
         })
         .collect();
-    let mut mended = 0;
+    let mut restored = 0;
     let (mut at, mut used, mut first_used) = (0, 0, false);
     while at < last {
         // A wheel that starts or stops is out of line as well, but what a tear does is undone a row or two later.
@@ -128,12 +128,12 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
             continue;
         }
         first_used |= at == 0;
-        mended += put_back(&mut ticks[at + 1..], jumps, jump);
+        restored += put_back(&mut ticks[at + 1..], jumps, jump);
         at += back + 1;
         used = at;
     }
     // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after to undo them.
-    if mended > 0 {
+    if restored > 0 {
         let ends = [(0, -jumps[0], !first_used), (last, jumps[last - 1], used < last)];
         // A wheel that starts or stops there is on the line through the two increments beside, and not where a tear of its own puts it.
         let rate = |k: usize| (ticks[k + 1] - ticks[k]) as f64 / (t_s[k + 1] - t_s[k]);
@@ -141,38 +141,38 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Mended {
             (rate(own) - 2.0 * rate(next) + rate(further)) * (t_s[own + 1] - t_s[own])
         };
         let off_lines = if last < 3 { [0.0; 2] } else { [-off_line(0, 1, 2), off_line(last - 1, last - 2, last - 3)] };
-        for ((row, astray, free), off_line) in ends.into_iter().zip(off_lines) {
-            if free && astray.abs() == 1.0 && (off_line - astray * step).abs() < step / 4.0 {
-                let off = astray as i64;
+        for ((row, outlying, free), off_line) in ends.into_iter().zip(off_lines) {
+            if free && outlying.abs() == 1.0 && (off_line - outlying * step).abs() < step / 4.0 {
+                let off = outlying as i64;
                 ticks[row] -= off * jump;
-                mended += 1;
+                restored += 1;
             }
         }
     }
-    Mended { samples: mended, plainly: if usual < step / PLAINLY { mended } else { 0 } }
+    Restored { samples: restored, clear: if typical < step / CLEAR_JUMP_RATIO { restored } else { 0 } }
 }
 
 /// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that jitter make some that measurement alike.
-const PLAINLY: f64 = 64.0;
+const CLEAR_JUMP_RATIO: f64 = 64.0;
 
 /// Samples put back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Mended {
+struct Restored {
     samples: usize,
     /// Those of columns in which nothing else looks like a jump.
-    plainly: usize,
+    clear: usize,
 }
 
 /// Takes the sum of the jumps so far off each count, and says how many were astray.
 fn put_back(ticks: &mut [i64], jumps: &[f64], jump: i64) -> usize {
-    let (mut astray, mut mended) = (0.0, 0);
+    let (mut outlying, mut restored) = (0.0, 0);
     for (count, jumps) in ticks.iter_mut().zip(jumps) {
-        astray += jumps;
-        let off = astray as i64;
+        outlying += jumps;
+        let off = outlying as i64;
         *count -= off * jump;
-        mended += usize::from(off != 0);
+        restored += usize::from(off != 0);
     }
-    mended
+    restored
 }
 
 /// Whether counts go more smoothly without jumps from one row on: a tear bends them by four jumps, of which two are gone where another tear is beside it, and what is none is
@@ -181,23 +181,23 @@ fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
     let from = at.saturating_sub(1);
     let near = &ticks[from..(at + jumps.len() + 2).min(ticks.len())];
     let roughness = |ticks: &[i64]| -> i64 { ticks.windows(3).map(|of| (of[2] - 2 * of[1] + of[0]).abs()).sum() };
-    let mut mended = near.to_vec();
-    put_back(&mut mended[at + 1 - from..], jumps, jump);
-    roughness(near) - roughness(&mended) >= jump
+    let mut restored = near.to_vec();
+    put_back(&mut restored[at + 1 - from..], jumps, jump);
+    roughness(near) - roughness(&restored) >= jump
 }
 
 /// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so, or is not back in time.
 fn undone(jumps: &[f64]) -> Option<usize> {
-    let mut astray = *jumps.first()?;
-    if astray.abs() != 1.0 {
+    let mut outlying = *jumps.first()?;
+    if outlying.abs() != 1.0 {
         return None;
     }
     for (rows, jumps) in jumps.iter().enumerate().skip(1).take(MAX_ROWS) {
-        astray += jumps;
-        if astray == 0.0 {
+        outlying += jumps;
+        if outlying == 0.0 {
             return Some(rows);
         }
-        if astray.abs() > 1.0 {
+        if outlying.abs() > 1.0 {
             break;
         }
     }
@@ -205,28 +205,28 @@ fn undone(jumps: &[f64]) -> Option<usize> {
 }
 
 /// Jumps of just a torn byte that are undone at once: one may be an accident, two are none.
-const EVIDENT: usize = 2;
+const MIN_VISIBLE_FAULTS: usize = 2;
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let without = |jump: i64| {
-        let (mut mended, mut plainly, mut samples) = (0, 0, 0);
+        let (mut restored, mut clear, mut samples) = (0, 0, 0);
         let mut records = dataset.clone();
         for run in &mut records.runs {
             if let WheelLog::Ticks(Wheels { left, right }) = &mut run.odometry.wheels {
                 samples += left.len() + right.len();
                 for column in [left, right] {
                     let found = mend(&run.odometry.t_s, column, jump);
-                    mended += found.samples;
-                    plainly += found.plainly;
+                    restored += found.samples;
+                    clear += found.clear;
                 }
             }
         }
-        (mended > 0).then(|| RecordCorrection {
-            sizes: vec![("probability", mended as f64 / samples as f64), ("jump_counts", jump as f64)],
-            sentence: format!("{mended} counts were torn while they were read, off by {jump}"),
-            visible_in_log: plainly >= EVIDENT,
+        (restored > 0).then(|| RecordCorrection {
+            values: vec![("probability", restored as f64 / samples as f64), ("jump_counts", jump as f64)],
+            sentence: format!("{restored} counts were torn while they were read, off by {jump}"),
+            visible_in_log: clear >= MIN_VISIBLE_FAULTS,
             records,
         })
     };
-    JUMPS.into_iter().filter_map(without).collect()
+    TORN_STEPS_COUNTS.into_iter().filter_map(without).collect()
 }

@@ -11,15 +11,15 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, HostRobot, NamedSize};
+use crate::benchmark::{Benchmark, HostRobot, ParameterValue};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, Sign, size};
+use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
 
 /// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it
 /// should, to one that holds nearly nothing.
-const SLIDES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
+const SLIDE_SCALES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 
 /// Standard gravity, m/s² (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -55,17 +55,17 @@ impl PhysicalEffect for TractionLoss {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, ground_m_s: Wheels::both(0.0), sliding: Wheels::both(false) }))
+        Some(Box::new(State { effect: *self, ground_m_s: Wheels::both(0.0), sliding: Wheels::both(false) }))
     }
 
     fn hypothesis() -> Hypothesis {
-        let terms = Variant::along("holds_m_s2", &HOLDS_M_S2, |holds_m_s2| Box::new(Term::new(holds_m_s2)));
+        let terms = Variant::along("holds_m_s2", &GRIP_M_S2, |grip_m_s2| Box::new(Term::new(grip_m_s2)));
         Hypothesis::TermsAndScatter(terms, &[Sign::DistanceJumps, Sign::HeadingJumps])
     }
 
     fn description() -> Description {
         Description {
-            isolated_error: Some(IsolatedError::LostWithSpeedChange { scales_s: &SLIDES_S }),
+            isolated_error: Some(IsolatedError::LostWithSpeedChange { scales_s: &SLIDE_SCALES_S }),
             benchmark: Benchmark {
                 max_scale: 2.5,
                 // The share of the acceleration that the floor does not hold.
@@ -79,37 +79,37 @@ impl PhysicalEffect for TractionLoss {
     }
 
     /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's sliding there is beyond it.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        if let Some((sliding, holds_m_s2)) = size(sizes, "sliding").zip(size(sizes, "holds_m_s2")) {
-            return (sliding >= 0.0).then(|| Self::sliding(sliding, holds_m_s2));
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        if let Some((sliding, grip_m_s2)) = value_of(values, "sliding").zip(value_of(values, "holds_m_s2")) {
+            return (sliding >= 0.0).then(|| Self::sliding(sliding, grip_m_s2));
         }
         Some(Self {
-            static_friction: size(sizes, "static_friction")?,
-            kinetic_friction: size(sizes, "kinetic_friction")?,
-            stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
+            static_friction: value_of(values, "static_friction")?,
+            kinetic_friction: value_of(values, "kinetic_friction")?,
+            stribeck_speed_m_s: value_of(values, "stribeck_speed_m_s")?,
         })
     }
 
-    fn at_scale(sizes: &[NamedSize], _: f64, _: &HostRobot) -> Option<Self> {
-        let static_friction = size(sizes, "needs")? * (1.0 - size(sizes, "excess")?);
+    fn at_scale(values: &[ParameterValue], _: f64, _: &HostRobot) -> Option<Self> {
+        let static_friction = value_of(values, "needs")? * (1.0 - value_of(values, "excess")?);
         Some(Self {
             static_friction,
             kinetic_friction: 0.7 * static_friction,
-            stribeck_speed_m_s: size(sizes, "stribeck_speed_m_s")?,
+            stribeck_speed_m_s: value_of(values, "stribeck_speed_m_s")?,
         })
     }
 }
 
 #[derive(Clone)]
 struct State {
-    size: TractionLoss,
+    effect: TractionLoss,
     ground_m_s: Wheels<f64>,
     sliding: Wheels<bool>,
 }
 
 impl State {
     fn held_m_s2(&self, sliding_m_s: f64) -> f64 {
-        let TractionLoss { static_friction, kinetic_friction, stribeck_speed_m_s } = self.size;
+        let TractionLoss { static_friction, kinetic_friction, stribeck_speed_m_s } = self.effect;
         let excess = (static_friction - kinetic_friction) * (-sliding_m_s.abs() / stribeck_speed_m_s).exp();
         GRAVITY_M_S2 * (kinetic_friction + excess)
     }
@@ -146,7 +146,7 @@ impl Forward for State {
         for side in Side::BOTH {
             let before_m_s = self.ground_m_s[side];
             if !self.sliding[side] {
-                if acceleration_m_s2[side].abs() <= GRAVITY_M_S2 * self.size.static_friction {
+                if acceleration_m_s2[side].abs() <= GRAVITY_M_S2 * self.effect.static_friction {
                     self.ground_m_s[side] = speed_m_s[side];
                     continue;
                 }
@@ -164,36 +164,36 @@ impl Forward for State {
 }
 
 /// Accelerations up to which the floor holds that are tried, m/s².
-const HOLDS_M_S2: [f64; 10] = [0.1, 0.2, 0.3, 0.36, 0.43, 0.52, 0.62, 0.75, 0.9, 1.2];
+const GRIP_M_S2: [f64; 10] = [0.1, 0.2, 0.3, 0.36, 0.43, 0.52, 0.62, 0.75, 0.9, 1.2];
 /// Kinetic over static friction, and the Stribeck speed, m/s, of a usual floor: rubber slides with two thirds to four fifths of what it holds.
-const USUAL_KINETIC: f64 = 0.7;
-const USUAL_STRIBECK_M_S: f64 = 0.05;
+const TYPICAL_KINETIC: f64 = 0.7;
+const TYPICAL_STRIBECK_M_S: f64 = 0.05;
 
 /// With what power of the acceleration the way that is lost falls where a floor holds a little more or less than is asked of it: four to six, as driven in the blind benchmark.
-const LOST_BY_HOLDS: f64 = 5.0;
+const LOSS_EXPONENT: f64 = 5.0;
 /// A floor on which less than this of the sliding is found holds all.
 const MIN_SLIDING: f64 = 1e-3;
 
 impl TractionLoss {
     /// The usual floor on which so many times as much way is lost as on one that holds up to an acceleration.
-    fn sliding(sliding: f64, holds_m_s2: f64) -> Self {
-        Self::usual(holds_m_s2 * sliding.max(MIN_SLIDING).powf(-1.0 / LOST_BY_HOLDS))
+    fn sliding(sliding: f64, grip_m_s2: f64) -> Self {
+        Self::typical(grip_m_s2 * sliding.max(MIN_SLIDING).powf(-1.0 / LOSS_EXPONENT))
     }
 
     /// A usual floor that holds up to an acceleration.
-    fn usual(holds_m_s2: f64) -> Self {
-        let static_friction = holds_m_s2 / GRAVITY_M_S2;
-        let kinetic_friction = USUAL_KINETIC * static_friction;
-        Self { static_friction, kinetic_friction, stribeck_speed_m_s: USUAL_STRIBECK_M_S }
+    fn typical(grip_m_s2: f64) -> Self {
+        let static_friction = grip_m_s2 / GRAVITY_M_S2;
+        let kinetic_friction = TYPICAL_KINETIC * static_friction;
+        Self { static_friction, kinetic_friction, stribeck_speed_m_s: TYPICAL_STRIBECK_M_S }
     }
 }
 
 /// Speed by which a tread trembles about its mean, m/s: what whole counts and steps of voltage leave a wheel under control, 0.005 to 0.01. Whatever it trembles by
 /// sets it sliding to and fro, so that the floor pulls as hard as it holds only where the mean speeds are apart by as much, and in proportion under that.
-const TREMBLES_M_S: f64 = 0.01;
+const TREAD_JITTER_M_S: f64 = 0.01;
 /// What of the friction is left when sliding fast, in the hypothesis: between a floor that holds as much sliding as at rest, and a usual one's 0.7. A wheel that trembles slides
 /// at rest already.
-const LEFT_SLIDING: f64 = 0.85;
+const SLIDING_FRICTION_RATIO: f64 = 0.85;
 /// Longest step in which sliding is followed within a row, seconds: a fifth of what the ground takes to follow a trembling tread.
 const STEP_S: f64 = 2.5e-3;
 /// Most steps of a piece of a row: rows as long say nothing of a start.
@@ -202,7 +202,7 @@ const MAX_STEPS: f64 = 40.0;
 /// The ground's speed under trembling treads, by their mean speeds from row to row: within a row they change steadily.
 #[derive(Clone)]
 struct Term {
-    holds_m_s2: f64,
+    grip_m_s2: f64,
     ground_m_s: Wheels<f64>,
     row: Option<Row>,
     /// Way that each wheel has lost while the floor had not given way yet: a floor that holds all that is asked of it is none of this effect. `None` once it has.
@@ -238,23 +238,23 @@ impl Row {
 }
 
 impl Term {
-    fn new(holds_m_s2: f64) -> Self {
-        Self { holds_m_s2, ground_m_s: Wheels::both(0.0), row: None, held_m: Some(Wheels::both(0.0)) }
+    fn new(grip_m_s2: f64) -> Self {
+        Self { grip_m_s2, ground_m_s: Wheels::both(0.0), row: None, held_m: Some(Wheels::both(0.0)) }
     }
 
     /// How fast the ground gains on a tread that is so much faster, m/s².
     fn pull_m_s2(&self, gap_m_s: f64) -> f64 {
-        let left = LEFT_SLIDING + (1.0 - LEFT_SLIDING) * (-gap_m_s.abs() / USUAL_STRIBECK_M_S).exp();
-        self.holds_m_s2 * left * (gap_m_s / TREMBLES_M_S).clamp(-1.0, 1.0)
+        let left = SLIDING_FRICTION_RATIO + (1.0 - SLIDING_FRICTION_RATIO) * (-gap_m_s.abs() / TYPICAL_STRIBECK_M_S).exp();
+        self.grip_m_s2 * left * (gap_m_s / TREAD_JITTER_M_S).clamp(-1.0, 1.0)
     }
 
     /// The way that a wheel loses in some time, from its tread's mean speed on, which changes steadily.
     fn slide(&mut self, side: Side, time_s: f64, speed_m_s: f64, acceleration_m_s2: f64) -> f64 {
         let gap_m_s = speed_m_s - self.ground_m_s[side];
         // While the gap stays within what the tread trembles by, the ground lags it by a time constant: in closed form, and the friction as at rest.
-        let lag_s = TREMBLES_M_S / self.holds_m_s2;
+        let lag_s = TREAD_JITTER_M_S / self.grip_m_s2;
         let steady_m_s = acceleration_m_s2 * lag_s;
-        if gap_m_s.abs() <= TREMBLES_M_S && steady_m_s.abs() <= TREMBLES_M_S {
+        if gap_m_s.abs() <= TREAD_JITTER_M_S && steady_m_s.abs() <= TREAD_JITTER_M_S {
             let left = (-time_s / lag_s).exp();
             let more_m_s = gap_m_s - steady_m_s;
             self.ground_m_s[side] = speed_m_s + acceleration_m_s2 * time_s - steady_m_s - more_m_s * left;
@@ -284,7 +284,7 @@ impl ModelTerm for Term {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        *self = Self::new(self.holds_m_s2);
+        *self = Self::new(self.grip_m_s2);
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
@@ -300,8 +300,8 @@ impl ModelTerm for Term {
         if let Some(held_m) = self.held_m {
             lost_m = lost_m.zip_with(held_m, |lost_m, held_m| lost_m + held_m);
             let end_s = interval.t_s + interval.dt_s;
-            let gives_way = |side| (row.speed_at_m_s(side, end_s) - self.ground_m_s[side]).abs() > TREMBLES_M_S;
-            if !Side::BOTH.into_iter().any(gives_way) {
+            let yields = |side| (row.speed_at_m_s(side, end_s) - self.ground_m_s[side]).abs() > TREAD_JITTER_M_S;
+            if !Side::BOTH.into_iter().any(yields) {
                 self.held_m = Some(lost_m);
                 return;
             }
@@ -361,12 +361,12 @@ mod tests {
     }
 
     /// Way lost in each row of a start to 0.3 m/s and a stop at 0.6 m/s², by a floor that holds a little less, by terms of several shapes, and by a delay last.
-    fn rows_lost_m(holds_m_s2: f64, variants: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn rows_lost_m(grip_m_s2: f64, variants: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (acceleration_m_s2, cruise_m_s, stops_s) = (0.6, 0.3, 1.5);
-        let mut floor = TractionLoss::usual(holds_m_s2).forward().expect("acts");
-        let mut terms: Vec<Term> = variants.iter().map(|shape| Term::new(*shape)).collect();
+        let mut floor = TractionLoss::typical(grip_m_s2).forward().expect("acts");
+        let mut terms: Vec<Term> = variants.iter().map(|variant| Term::new(*variant)).collect();
         let run = RunInfo::default();
-        let (mut truth, mut said, mut delay) = (Vec::new(), vec![Vec::new(); variants.len()], Vec::new());
+        let (mut truth, mut predicted, mut delay) = (Vec::new(), vec![Vec::new(); variants.len()], Vec::new());
         let (dt_s, steps, length_s) = (1e-3, 25_u32, 0.025);
         let mut previous_m = 0.0;
         for row in 0..90 {
@@ -404,21 +404,21 @@ mod tests {
                 session_m: 0.0,
                 run: &run,
             };
-            for (term, said) in terms.iter_mut().zip(&mut said) {
+            for (term, predicted) in terms.iter_mut().zip(&mut predicted) {
                 let mut gradient = [Pose::IDENTITY];
                 term.motion(&interval, &mut gradient);
                 // Half of a wheel's way is the centre's.
-                said.push(-2.0 * gradient[0].x_m);
+                predicted.push(-2.0 * gradient[0].x_m);
             }
             delay.push(travel_m - previous_m);
             previous_m = travel_m;
         }
-        said.push(delay);
-        (truth, said)
+        predicted.push(delay);
+        (truth, predicted)
     }
 
     /// Share of the lost way, summed along the rows, that a shape at its best size leaves, by squares.
-    fn left_by(truth: &[f64], said: &[f64]) -> (f64, f64) {
+    fn left_by(truth: &[f64], predicted: &[f64]) -> (f64, f64) {
         let summed = |rows: &[f64]| -> Vec<f64> {
             rows.iter()
                 .scan(0.0, |sum, row| {
@@ -427,37 +427,37 @@ mod tests {
                 })
                 .collect()
         };
-        let (truth, said) = (summed(truth), summed(said));
+        let (truth, predicted) = (summed(truth), summed(predicted));
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let size = product(&truth, &said) / product(&said, &said);
-        (1.0 - size * product(&truth, &said) / product(&truth, &truth), size)
+        let value = product(&truth, &predicted) / product(&predicted, &predicted);
+        (1.0 - value * product(&truth, &predicted) / product(&truth, &truth), value)
     }
 
     /// The hypothesis sees rows of the log, no frictions and no trembling; its grid is a fifth apart, so that some shape lies within a tenth of the floor's. A term whose slides
     /// begin with the mean acceleration and end where the mean speeds meet left 3 to 7 % of these, with sizes of hundreds; a delay leaves as much.
     #[test]
     fn rows_of_the_log_show_what_a_floor_loses_that_holds_a_little_less_than_is_asked() {
-        for holds_m_s2 in [0.599, 0.58, 0.55, 0.5] {
-            let variants = [0.92, 0.96, 1.0].map(|near| near * holds_m_s2);
-            let (truth, said) = rows_lost_m(holds_m_s2, &variants);
-            let all: Vec<(f64, f64)> = said.iter().map(|said| left_by(&truth, said)).collect();
+        for grip_m_s2 in [0.599, 0.58, 0.55, 0.5] {
+            let variants = [0.92, 0.96, 1.0].map(|near| near * grip_m_s2);
+            let (truth, predicted) = rows_lost_m(grip_m_s2, &variants);
+            let all: Vec<(f64, f64)> = predicted.iter().map(|predicted| left_by(&truth, predicted)).collect();
             let [variants @ .., (by_delay, _)] = &all[..] else { panic!("shapes and a delay") };
-            for (left, size) in variants {
-                assert!(*left < 0.01 && *left < 0.5 * by_delay, "{holds_m_s2}: {all:?}");
-                assert!((0.4..1.3).contains(size), "{holds_m_s2}: {all:?}");
+            for (left, value) in variants {
+                assert!(*left < 0.01 && *left < 0.5 * by_delay, "{grip_m_s2}: {all:?}");
+                assert!((0.4..1.3).contains(value), "{grip_m_s2}: {all:?}");
             }
         }
     }
 
     #[test]
     fn a_found_size_says_a_floor_that_holds_so_much_more_or_less() {
-        let holds_m_s2 = |sliding: f64| {
+        let grip_m_s2 = |sliding: f64| {
             let floor = TractionLoss::from_estimates(&[("sliding", sliding), ("holds_m_s2", 0.5)]).expect("a floor");
             floor.check().expect("physical");
             floor.static_friction * GRAVITY_M_S2
         };
-        assert!((holds_m_s2(1.0) - 0.5).abs() < 1e-12);
-        assert!(holds_m_s2(0.5) > 0.5 && holds_m_s2(2.0) < 0.5 && holds_m_s2(0.0).is_finite());
+        assert!((grip_m_s2(1.0) - 0.5).abs() < 1e-12);
+        assert!(grip_m_s2(0.5) > 0.5 && grip_m_s2(2.0) < 0.5 && grip_m_s2(0.0).is_finite());
         assert_eq!(TractionLoss::from_estimates(&[("sliding", -0.1), ("holds_m_s2", 0.5)]), None);
     }
 }

@@ -7,10 +7,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
-use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::hypothesis::{Hypothesis, Sign, value_of};
 use crate::stream::Stream;
 
 /// Errors of the outside instrument that last.
@@ -28,12 +28,12 @@ pub struct TruthCorrelatedNoise {
 impl PhysicalEffect for TruthCorrelatedNoise {
     fn check(&self) -> Result<(), EffectError> {
         let id = "truth_correlated_noise";
-        EffectError::unless_sizes(id, [("sigma_xy_m", self.sigma_xy_m), ("sigma_theta_rad", self.sigma_theta_rad)])?;
+        EffectError::unless_negative(id, [("sigma_xy_m", self.sigma_xy_m), ("sigma_theta_rad", self.sigma_theta_rad)])?;
         EffectError::unless_positive(id, [("tau_s", self.tau_s)])
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None, error: [0.0; 3], at_s: 0.0 }))
+        Some(Box::new(State { effect: *self, stream: None, error: [0.0; 3], at_s: 0.0 }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -42,7 +42,7 @@ impl PhysicalEffect for TruthCorrelatedNoise {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("sigma_xy_m", 1e-3), ("sigma_theta_rad", 1e-3)], vec![("tau_s", stream.log_uniform(0.3, 3.0))])
             }),
@@ -50,14 +50,14 @@ impl PhysicalEffect for TruthCorrelatedNoise {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (sigma_xy_m, sigma_theta_rad) = (size(sizes, "sigma_xy_m")?, size(sizes, "sigma_theta_rad")?);
-        Some(Self { sigma_xy_m, sigma_theta_rad, tau_s: size(sizes, "tau_s")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (sigma_xy_m, sigma_theta_rad) = (value_of(values, "sigma_xy_m")?, value_of(values, "sigma_theta_rad")?);
+        Some(Self { sigma_xy_m, sigma_theta_rad, tau_s: value_of(values, "tau_s")? })
     }
 }
 
 struct State {
-    size: TruthCorrelatedNoise,
+    effect: TruthCorrelatedNoise,
     stream: Option<Stream>,
     /// The errors of x, y and θ over their standard deviations, and when they were so.
     error: [f64; 3],
@@ -77,14 +77,14 @@ impl Forward for State {
 
     fn instrument(&mut self, reading: &mut PoseReading) {
         let Some(stream) = &mut self.stream else { return };
-        let kept = (-(reading.t_s - self.at_s).abs() / self.size.tau_s).exp();
+        let kept = (-(reading.t_s - self.at_s).abs() / self.effect.tau_s).exp();
         let fresh = (1.0 - kept * kept).sqrt();
         self.error = self.error.map(|error| kept * error + fresh * stream.normal());
         self.at_s = reading.t_s;
         let [x, y, theta] = self.error;
-        reading.world_from_body.x_m += self.size.sigma_xy_m * x;
-        reading.world_from_body.y_m += self.size.sigma_xy_m * y;
-        reading.world_from_body.theta_rad += self.size.sigma_theta_rad * theta;
+        reading.world_from_body.x_m += self.effect.sigma_xy_m * x;
+        reading.world_from_body.y_m += self.effect.sigma_xy_m * y;
+        reading.world_from_body.theta_rad += self.effect.sigma_theta_rad * theta;
     }
 }
 
@@ -96,11 +96,11 @@ mod tests {
 
     #[test]
     fn errors_have_the_stated_size_and_memory_however_often_one_looks() {
-        let size = TruthCorrelatedNoise { sigma_xy_m: 0.01, sigma_theta_rad: 0.02, tau_s: 2.0 };
+        let effect = TruthCorrelatedNoise { sigma_xy_m: 0.01, sigma_theta_rad: 0.02, tau_s: 2.0 };
         for measurements in [1_u32, 8] {
             let (n, mut squares, mut products, mut thetas) = (4000_u32, 0.0, 0.0, 0.0);
             for run in 0..n {
-                let mut state = size.forward().expect("acts on sightings");
+                let mut state = effect.forward().expect("acts on sightings");
                 let address = Address { seed: 3, point: 0, trial: u64::from(run), run: 0 };
                 state.seed_run(address.stream(StreamName::new("test")));
                 let mut see = |t_s: f64| {

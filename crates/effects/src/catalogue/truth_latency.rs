@@ -8,10 +8,10 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's measurements are late";
@@ -30,7 +30,7 @@ impl PhysicalEffect for TruthLatency {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -39,20 +39,20 @@ impl PhysicalEffect for TruthLatency {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING} by {}: nothing is wrong with the robot", sizes.shown("delay_s", 1e3, "ms"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING} by {}: nothing is wrong with the robot", values.shown("delay_s", 1e3, "ms"))
             }),
             ..Description::of(MEANING)
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { delay_s: size(sizes, "delay_s")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { delay_s: value_of(values, "delay_s")? })
     }
 }
 
 struct State {
-    size: TruthLatency,
+    effect: TruthLatency,
 }
 
 impl Forward for State {
@@ -61,7 +61,7 @@ impl Forward for State {
     }
 
     fn instrument(&mut self, reading: &mut PoseReading) {
-        reading.t_s += self.size.delay_s;
+        reading.t_s += self.effect.delay_s;
     }
 }
 
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn a_late_stamp_shows_the_robot_behind() {
-        let mut state = State { size: TruthLatency { delay_s: 0.05 } };
+        let mut state = State { effect: TruthLatency { delay_s: 0.05 } };
         let mut reading = PoseReading { t_s: 1.0, world_from_body: Pose::IDENTITY };
         state.instrument(&mut reading);
         assert_eq!(reading, PoseReading { t_s: 1.05, world_from_body: Pose::IDENTITY });

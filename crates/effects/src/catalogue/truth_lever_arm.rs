@@ -8,10 +8,10 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's marker is not over the axle's centre";
@@ -28,12 +28,12 @@ pub struct TruthLeverArm {
 
 impl PhysicalEffect for TruthLeverArm {
     fn check(&self) -> Result<(), EffectError> {
-        let sizes = [("lever_x_m", self.lever_x_m), ("lever_y_m", self.lever_y_m)];
-        EffectError::unless_finite("truth_lever_arm", sizes)
+        let values = [("lever_x_m", self.lever_x_m), ("lever_y_m", self.lever_y_m)];
+        EffectError::unless_finite("truth_lever_arm", values)
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -42,21 +42,21 @@ impl PhysicalEffect for TruthLeverArm {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let [ahead, left] = ["lever_x_m", "lever_y_m"].map(|name| sizes.shown(name, 1e3, "mm"));
+            summary: Summary::WithValues(|values| {
+                let [ahead, left] = ["lever_x_m", "lever_y_m"].map(|name| values.shown(name, 1e3, "mm"));
                 format!("{MEANING}, but {ahead} ahead and {left} to the left: nothing is wrong with the robot")
             }),
             ..Description::of(MEANING)
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { lever_x_m: size(sizes, "lever_x_m")?, lever_y_m: size(sizes, "lever_y_m")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { lever_x_m: value_of(values, "lever_x_m")?, lever_y_m: value_of(values, "lever_y_m")? })
     }
 }
 
 struct State {
-    size: TruthLeverArm,
+    effect: TruthLeverArm,
 }
 
 impl Forward for State {
@@ -65,7 +65,7 @@ impl Forward for State {
     }
 
     fn instrument(&mut self, reading: &mut PoseReading) {
-        let body_from_point = Pose::new(self.size.lever_x_m, self.size.lever_y_m, 0.0);
+        let body_from_point = Pose::new(self.effect.lever_x_m, self.effect.lever_y_m, 0.0);
         reading.world_from_body = reading.world_from_body * body_from_point;
     }
 }
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn the_point_turns_with_the_robot() {
-        let mut state = State { size: TruthLeverArm { lever_x_m: 0.1, lever_y_m: 0.02 } };
+        let mut state = State { effect: TruthLeverArm { lever_x_m: 0.1, lever_y_m: 0.02 } };
         let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(1.0, 2.0, FRAC_PI_2) };
         state.instrument(&mut reading);
         let seen = reading.world_from_body;

@@ -10,10 +10,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, IsolatedError, Told};
+use crate::description::{Description, IsolatedError, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
-use crate::hypothesis::{Hypothesis, Sign, size};
+use crate::hypothesis::{Hypothesis, Sign, value_of};
 use crate::stream::Stream;
 
 /// Gross errors of the outside instrument.
@@ -41,7 +41,7 @@ impl PhysicalEffect for TruthOutliers {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, stream: None }))
+        Some(Box::new(State { effect: *self, stream: None }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -50,7 +50,7 @@ impl PhysicalEffect for TruthOutliers {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             isolated_error: Some(IsolatedError::OfInstrument),
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("jump_m", 0.02), ("jump_rad", 0.02)], vec![("probability", stream.log_uniform(0.003, 0.03))])
@@ -59,14 +59,14 @@ impl PhysicalEffect for TruthOutliers {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (jump_m, jump_rad) = (size(sizes, "jump_m")?, size(sizes, "jump_rad")?);
-        Some(Self { probability: size(sizes, "probability")?, jump_m, jump_rad })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (jump_m, jump_rad) = (value_of(values, "jump_m")?, value_of(values, "jump_rad")?);
+        Some(Self { probability: value_of(values, "probability")?, jump_m, jump_rad })
     }
 }
 
 struct State {
-    size: TruthOutliers,
+    effect: TruthOutliers,
     stream: Option<Stream>,
 }
 
@@ -83,10 +83,10 @@ impl Forward for State {
         let Some(stream) = &mut self.stream else { return };
         // Drawn for every sighting: at a larger probability the same sightings jump as at a smaller one, by the same, and others too.
         let (chance, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
-        if chance < self.size.probability {
-            reading.world_from_body.x_m += self.size.jump_m * jump[0];
-            reading.world_from_body.y_m += self.size.jump_m * jump[1];
-            reading.world_from_body.theta_rad += self.size.jump_rad * jump[2];
+        if chance < self.effect.probability {
+            reading.world_from_body.x_m += self.effect.jump_m * jump[0];
+            reading.world_from_body.y_m += self.effect.jump_m * jump[1];
+            reading.world_from_body.theta_rad += self.effect.jump_rad * jump[2];
         }
     }
 }
@@ -100,8 +100,8 @@ mod tests {
     const HERE: Pose = Pose::new(1.0, -2.0, 0.5);
 
     /// How far each of `n` sightings of one run is displaced.
-    fn mahalanobis_distance(size: TruthOutliers, n: u32) -> Vec<Pose> {
-        let mut state = size.forward().expect("acts on sightings");
+    fn mahalanobis_distance(effect: TruthOutliers, n: u32) -> Vec<Pose> {
+        let mut state = effect.forward().expect("acts on sightings");
         state.seed_run(Address { seed: 8, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         (0..n)
             .map(|k| {
@@ -115,9 +115,9 @@ mod tests {
 
     #[test]
     fn the_stated_share_of_sightings_jumps_by_the_stated_sizes() {
-        let size = TruthOutliers { probability: 0.2, jump_m: 0.03, jump_rad: 0.1 };
+        let effect = TruthOutliers { probability: 0.2, jump_m: 0.03, jump_rad: 0.1 };
         let n = 40_000;
-        let all = mahalanobis_distance(size, n);
+        let all = mahalanobis_distance(effect, n);
         let jumped: Vec<&Pose> = all.iter().filter(|pose| **pose != Pose::IDENTITY).collect();
         let (share, m) = (jumped.len() as f64 / f64::from(n), jumped.len() as f64);
         // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven numbers raise a false positive once in 2e5 seeds.

@@ -8,10 +8,10 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's frame is turned on the robot";
@@ -30,7 +30,7 @@ impl PhysicalEffect for TruthYaw {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -39,21 +39,21 @@ impl PhysicalEffect for TruthYaw {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                let yaw = sizes.shown("yaw_rad", 180.0 / std::f64::consts::PI, "°");
+            summary: Summary::WithValues(|values| {
+                let yaw = values.shown("yaw_rad", 180.0 / std::f64::consts::PI, "°");
                 format!("{MEANING} by {yaw} (or both wheels toe by as much)")
             }),
             ..Description::of(MEANING)
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { yaw_rad: size(sizes, "yaw_rad")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { yaw_rad: value_of(values, "yaw_rad")? })
     }
 }
 
 struct State {
-    size: TruthYaw,
+    effect: TruthYaw,
 }
 
 impl Forward for State {
@@ -62,7 +62,7 @@ impl Forward for State {
     }
 
     fn instrument(&mut self, reading: &mut PoseReading) {
-        reading.world_from_body.theta_rad += self.size.yaw_rad;
+        reading.world_from_body.theta_rad += self.effect.yaw_rad;
     }
 }
 
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn only_the_heading_is_seen_turned() {
-        let mut state = State { size: TruthYaw { yaw_rad: -0.02 } };
+        let mut state = State { effect: TruthYaw { yaw_rad: -0.02 } };
         let mut reading = PoseReading { t_s: 1.0, world_from_body: Pose::new(1.0, 2.0, 0.5) };
         state.instrument(&mut reading);
         assert_eq!(reading.world_from_body, Pose::new(1.0, 2.0, 0.48));

@@ -9,10 +9,10 @@ use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "the faster the robot turns, the farther apart its wheels act";
@@ -31,7 +31,7 @@ impl PhysicalEffect for TurnRateWheelbase {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -40,10 +40,10 @@ impl PhysicalEffect for TurnRateWheelbase {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| format!("{MEANING}: {} for each rad/s", sizes.shown("beta_s", 100.0, "%"))),
-            benchmark: Benchmark::OF_MEAN.with_form("a wheelbase that grows with the square of the yaw rate", |sizes, robot| {
+            summary: Summary::WithValues(|values| format!("{MEANING}: {} for each rad/s", values.shown("beta_s", 100.0, "%"))),
+            benchmark: Benchmark::OF_MEAN.with_form("a wheelbase that grows with the square of the yaw rate", |values, robot| {
                 // The same at the yaw rate of a spin at cruise speed.
-                let beta_s = size(sizes, "beta_s").unwrap_or(0.0);
+                let beta_s = value_of(values, "beta_s").unwrap_or(0.0);
                 let at_rad_s = 2.0 * robot.cruise_speed_m_s / robot.wheel_separation_m;
                 FloorForm::boxed(move |step| {
                     let (_, omega_rad_s) = contact_twist(step);
@@ -54,13 +54,13 @@ impl PhysicalEffect for TurnRateWheelbase {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { beta_s: size(sizes, "beta_s")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { beta_s: value_of(values, "beta_s")? })
     }
 }
 
 struct State {
-    size: TurnRateWheelbase,
+    effect: TurnRateWheelbase,
 }
 
 impl Forward for State {
@@ -71,11 +71,11 @@ impl Forward for State {
     fn floor(&mut self, step: &mut Step) {
         let speed_m_s = step.contact_speed_m_s();
         let omega_rad_s = (speed_m_s.right - speed_m_s.left) / step.wheel_separation_m;
-        step.wheel_separation_m *= 1.0 + self.size.beta_s * omega_rad_s.abs();
+        step.wheel_separation_m *= 1.0 + self.effect.beta_s * omega_rad_s.abs();
     }
 
     fn depends_on_speed(&self) -> bool {
-        self.size.beta_s != 0.0
+        self.effect.beta_s != 0.0
     }
 }
 
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn both_senses_of_turning_widen_alike() {
-        let mut state = State { size: TurnRateWheelbase { beta_s: 0.02 } };
+        let mut state = State { effect: TurnRateWheelbase { beta_s: 0.02 } };
         for sense in [-1.0, 1.0] {
             let mut step = specimen_step();
             let before_m = step.wheel_separation_m;

@@ -8,10 +8,10 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Excitation, Told};
+use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Variant, size};
+use crate::hypothesis::{Hypothesis, Variant, value_of};
 
 /// Loss of radius with the way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ impl PhysicalEffect for Wear {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self, distance_m: 0.0 }))
+        Some(Box::new(State { effect: *self, distance_m: 0.0 }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -36,21 +36,21 @@ impl PhysicalEffect for Wear {
 
     fn description() -> Description {
         Description {
-            told: Told::ByMeaning,
+            summary: Summary::Meaning,
             excitation: Excitation::Conditions("drive the same runs again after some kilometres"),
             ..Description::of("the scale drifts with the distance driven")
         }
     }
 
     /// A tread wears off: found negative it is something else.
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let loss_per_m = size(sizes, "loss_per_m")?;
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let loss_per_m = value_of(values, "loss_per_m")?;
         (loss_per_m >= 0.0).then_some(Self { loss_per_m })
     }
 }
 
 struct State {
-    size: Wear,
+    effect: Wear,
     distance_m: f64,
 }
 
@@ -67,7 +67,7 @@ impl Forward for State {
     fn wheel(&mut self, step: &mut Step) {
         let rolled_m = step.wheel_rad.zip_with(step.radius_m, |rad, radius_m| rad * radius_m);
         let ahead_m = 0.5 * (rolled_m.left + rolled_m.right).abs();
-        let left_over = 1.0 - self.size.loss_per_m * (self.distance_m + 0.5 * ahead_m);
+        let left_over = 1.0 - self.effect.loss_per_m * (self.distance_m + 0.5 * ahead_m);
         self.distance_m += ahead_m;
         step.radius_m = step.radius_m.map(|radius_m| radius_m * left_over);
     }
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn the_way_counts_in_both_directions_and_over_runs() {
-        let mut state = State { size: Wear { loss_per_m: 1e-3 }, distance_m: 0.0 };
+        let mut state = State { effect: Wear { loss_per_m: 1e-3 }, distance_m: 0.0 };
         let mut info = RunInfo::default();
         state.on_run_start(&mut RunStart { number: 1, session_s: 0.0, session_m: 10.0, info: &mut info });
         for (turned_m, factor) in [(2.0, 1.0 - 1e-3 * 11.0), (-2.0, 1.0 - 1e-3 * 13.0)] {

@@ -9,10 +9,10 @@ use kinematics::{Pose, Side, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Told};
+use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, LastAngle, Variant, size};
+use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
 
 /// What it is, in one line.
 const MEANING: &str = "a wheel is not round or not centred";
@@ -58,13 +58,13 @@ impl PhysicalEffect for WheelEccentricity {
 
     fn description() -> Description {
         Description {
-            told: Told::WithSizes(|sizes| {
-                format!("{MEANING}: {}", sizes.amplitudes("", 100.0, "%", "wheel's radius varies"))
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}: {}", values.amplitudes("", 100.0, "%", "wheel's radius varies"))
             }),
             benchmark: Benchmark::OF_MEAN.with_form(
                 "a radius that rises and falls linearly with the wheel's angle, a triangle for a sine",
-                |sizes, _| {
-                    let of = |name: &str| size(sizes, name).unwrap_or(0.0);
+                |values, _| {
+                    let of = |name: &str| value_of(values, name).unwrap_or(0.0);
                     let amplitude = |side: &str| of(&format!("{side}_sin")).hypot(of(&format!("{side}_cos")));
                     let phase = |side: &str| of(&format!("{side}_cos")).atan2(of(&format!("{side}_sin")));
                     Box::new(FlatSpots {
@@ -77,9 +77,9 @@ impl PhysicalEffect for WheelEccentricity {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        let (left_sin, left_cos) = (size(sizes, "left_sin")?, size(sizes, "left_cos")?);
-        let (right_sin, right_cos) = (size(sizes, "right_sin")?, size(sizes, "right_cos")?);
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let (left_sin, left_cos) = (value_of(values, "left_sin")?, value_of(values, "left_cos")?);
+        let (right_sin, right_cos) = (value_of(values, "right_sin")?, value_of(values, "right_cos")?);
         Some(Self {
             left_amplitude: left_sin.hypot(left_cos),
             left_phase_rad: left_cos.atan2(left_sin),

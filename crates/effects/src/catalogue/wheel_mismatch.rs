@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::{Hypothesis, size};
+use crate::hypothesis::{Hypothesis, value_of};
 
 /// Ratio of the diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,7 +41,7 @@ impl PhysicalEffect for WheelMismatch {
         Description::of("the wheels differ in diameter")
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { right_over_left: size(sizes, "right_over_left")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { right_over_left: value_of(values, "right_over_left")? })
     }
 }

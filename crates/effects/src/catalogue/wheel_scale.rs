@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::{Hypothesis, size};
+use crate::hypothesis::{Hypothesis, value_of};
 
 /// Common factor of both diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,7 +38,7 @@ impl PhysicalEffect for WheelScale {
         Description::of("both wheels are larger or smaller than believed, by one factor")
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { scale: size(sizes, "scale")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { scale: value_of(values, "scale")? })
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::hypothesis::{Hypothesis, size};
+use crate::hypothesis::{Hypothesis, value_of};
 
 /// Ratio of the wheelbases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ impl PhysicalEffect for Wheelbase {
         Description::of("the wheels act farther apart or closer together than believed")
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { ratio: size(sizes, "ratio")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { ratio: value_of(values, "ratio")? })
     }
 }

@@ -14,7 +14,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, rewrite_wheels, size};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, rewrite_wheels, value_of};
 
 /// Factors by which people err.
 const FACTORS: [(f64, &str); 14] = [
@@ -35,13 +35,13 @@ const FACTORS: [(f64, &str); 14] = [
 ];
 
 /// How near an estimate must come to a factor of the list, as a share: wheels are out by less, and the list is not that dense.
-const SNAPS_WITHIN: f64 = 0.12;
+const FACTOR_TOLERANCE: f64 = 0.12;
 
 /// Nearer to one than this share is no gross fault.
-const INNOCENT: f64 = 0.3;
+const MIN_DEPARTURE: f64 = 0.3;
 
 /// Shortest way that is compared, metres, and shortest turn, radians: far above what instruments err.
-const COMPARED: [f64; 2] = [0.2, 0.5];
+const MIN_COMPARED_MOTION: [f64; 2] = [0.2, 0.5];
 
 /// A displacement goes on where the one before ended, by the rounding of a file.
 const SAME_INSTANT_S: f64 = 1e-6;
@@ -60,7 +60,7 @@ impl PhysicalEffect for WrongCountsPerTurn {
     }
 
     fn forward(&self) -> Option<Box<dyn Forward>> {
-        Some(Box::new(State { size: *self }))
+        Some(Box::new(State { effect: *self }))
     }
 
     fn hypothesis() -> Hypothesis {
@@ -79,13 +79,13 @@ impl PhysicalEffect for WrongCountsPerTurn {
         }
     }
 
-    fn from_estimates(sizes: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { factor: size(sizes, "factor")? })
+    fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        Some(Self { factor: value_of(values, "factor")? })
     }
 }
 
 struct State {
-    size: WrongCountsPerTurn,
+    effect: WrongCountsPerTurn,
 }
 
 impl Forward for State {
@@ -94,7 +94,7 @@ impl Forward for State {
     }
 
     fn readout(&mut self, readout: &mut Readout) {
-        let logged = |counts: i64| (counts as f64 * self.size.factor).floor() as i64;
+        let logged = |counts: i64| (counts as f64 * self.effect.factor).floor() as i64;
         readout.ticks = readout.ticks.map(logged);
     }
 }
@@ -133,7 +133,7 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
                 };
                 let moved =
                     [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
-                if moved[k] > COMPARED[k] {
+                if moved[k] > MIN_COMPARED_MOTION[k] {
                     found[k].push((counted[k] - start[k]).abs() / moved[k]);
                     anchors[k] = Some((seen, counted));
                 }
@@ -173,11 +173,11 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
     }
     let [ways, turns] = all.map(median);
     let factor = ways.or(turns).filter(|factor| *factor > 0.0 && factor.is_finite())?;
-    (factor.ln().abs() > INNOCENT.ln_1p()).then_some(factor)
+    (factor.ln().abs() > MIN_DEPARTURE.ln_1p()).then_some(factor)
 }
 
 /// With fewer measurements a run, what lies between two of them is no way that could be measured: paths turn, and may lead back.
-const WAYS_SEEN: usize = 4;
+const MIN_MEASUREMENTS: usize = 4;
 
 /// Whether the runs are seen at their ends alone.
 fn is_seen_at_ends(dataset: &Dataset) -> bool {
@@ -189,7 +189,7 @@ fn is_seen_at_ends(dataset: &Dataset) -> bool {
         .map(measurements)
         .filter(|measurements| *measurements > 0)
         .fold((0, 0), |(runs, all), own| (runs + 1, all + own));
-    measurements < WAYS_SEEN * runs
+    measurements < MIN_MEASUREMENTS * runs
 }
 
 /// The factors that may be: that of the ways that were seen and, where hardly any was, all that people err by.
@@ -197,7 +197,7 @@ fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
     let of_ways = estimate(dataset).map(|estimate| {
         let off = |factor: f64| (estimate / factor).ln().abs();
         let nearest = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
-        nearest.filter(|(factor, _)| off(*factor) < SNAPS_WITHIN).copied().unwrap_or((estimate, "a gear?"))
+        nearest.filter(|(factor, _)| off(*factor) < FACTOR_TOLERANCE).copied().unwrap_or((estimate, "a gear?"))
     });
     let all = if is_seen_at_ends(dataset) { &FACTORS[..] } else { &[] };
     let others = all.iter().copied().filter(|known| Some(*known) != of_ways);
@@ -220,7 +220,7 @@ fn correction(dataset: &Dataset, factor: f64, reason: &str) -> RecordCorrection 
         *ticks_per_rev *= factor;
     }
     RecordCorrection {
-        sizes: vec![("factor", factor)],
+        values: vec![("factor", factor)],
         sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
         visible_in_log: false,
         records,

@@ -13,12 +13,12 @@ use crate::motion_history::{MotionHistory, MotionHistoryTracker};
 pub(super) struct Recorded {
     of: Sparse,
     own: [TermParameter; 1],
-    past: Past,
+    past: PreviousIntervals,
 }
 
 /// What moments need to know of the intervals before.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Past {
+pub(super) struct PreviousIntervals {
     memory: MotionHistoryTracker,
     row: Option<Row>,
 }
@@ -31,7 +31,7 @@ struct Row {
     wheel_m_s2: Wheels<f64>,
 }
 
-impl Past {
+impl PreviousIntervals {
     pub(super) const NONE: Self = Self { memory: MotionHistoryTracker::NONE, row: None };
 
     /// The middle of an interval that takes time.
@@ -83,7 +83,7 @@ impl Past {
 
 impl Recorded {
     pub(super) fn new(of: &Sparse) -> Self {
-        Self { of: of.clone(), own: [parameter(of)], past: Past::NONE }
+        Self { of: of.clone(), own: [parameter(of)], past: PreviousIntervals::NONE }
     }
 }
 
@@ -93,11 +93,11 @@ impl ModelTerm for Recorded {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.past = Past::NONE;
+        self.past = PreviousIntervals::NONE;
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        if interval.dt_s > 0.0 && !self.of.channel.is_seen() {
+        if interval.dt_s > 0.0 && !self.of.channel.is_of_instrument() {
             let at = self.past.moment(interval);
             gradient[0] = if self.of.channel.is_of_wheels() {
                 interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
@@ -108,7 +108,7 @@ impl ModelTerm for Recorded {
     }
 
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
-        if self.of.channel.is_seen() {
+        if self.of.channel.is_of_instrument() {
             let speeds = (measurement.twist.v_m_s, measurement.twist.omega_rad_s);
             let product = self.of.product(&seen(speeds, measurement.world_from_body, measurement.t_s));
             gradient[0] = on_channel(self.of.channel, product, speeds);

@@ -32,7 +32,7 @@ impl Sparse {
     /// Whether it goes with what is found once for all products of an interval: those do that add to the motion or to the wheels' way, but for what goes with rows.
     #[must_use]
     pub fn shares_moments(&self) -> bool {
-        !self.channel.is_seen() && !self.is_of_rows()
+        !self.channel.is_of_instrument() && !self.is_of_rows()
     }
 
     /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.

@@ -85,9 +85,9 @@ fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
     let mut of_load = term(Channel::Along, &["v", "load"]);
     of_load.of_runs.insert("load".to_owned(), vec![1.0, 5.0]);
     let mut state = of_load.forward().expect("a term");
-    let gained_m = |state: &mut dyn Forward, number, said: Option<f64>| {
+    let gained_m = |state: &mut dyn Forward, number, predicted: Option<f64>| {
         let mut info = RunInfo::default();
-        info.covariates.extend(said.map(|said| ("load".to_owned(), said)));
+        info.covariates.extend(predicted.map(|predicted| ("load".to_owned(), predicted)));
         state.on_run_start(&mut RunStart { number, session_s: 0.0, session_m: 0.0, info: &mut info });
         let mut step = specimen_step();
         step.rate_rad_s = Wheels::both(2.5);
@@ -95,10 +95,10 @@ fn runs_have_their_own_covariates_in_turn_and_their_records_say_so() {
         (info.covariates["load"], step.travel_m.left)
     };
     // (value − 3)/2 × 0.2 m/s × 0.1 × 1 ms.
-    for (number, said, load, expected) in
+    for (number, predicted, load, expected) in
         [(0, None, 1.0, -2e-5), (1, None, 5.0, 2e-5), (2, None, 1.0, -2e-5), (3, Some(3.5), 3.5, 5e-6)]
     {
-        let (found, gained_m) = gained_m(&mut *state, number, said);
+        let (found, gained_m) = gained_m(&mut *state, number, predicted);
         assert_eq!(found, load);
         assert!((gained_m - expected).abs() < 1e-18, "{number}: {gained_m:e}");
     }

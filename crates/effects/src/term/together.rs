@@ -7,14 +7,14 @@ use dataset::RunInfo;
 use kinematics::{Pose, Side, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 
-use super::recorded::Past;
+use super::recorded::PreviousIntervals;
 use super::sparse::{Sparse, on_channel, parameter};
 use crate::covariate::{Channel, Covariate, KinematicSample};
 
 /// Products on channels of the motion and of the wheels, a parameter each.
 #[derive(Clone)]
 pub(super) struct ProductBatch {
-    past: Past,
+    past: PreviousIntervals,
     /// What the products are made of, each once, and its value by what each wheel does itself.
     covariates: Vec<Covariate>,
     values: Vec<Wheels<f64>>,
@@ -42,7 +42,7 @@ impl ProductBatch {
             on.push((*channel, place(&mut factors, own)));
         }
         Self {
-            past: Past::NONE,
+            past: PreviousIntervals::NONE,
             values: vec![Wheels::both(0.0); covariates.len()],
             covariates,
             products: vec![Wheels::both(0.0); factors.len()],
@@ -83,7 +83,7 @@ impl ModelTerm for ProductBatch {
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.past = Past::NONE;
+        self.past = PreviousIntervals::NONE;
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {

@@ -7,7 +7,7 @@ use dataset::{Run, WheelLog};
 use effects::Readout;
 
 use crate::active::ActiveEffects;
-use crate::actuator::{ConstantSpeed, Piece};
+use crate::actuator::{ConstantSpeed, RateSegment};
 use crate::body::{Body, DriveSetup, DriveStreams, Start};
 use crate::drive::SAME_INSTANT_S;
 use crate::instrument::Observer;
@@ -18,7 +18,7 @@ use crate::planned_motion::PlannedMotion;
 struct PropagationInterval {
     /// Does it begin a motion, for which effects and sensitivities draw?
     sets_out: bool,
-    pieces: Vec<Piece>,
+    segments: Vec<RateSegment>,
     /// Is the standing robot read?
     is_read: bool,
 }
@@ -35,26 +35,26 @@ pub(crate) struct PrecomputedRun {
 impl PrecomputedRun {
     /// The course of a plan's motions; `None` where one of them has its say only when it comes.
     pub(crate) fn new(motions: &[PlannedMotion]) -> Option<Self> {
-        let mut legs = vec![PropagationInterval { sets_out: false, pieces: Vec::new(), is_read: true }];
+        let mut legs = vec![PropagationInterval { sets_out: false, segments: Vec::new(), is_read: true }];
         let (mut t_s, mut rows_s) = (0.0, vec![0.0]);
         for motion in motions {
-            let (sets_out, pieces) = match motion {
+            let (sets_out, segments) = match motion {
                 PlannedMotion::Measure => {
                     if let Some(last) = legs.last_mut() {
                         last.is_read = true;
                     }
                     continue;
                 }
-                PlannedMotion::Pause { duration_s } => (false, Piece::at_rest(*duration_s).into_iter().collect()),
-                PlannedMotion::Go { pieces, .. } => (true, pieces.clone()?),
+                PlannedMotion::Pause { duration_s } => (false, RateSegment::at_rest(*duration_s).into_iter().collect()),
+                PlannedMotion::Go { segments, .. } => (true, segments.clone()?),
             };
             // Added up as the body's clock is.
-            let ends_s = pieces.iter().fold(t_s, |t_s, piece: &Piece| t_s + piece.duration_s);
+            let ends_s = segments.iter().fold(t_s, |t_s, segment: &RateSegment| t_s + segment.duration_s);
             if ends_s <= t_s + SAME_INSTANT_S {
                 return None;
             }
             t_s = ends_s;
-            legs.push(PropagationInterval { sets_out, pieces, is_read: false });
+            legs.push(PropagationInterval { sets_out, segments, is_read: false });
             rows_s.push(t_s);
         }
         if let Some(last) = legs.last_mut() {
@@ -85,9 +85,9 @@ impl PrecomputedRun {
                 effects.start_motion();
                 body.start_motion(setup, streams);
             }
-            for &piece in &leg.pieces {
-                let motion = drive.whole(piece);
-                let step = body.advance(setup, streams, effects, (piece.duration_s, &motion));
+            for &segment in &leg.segments {
+                let motion = drive.whole(segment);
+                let step = body.advance(setup, streams, effects, (segment.duration_s, &motion));
                 drive.count(&step);
             }
             let mut readout = Readout { ticks: drive.counts(), m_per_count: setup.m_per_count, written: true };
@@ -143,16 +143,19 @@ mod tests {
             program("not at all", &[]),
         ];
         for scenario in [paper, scattering] {
-            let [mut foreseen, mut asking] = [(); 2].map(|()| SimulatedRobot::new(&scenario, 5, 7).expect("simulates"));
+            let [mut precomputed, mut asking] =
+                [(); 2].map(|()| SimulatedRobot::new(&scenario, 5, 7).expect("simulates"));
             // The same buffers for all, as a campaign has it.
             let (mut run, mut asked) = (Run::default(), Run::default());
             for program in &programs {
-                let plan = foreseen.plan(program.clone());
+                let plan = precomputed.prepare(program.clone());
                 assert!(plan.precomputed_run.is_some(), "{}", program.id);
-                foreseen.drive_plan_into(&plan, &mut run).expect("drives");
-                asking.drive_plan_into(&crate::Plan { precomputed_run: None, ..plan }, &mut asked).expect("drives");
+                precomputed.drive_prepared_into(&plan, &mut run).expect("drives");
+                asking
+                    .drive_prepared_into(&crate::PreparedProgram { precomputed_run: None, ..plan }, &mut asked)
+                    .expect("drives");
                 assert_eq!(run, asked);
-                assert_eq!(foreseen.last_true_ends(), asking.last_true_ends());
+                assert_eq!(precomputed.last_true_ends(), asking.last_true_ends());
             }
         }
     }

@@ -2,19 +2,19 @@
 
 use motion_programs::MotionProgram;
 
-use crate::foreseen::PrecomputedRun;
 use crate::planned_motion::PlannedMotion;
+use crate::precomputed_run::PrecomputedRun;
 
-/// A program made ready for the robot that [`crate::SimulatedRobot::plan`] was asked of.
+/// A program made ready for the robot that [`crate::SimulatedRobot::prepare`] was asked of.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct PreparedProgram {
     pub(crate) program: MotionProgram,
     pub(crate) motions: Vec<PlannedMotion>,
     /// The motions once more, where the closed form foresees all of the run.
     pub(crate) precomputed_run: Option<PrecomputedRun>,
 }
 
-impl Plan {
+impl PreparedProgram {
     /// The program.
     #[must_use]
     pub const fn program(&self) -> &MotionProgram {
