@@ -9,7 +9,7 @@ mod plain;
 use std::hint::black_box;
 use std::time::Instant;
 
-use kinematics::{Fleet, InstructionSet, Odometry, Pose, Rule, Wheels};
+use kinematics::{InstructionSet, Odometry, Pose, Rule, Wheels};
 
 /// Bytes that a step of a log moves: two counts in, a pose out.
 const BYTES_A_STEP: usize = 2 * size_of::<i64>() + size_of::<Pose>();
@@ -131,54 +131,6 @@ fn whole_log(steps: usize, rounds: usize) {
     }
 }
 
-/// Many robots, a row of counts at a time.
-fn fleet(robots: usize, rows: usize, rounds: usize) {
-    let odometry = odometry(Rule::ExactArc);
-    let one = counts(rows);
-    let spread = |column: &[i64]| -> Vec<i64> {
-        column.iter().flat_map(|count| (0..robots).map(move |robot| count * (1 + robot as i64 % 3))).collect()
-    };
-    let counts = Wheels { left: spread(&one.left), right: spread(&one.right) };
-    let start = vec![Pose::IDENTITY; robots];
-    let first = Wheels { left: &counts.left[..robots], right: &counts.right[..robots] };
-    let row = |row: usize, lanes: std::ops::Range<usize>| {
-        let range = row * robots + lanes.start..row * robots + lanes.end;
-        Wheels { left: &counts.left[range.clone()], right: &counts.right[range] }
-    };
-    let mut contenders = vec![Contender::new("plain loop, C library", || {
-        black_box(plain::fleet(&odometry, &start, black_box(first), rows, |k| row(k, 0..robots)));
-    })];
-    for set in InstructionSet::available() {
-        let (start, row) = (&start, &row);
-        contenders.push(Contender::new(format!("Fleet, {}", set.name()), move || {
-            let mut fleet = Fleet::by(set, odometry, start, black_box(first));
-            (1..rows).for_each(|k| fleet.update(row(k, 0..robots)));
-            black_box(&fleet);
-        }));
-    }
-    for threads in [1, 2] {
-        let (start, row) = (&start, &row);
-        contenders.push(Contender::new(format!("Fleet, {threads} threads"), move || {
-            std::thread::scope(|scope| {
-                for thread in 0..threads {
-                    let lanes = thread * robots / threads..(thread + 1) * robots / threads;
-                    scope.spawn(move || {
-                        let mut fleet = Fleet::new(odometry, &start[lanes.clone()], row(0, lanes.clone()));
-                        (1..rows).for_each(|k| fleet.update(row(k, lanes.clone())));
-                        black_box(&fleet);
-                    });
-                }
-            });
-        }));
-    }
-    race(
-        &format!("{robots} robots, exact arc"),
-        (robots * rows, rounds),
-        (2 * size_of::<i64>(), "of 2 threads"),
-        contenders,
-    );
-}
-
 fn main() {
     let quick = std::env::args().any(|argument| argument == "--quick" || argument == "--test");
     let rounds = if quick { 9 } else { 41 };
@@ -188,8 +140,5 @@ fn main() {
     if !quick {
         whole_log(1_000_000, 15);
         whole_log(10_000_000, 9);
-    }
-    for robots in [8, 64, 1_000, 10_000] {
-        fleet(robots, 300_000 / robots, rounds);
     }
 }

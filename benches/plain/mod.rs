@@ -34,26 +34,3 @@ pub(crate) fn trajectory(odometry: &Odometry, start: Pose, counts: Wheels<&[i64]
         before = now;
     }
 }
-
-/// The last poses of many robots, a row of counts at a time.
-#[inline(never)]
-pub(crate) fn fleet<'a>(
-    odometry: &Odometry,
-    start: &[Pose],
-    first: Wheels<&[i64]>,
-    rows: usize,
-    row: impl Fn(usize) -> Wheels<&'a [i64]>,
-) -> Vec<Pose> {
-    let mut poses = start.to_vec();
-    let mut before = (first.left.to_vec(), first.right.to_vec());
-    for now in (1..rows).map(row) {
-        for (k, pose) in poses.iter_mut().enumerate() {
-            let (was, is) =
-                (Wheels { left: before.0[k], right: before.1[k] }, Wheels { left: now.left[k], right: now.right[k] });
-            step(odometry, pose, (was, is));
-        }
-        before.0.copy_from_slice(now.left);
-        before.1.copy_from_slice(now.right);
-    }
-    poses
-}

@@ -109,7 +109,7 @@ impl Odometry {
             start_theta_rad: world_from_body.theta_rad,
             start_counts: counts,
             counts,
-            place: [Place::at(world_from_body.x_m), Place::at(world_from_body.y_m)],
+            position: [CompensatedSum::at(world_from_body.x_m), CompensatedSum::at(world_from_body.y_m)],
             steps: 0,
             world_from_body,
         }
@@ -128,13 +128,13 @@ pub(crate) const GROUP: usize = 64;
 
 /// One coordinate of the robot's place, metres: where the group of steps began, what its sum dropped, and the group's own sum.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct CompensatedSum {
     pub(crate) anchor_m: f64,
     pub(crate) dropped_m: f64,
     pub(crate) moved_m: f64,
 }
 
-impl Place {
+impl CompensatedSum {
     const fn at(anchor_m: f64) -> Self {
         Self { anchor_m, dropped_m: 0.0, moved_m: 0.0 }
     }
@@ -170,7 +170,7 @@ pub struct DeadReckoning<C> {
     pub(crate) start_theta_rad: f64,
     pub(crate) start_counts: Wheels<C>,
     pub(crate) counts: Wheels<C>,
-    pub(crate) place: [Place; 2],
+    pub(crate) position: [CompensatedSum; 2],
     /// In the group that is not at its end.
     pub(crate) steps: usize,
     pub(crate) world_from_body: Pose,
@@ -198,7 +198,7 @@ impl<C: Count> DeadReckoning<C> {
             Rule::ExactArc => distance_m * step_sinc(half_turn_rad),
         };
         let [dx_m, dy_m] = along(self.world_from_body.theta_rad + half_turn_rad, chord_m);
-        let [x, y] = &mut self.place;
+        let [x, y] = &mut self.position;
         x.moved_m += dx_m;
         y.moved_m += dy_m;
         self.world_from_body = Pose::new(x.now_m(), y.now_m(), theta_rad);

@@ -105,7 +105,7 @@ impl Odometry {
     pub fn for_each_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>, mut visit: impl FnMut(Pose)) {
         let Some((mut state, steps)) = self.first_row(start, counts) else { return };
         visit(start);
-        if steps.left.len() < whole_log::FEWEST_FOR_A_BLOCK {
+        if steps.left.len() < whole_log::MIN_STEPS_FOR_A_BLOCK {
             for (&left, &right) in steps.left.iter().zip(steps.right) {
                 visit(state.update(Wheels { left, right }));
             }

@@ -5,7 +5,7 @@
 //! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
 //! turned in a step) goes through it instead.
 
-use crate::dead_reckoning::{GROUP, Place, heading_rad};
+use crate::dead_reckoning::{CompensatedSum, GROUP, heading_rad};
 use crate::instruction_set::Kernel;
 use crate::prefetch::{prefetch_read, prefetch_write};
 use crate::trig::{Direction, short_sinc};
@@ -18,11 +18,11 @@ const GROUPS: usize = 4;
 pub(crate) const BLOCK: usize = GROUPS * GROUP;
 
 /// Steps ahead of those being written, and of those being read, whose memory is asked for; from two to eight groups cost the same within the noise of a log of 10⁷ steps.
-const WRITTEN_AHEAD: usize = 2 * GROUP;
-const READ_AHEAD: usize = BLOCK;
+const WRITE_PREFETCH_STEPS: usize = 2 * GROUP;
+const READ_PREFETCH_STEPS: usize = BLOCK;
 
 /// Fewer steps than this are not worth a block.
-pub(crate) const FEWEST_FOR_A_BLOCK: usize = 24;
+pub(crate) const MIN_STEPS_FOR_A_BLOCK: usize = 24;
 
 /// What becomes of the poses.
 pub(crate) trait Sink {
@@ -55,7 +55,7 @@ impl Sink for Every<'_> {
     #[inline(always)]
     fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         let (now, later) = std::mem::take(&mut self.0).split_first_chunk_mut()?;
-        if let Some(soon) = later.get(WRITTEN_AHEAD..) {
+        if let Some(soon) = later.get(WRITE_PREFETCH_STEPS..) {
             soon.first_chunk::<GROUP>().into_iter().for_each(prefetch_write);
         }
         self.0 = later;
@@ -111,7 +111,7 @@ pub(crate) fn walk<C: Count, S: Sink>(
     counts: Wheels<&[C]>,
     sink: S,
 ) -> DeadReckoning<C> {
-    if counts.left.len() < FEWEST_FOR_A_BLOCK {
+    if counts.left.len() < MIN_STEPS_FOR_A_BLOCK {
         let mut walk = Walk { state, counts, sink };
         walk.one_by_one(counts);
         return walk.state;
@@ -138,7 +138,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         columns.start_from(&self.state);
         let ((left, left_rest), (right, right_rest)) = (counts.left.as_chunks(), counts.right.as_chunks());
         let (mut left, mut right) = (left.chunks_exact(GROUPS), right.chunks_exact(GROUPS));
-        let mut soon = counts.map(|counts| counts.get(READ_AHEAD..).unwrap_or(&[]));
+        let mut soon = counts.map(|counts| counts.get(READ_PREFETCH_STEPS..).unwrap_or(&[]));
         for (left, right) in (&mut left).zip(&mut right) {
             self.block(&mut columns, (Wheels { left, right }, soon), BLOCK);
             soon = soon.map(|counts| counts.get(BLOCK..).unwrap_or(&[]));
@@ -152,7 +152,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         let whole = left.remainder().len();
         let mut rest = Wheels { left: left_rest, right: right_rest };
         let mut steps = whole * GROUP;
-        if rest.left.len() >= FEWEST_FOR_A_BLOCK {
+        if rest.left.len() >= MIN_STEPS_FOR_A_BLOCK {
             for (filled, rest) in [(&mut groups.left, rest.left), (&mut groups.right, rest.right)] {
                 filled[whole] = [rest[rest.len() - 1]; GROUP];
                 filled[whole][..rest.len()].copy_from_slice(rest);
@@ -165,7 +165,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
             let groups = Wheels { left: &groups.left[used], right: &groups.right[used] };
             self.block(&mut columns, (groups, Wheels::both(&[])), steps);
         }
-        self.place_waiting(&mut columns);
+        self.write_waiting(&mut columns);
         self.one_by_one(rest);
         self.state
     }
@@ -202,13 +202,13 @@ impl Column {
 /// What is known of a group before its place is.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-struct Moved {
+struct GroupDisplacement {
     theta_rad: [f64; GROUP],
     /// Displacement of each step, along x and y; then their sums.
     moved_m: [[f64; 2]; GROUP],
 }
 
-impl Moved {
+impl GroupDisplacement {
     const EMPTY: Self = Self { theta_rad: [0.0; GROUP], moved_m: [[0.0; 2]; GROUP] };
 }
 
@@ -217,9 +217,9 @@ struct Columns {
     /// Counts since the start; where these do not tell the steps, the steps.
     since: Wheels<Column>,
     theta_rad: Column,
-    blocks: [[Moved; GROUPS]; 2],
+    blocks: [[GroupDisplacement; GROUPS]; 2],
     /// Which of the two is at hand.
-    at_hand: usize,
+    current: usize,
     /// Steps of the one that waits.
     waiting: usize,
     poses: [Pose; GROUP],
@@ -229,8 +229,8 @@ impl Columns {
     const EMPTY: Self = Self {
         since: Wheels { left: Column::EMPTY, right: Column::EMPTY },
         theta_rad: Column::EMPTY,
-        blocks: [[Moved::EMPTY; GROUPS]; 2],
-        at_hand: 0,
+        blocks: [[GroupDisplacement::EMPTY; GROUPS]; 2],
+        current: 0,
         waiting: 0,
         poses: [Pose::IDENTITY; GROUP],
     };
@@ -251,7 +251,7 @@ impl Columns {
         counts: Wheels<&[C; GROUP]>,
         group: usize,
     ) -> bool {
-        let moved = &mut self.blocks[self.at_hand][group];
+        let moved = &mut self.blocks[self.current][group];
         let (Wheels { left, right }, theta_rad) = (&mut self.since, &mut self.theta_rad);
         let differences_are_steps = since_start(state, counts, left, right, theta_rad, &mut moved.theta_rad);
         if !differences_are_steps {
@@ -343,7 +343,7 @@ fn displace<const EXACT_ARC: bool, const DIFFERENCES: bool>(
 
 /// Sums of the displacements, from nothing in each group.
 #[inline(always)]
-fn sum_up(block: &mut [Moved; GROUPS]) {
+fn prefix_sums(block: &mut [GroupDisplacement; GROUPS]) {
     let mut sums_m = [[0.0; 2]; GROUPS];
     for step in 0..GROUP {
         for (group, [x_m, y_m]) in block.iter_mut().zip(&mut sums_m) {
@@ -356,7 +356,11 @@ fn sum_up(block: &mut [Moved; GROUPS]) {
 
 /// Poses of a group whose place is known.
 #[inline(always)]
-fn fill(poses: &mut [Pose; GROUP], [x, y]: [Place; 2], Moved { theta_rad, moved_m }: &Moved) {
+fn fill(
+    poses: &mut [Pose; GROUP],
+    [x, y]: [CompensatedSum; 2],
+    GroupDisplacement { theta_rad, moved_m }: &GroupDisplacement,
+) {
     let moved = moved_m.as_chunks().0.iter().zip(theta_rad.as_chunks().0);
     // Eight by eight: vectors of the widest set are put together, then stored.
     for (poses, (moved_m, theta_rad)) in poses.as_chunks_mut::<8>().0.iter_mut().zip(moved) {
@@ -395,9 +399,9 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
             is_within &= columns.displace(&self.state, before, Wheels { left, right }, group);
             columns.next_group();
             before = Wheels { left: left[GROUP - 1], right: right[GROUP - 1] };
-            self.place_group(columns, group);
+            self.write_group(columns, group);
         }
-        (counts.left.len()..GROUPS).for_each(|group| self.place_group(columns, group));
+        (counts.left.len()..GROUPS).for_each(|group| self.write_group(columns, group));
         columns.waiting = 0;
         let (left, right) = (&counts.left.as_flattened()[..used], &counts.right.as_flattened()[..used]);
         if !is_within {
@@ -405,35 +409,35 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
             columns.start_from(&self.state);
             return;
         }
-        sum_up(&mut columns.blocks[columns.at_hand]);
-        columns.at_hand = 1 - columns.at_hand;
+        prefix_sums(&mut columns.blocks[columns.current]);
+        columns.current = 1 - columns.current;
         columns.waiting = used;
         self.state.counts = Wheels { left: left[used - 1], right: right[used - 1] };
     }
 
     /// Places the block that waits.
     #[inline(always)]
-    fn place_waiting(&mut self, columns: &mut Columns) {
-        (0..GROUPS).for_each(|group| self.place_group(columns, group));
+    fn write_waiting(&mut self, columns: &mut Columns) {
+        (0..GROUPS).for_each(|group| self.write_group(columns, group));
         columns.waiting = 0;
     }
 
     /// Places a group of the block that waits, if there is one.
     #[inline(always)]
-    fn place_group(&mut self, columns: &mut Columns, group: usize) {
+    fn write_group(&mut self, columns: &mut Columns, group: usize) {
         let used = columns.waiting.saturating_sub(group * GROUP).min(GROUP);
         let Some(last) = used.checked_sub(1) else { return };
-        let moved = &columns.blocks[1 - columns.at_hand][group];
+        let moved = &columns.blocks[1 - columns.current][group];
         let state = &mut self.state;
         if S::EVERY {
             if let Some(room) = if used == GROUP { self.sink.room() } else { None } {
-                fill(room, state.place, moved);
+                fill(room, state.position, moved);
             } else {
-                fill(&mut columns.poses, state.place, moved);
+                fill(&mut columns.poses, state.position, moved);
                 self.sink.take(&columns.poses[..used]);
             }
         }
-        let [x, y] = &mut state.place;
+        let [x, y] = &mut state.position;
         [x.moved_m, y.moved_m] = moved.moved_m[last];
         state.world_from_body = Pose::new(x.now_m(), y.now_m(), moved.theta_rad[last]);
         state.steps = used;

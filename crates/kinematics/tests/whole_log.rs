@@ -1,6 +1,6 @@
-//! Whole logs and fleets: the bits of dead reckoning one step at a time, by every instruction set and number of threads, and close to the truth after 10⁷ steps.
+//! Whole logs: the bits of dead reckoning one step at a time, by every instruction set, and close to the truth after 10⁷ steps.
 
-use kinematics::{Count, Fleet, InstructionSet, Odometry, OdometryCovariance, Pose, Rule, WheelNoise, Wheels, sinc};
+use kinematics::{Count, InstructionSet, Odometry, OdometryCovariance, Pose, Rule, WheelNoise, Wheels, sinc};
 use nalgebra::Matrix3;
 
 fn odometry(rule: Rule) -> Odometry {
@@ -194,85 +194,6 @@ fn golden_bits_of_a_whole_log() {
             .fold(0_u64, |digest, bits| (digest ^ bits).wrapping_mul(0x0000_0100_0000_01b3))
     });
     assert_eq!(digest.map(|digest| format!("{digest:016x}")), ["62ca77eb2efb2938", "512d524fccb51619"]);
-}
-
-#[test]
-fn a_robot_of_a_fleet_has_the_bits_that_it_has_alone() {
-    const ROWS: usize = 200;
-    let log = wandering(ROWS);
-    for robots in [1, 11, 12, 64, 65, 130] {
-        // Robot 3 makes a leap that its block's loops are not made for.
-        let row = |k: usize| {
-            let of = |column: &[i64]| -> Vec<i64> {
-                let leap = |robot| if robot == 3 && k > 100 { 1 << 53 } else { 0 };
-                (0..robots as i64).map(|robot| column[k] * (1 + robot % 5) + leap(robot)).collect()
-            };
-            Wheels { left: of(&log.left), right: of(&log.right) }
-        };
-        let start: Vec<Pose> = (0..robots).map(|robot| Pose::new(robot as f64, 0.5, 0.1 * robot as f64)).collect();
-        for odometry in [Rule::Midpoint, Rule::ExactArc].map(odometry) {
-            let first = row(0);
-            let mut alone: Vec<_> = (0..robots)
-                .map(|robot| {
-                    odometry.start(start[robot], Wheels { left: first.left[robot], right: first.right[robot] })
-                })
-                .collect();
-            let first = Wheels { left: &first.left[..], right: &first.right[..] };
-            let mut fleets: Vec<_> =
-                InstructionSet::available().map(|set| Fleet::by(set, odometry, &start, first)).collect();
-            for k in 1..ROWS {
-                let now = row(k);
-                for (robot, alone) in alone.iter_mut().enumerate() {
-                    alone.update(Wheels { left: now.left[robot], right: now.right[robot] });
-                }
-                for fleet in &mut fleets {
-                    fleet.update(Wheels { left: &now.left, right: &now.right });
-                    for (robot, pose) in fleet.poses().enumerate() {
-                        assert_eq!(
-                            bits(pose),
-                            bits(alone[robot].world_from_body()),
-                            "row {k}, robot {robot} of {robots}"
-                        );
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn any_number_of_threads_gives_the_same_bits() {
-    const ROBOTS: usize = 150;
-    let log = wandering(300);
-    let spread = |column: &[i64]| -> Vec<i64> {
-        column.iter().flat_map(|count| (0..ROBOTS as i64).map(move |robot| count * (1 + robot % 7))).collect()
-    };
-    let counts = Wheels { left: spread(&log.left), right: spread(&log.right) };
-    let start = [START; ROBOTS];
-    let by = |threads: usize| -> Vec<[u64; 3]> {
-        std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads)
-                .map(|thread| {
-                    let lanes = thread * ROBOTS / threads..(thread + 1) * ROBOTS / threads;
-                    let (counts, start) = (&counts, &start);
-                    scope.spawn(move || {
-                        let row = |k: usize| {
-                            let range = k * ROBOTS + lanes.start..k * ROBOTS + lanes.end;
-                            Wheels { left: &counts.left[range.clone()], right: &counts.right[range] }
-                        };
-                        let mut fleet = Fleet::new(odometry(Rule::ExactArc), &start[lanes.clone()], row(0));
-                        (1..300).for_each(|k| fleet.update(row(k)));
-                        fleet.poses().map(bits).collect::<Vec<_>>()
-                    })
-                })
-                .collect();
-            workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
-        })
-    };
-    let one = by(1);
-    for threads in [2, 3, 7] {
-        assert_eq!(by(threads), one, "{threads} threads");
-    }
 }
 
 /// Covariance along a log is that of its steps one by one, and of one long step where the robot keeps its curvature (to the rounding of 400 products).

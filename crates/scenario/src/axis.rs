@@ -185,15 +185,15 @@ fn position(items: &[Value], word: &str) -> Result<usize, String> {
 }
 
 /// Where the keys of an axis lead, and whether any of them asks for whole numbers.
-pub(crate) fn places(table: &mut Table, axis: &str) -> Result<(Vec<String>, bool), String> {
-    let mut places = Vec::new();
+pub(crate) fn key_paths(table: &mut Table, axis: &str) -> Result<(Vec<String>, bool), String> {
+    let mut key_paths = Vec::new();
     let mut whole = false;
     for key in keys(axis) {
         let (value, spelled) = number_at(table, key)?;
         whole |= value.is_integer();
-        places.push(spelled);
+        key_paths.push(spelled);
     }
-    Ok((places, whole))
+    Ok((key_paths, whole))
 }
 
 /// Puts `level` at all keys of an axis, keeping integers integers.
@@ -298,7 +298,7 @@ mod tests {
             "seed = 1\nmark = [{ id = \"left\", y = 1 }]\npart = [{ kind = \"a\", n = 1.0 }, { kind = \"b\", n = 1.0 }, { kind = \"b\", n = 2.0 }]",
         )
         .expect("TOML");
-        let mut spelled = |axis: &str| places(&mut table, axis);
+        let mut spelled = |axis: &str| key_paths(&mut table, axis);
         assert_eq!(spelled("part.a.n , mark.left.y"), Ok((vec!["part.0.n".to_owned(), "mark.0.y".to_owned()], true)));
         assert_eq!(spelled("part.2.n"), Ok((vec!["part.2.n".to_owned()], false)));
         assert!(spelled("part.b.n").expect_err("two").contains("by number, such as 1"));

@@ -53,10 +53,14 @@ impl Part {
 }
 
 impl Budget {
-    pub(crate) fn check(&self, place: &str) -> Result<(), ScenarioError> {
+    pub(crate) fn check(&self, location: &str) -> Result<(), ScenarioError> {
         let range = |key: &str, value: f64, holds: bool, must_be: &'static str| {
             let key = format!("budget.{key}");
-            if holds { Ok(()) } else { Err(ScenarioError::OutOfRange { place: place.to_owned(), key, value, must_be }) }
+            if holds {
+                Ok(())
+            } else {
+                Err(ScenarioError::OutOfRange { location: location.to_owned(), key, value, must_be })
+            }
         };
         let side = |key: &str, value: f64| range(key, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
         side("room_x_m", self.room_x_m)?;
@@ -70,7 +74,7 @@ impl Budget {
             _ => "",
         };
         if !message.is_empty() {
-            return Err(ScenarioError::Toml { place: place.to_owned(), message: message.to_owned() });
+            return Err(ScenarioError::Toml { location: location.to_owned(), message: message.to_owned() });
         }
         for (key, value) in [("minutes", self.minutes), ("metres", self.metres)] {
             let value = value.unwrap_or(1.0);

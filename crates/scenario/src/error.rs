@@ -18,34 +18,34 @@ pub enum ScenarioError {
         source: std::io::Error,
     },
     /// The text is not a scenario; the message carries line and column and lists the known words.
-    #[error("{place}: {message}")]
+    #[error("{location}: {message}")]
     Toml {
         /// File, and line where it is known.
-        place: String,
+        location: String,
         /// What is wrong, in one line.
         message: String,
     },
     /// An effect's size is not physical.
-    #[error("{place}: {source}")]
+    #[error("{location}: {source}")]
     Effect {
         /// The file.
-        place: String,
+        location: String,
         /// Which and why.
         source: EffectError,
     },
     /// The robot's nominal geometry is not physical.
-    #[error("{place}: robot: {source}")]
+    #[error("{location}: robot: {source}")]
     Geometry {
         /// The file.
-        place: String,
+        location: String,
         /// Which and why.
         source: GeometryError,
     },
     /// A value is outside its range.
-    #[error("{place}: {key} is {value}; it must be {must_be}")]
+    #[error("{location}: {key} is {value}; it must be {must_be}")]
     OutOfRange {
         /// The file.
-        place: String,
+        location: String,
         /// Dotted key.
         key: String,
         /// The offending value.
@@ -54,20 +54,20 @@ pub enum ScenarioError {
         must_be: &'static str,
     },
     /// Protocols that cannot be driven within the budget.
-    #[error("{place}: {key} does not fit into the budget: {source}")]
+    #[error("{location}: {key} does not fit into the budget: {source}")]
     NoFit {
         /// The file.
-        place: String,
+        location: String,
         /// Dotted key of the protocols.
         key: String,
         /// Why.
         source: NoFit,
     },
     /// A sweep's axis or case names a key that the scenario does not have, or one that is not a number.
-    #[error("{place}: {key}: {problem}")]
+    #[error("{location}: {key}: {problem}")]
     Axis {
         /// The file.
-        place: String,
+        location: String,
         /// Which axis or case, with its dotted key.
         key: String,
         /// What is wrong with it.

@@ -143,9 +143,10 @@ impl Scenario {
         Ok(self.effects.iter().fold(nominal, |geometry, effect| effect.physical().true_geometry(geometry)))
     }
 
-    pub(crate) fn check(&self, place: &str) -> Result<(), ScenarioError> {
+    pub(crate) fn check(&self, location: &str) -> Result<(), ScenarioError> {
         let range = |key: &str, value: f64, holds: bool, must_be: &'static str| {
-            let error = || ScenarioError::OutOfRange { place: place.to_owned(), key: key.to_owned(), value, must_be };
+            let error =
+                || ScenarioError::OutOfRange { location: location.to_owned(), key: key.to_owned(), value, must_be };
             if holds { Ok(()) } else { Err(error()) }
         };
         let positive = |key: &str, value: f64| range(key, value, value.is_finite() && value > 0.0, "positive");
@@ -156,7 +157,7 @@ impl Scenario {
         let interval =
             |key: &str, value: f64| range(key, value, (1e-5..=1e3).contains(&value), "from 0.00001 to 1000 s");
 
-        self.nominal_geometry().map_err(|source| ScenarioError::Geometry { place: place.to_owned(), source })?;
+        self.nominal_geometry().map_err(|source| ScenarioError::Geometry { location: location.to_owned(), source })?;
         let robot = &self.robot;
         speed("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
         speed("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
@@ -184,7 +185,7 @@ impl Scenario {
         let twice = points.iter().enumerate().find(|(k, mark)| points[..*k].iter().any(|other| other.id == mark.id));
         if let Some((_, mark)) = twice {
             let message = format!("two [[robot.point]] have the id \"{}\"; ids must differ", mark.id);
-            return Err(ScenarioError::Toml { place: place.to_owned(), message });
+            return Err(ScenarioError::Toml { location: location.to_owned(), message });
         }
         if let Engine::Stepping { step_s } = self.engine {
             range("engine.step_s", step_s, (1e-6..=1e-3).contains(&step_s), "from 0.000001 to 0.001 s")?;
@@ -236,38 +237,45 @@ impl Scenario {
             }
         }
         for effect in &self.effects {
-            effect.physical().check().map_err(|source| ScenarioError::Effect { place: place.to_owned(), source })?;
+            effect
+                .physical()
+                .check()
+                .map_err(|source| ScenarioError::Effect { location: location.to_owned(), source })?;
         }
         if let Some(budget) = &self.budget {
-            budget.check(place)?;
+            budget.check(location)?;
         }
-        self.check_protocols(place, "protocol", &self.protocols)?;
+        self.check_protocols(location, "protocol", &self.protocols)?;
         let Some(sweep) = &self.sweep else { return Ok(()) };
         for (method, protocols) in &sweep.protocols {
-            self.check_protocols(place, &format!("sweep.protocols.{method}"), protocols)?;
+            self.check_protocols(location, &format!("sweep.protocols.{method}"), protocols)?;
         }
         if !sweep.validation.is_empty() {
-            check_schedules(place, "sweep.validation", &sweep.validation)?;
+            check_schedules(location, "sweep.validation", &sweep.validation)?;
         }
         Ok(())
     }
 
-    fn check_protocols(&self, place: &str, key: &str, protocols: &[Schedule]) -> Result<(), ScenarioError> {
-        check_schedules(place, key, protocols)?;
+    fn check_protocols(&self, location: &str, key: &str, protocols: &[Schedule]) -> Result<(), ScenarioError> {
+        check_schedules(location, key, protocols)?;
         let path = protocols.iter().any(|part| matches!(part, Schedule::ValidationPath { .. }));
         if self.budget.is_some() && path {
-            let (place, key) = (place.to_owned(), key.to_owned());
-            return Err(ScenarioError::NoFit { place, key, source: NoFit::ValidationPath });
+            let (location, key) = (location.to_owned(), key.to_owned());
+            return Err(ScenarioError::NoFit { location, key, source: NoFit::ValidationPath });
         }
         Ok(())
     }
 }
 
 /// Whether schedules, the ones at `key`, can be driven at all.
-fn check_schedules(place: &str, key: &str, schedules: &[Schedule]) -> Result<(), ScenarioError> {
+fn check_schedules(location: &str, key: &str, schedules: &[Schedule]) -> Result<(), ScenarioError> {
     let range = |last: &str, value: f64, holds: bool, must_be: &'static str| {
         let key = format!("{key}.{last}");
-        if holds { Ok(()) } else { Err(ScenarioError::OutOfRange { place: place.to_owned(), key, value, must_be }) }
+        if holds {
+            Ok(())
+        } else {
+            Err(ScenarioError::OutOfRange { location: location.to_owned(), key, value, must_be })
+        }
     };
     let length = |last: &str, value: f64| range(last, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
     for part in schedules {

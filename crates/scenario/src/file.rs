@@ -16,35 +16,36 @@ impl Scenario {
     /// [`ScenarioError`]: unreadable, not a scenario, or values out of range; one line that names the file.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let io = |source| ScenarioError::Io { path: path.to_owned(), source };
-        let place = path.display().to_string();
+        let location = path.display().to_string();
         // Read no more than the limit, whatever size a device or a pipe states.
         let mut text = String::new();
         let file = std::fs::File::open(path).map_err(io)?;
         file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
         if text.len() as u64 > LARGEST_FILE_BYTES {
             let message = format!("too large for a scenario (at most {LARGEST_FILE_BYTES} bytes)");
-            return Err(ScenarioError::Toml { place, message });
+            return Err(ScenarioError::Toml { location, message });
         }
-        Self::parse(&text, &place)
+        Self::parse(&text, &location)
     }
 
-    /// Parses and checks a scenario; `place` (the file) is named in errors.
+    /// Parses and checks a scenario; `location` (the file) is named in errors.
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn parse(text: &str, place: &str) -> Result<Self, ScenarioError> {
+    pub fn parse(text: &str, location: &str) -> Result<Self, ScenarioError> {
         let scenario: Self = toml::from_str(text).map_err(|error| {
-            let place = match error.span() {
-                Some(span) => format!("{place}:{}", text[..span.start].matches('\n').count() + 1),
-                None => place.to_owned(),
+            let location = match error.span() {
+                Some(span) => format!("{location}:{}", text[..span.start].matches('\n').count() + 1),
+                None => location.to_owned(),
             };
-            ScenarioError::Toml { place, message: error.message().trim().replace('\n', "; ") }
+            ScenarioError::Toml { location, message: error.message().trim().replace('\n', "; ") }
         })?;
-        scenario.check(place)?;
-        let no_fit = |source| ScenarioError::NoFit { place: place.to_owned(), key: "protocol".to_owned(), source };
+        scenario.check(location)?;
+        let no_fit =
+            |source| ScenarioError::NoFit { location: location.to_owned(), key: "protocol".to_owned(), source };
         scenario.fitted(&scenario.protocols).map_err(no_fit)?;
         if let Some(sweep) = &scenario.sweep {
-            sweep.points(&scenario, place)?;
+            sweep.points(&scenario, location)?;
         }
         Ok(scenario)
     }
@@ -55,6 +56,6 @@ impl Scenario {
     /// [`ScenarioError::Toml`] when a value has no TOML form (a seed beyond 2⁶³).
     pub fn to_toml(&self) -> Result<String, ScenarioError> {
         toml::to_string(self)
-            .map_err(|error| ScenarioError::Toml { place: self.name.clone(), message: error.to_string() })
+            .map_err(|error| ScenarioError::Toml { location: self.name.clone(), message: error.to_string() })
     }
 }

@@ -30,11 +30,11 @@ impl Sweep {
     ///
     /// # Errors
     /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's scenario invalid.
-    pub fn points(&self, scenario: &Scenario, place: &str) -> Result<Vec<Point>, ScenarioError> {
-        let text_error = |message: String| ScenarioError::Toml { place: place.to_owned(), message };
+    pub fn points(&self, scenario: &Scenario, location: &str) -> Result<Vec<Point>, ScenarioError> {
+        let text_error = |message: String| ScenarioError::Toml { location: location.to_owned(), message };
         self.check().map_err(text_error)?;
         let mut base = Table::try_from(scenario).map_err(|error| text_error(error.to_string()))?;
-        let designs = self.designs(scenario.seed, &mut base, place)?;
+        let designs = self.designs(scenario.seed, &mut base, location)?;
 
         let mut points = Vec::with_capacity(self.cases.len().max(1) * designs.len());
         let no_case = [None];
@@ -44,19 +44,19 @@ impl Sweep {
             let mut levels = Vec::with_capacity(1 + self.axes.len());
             if let Some(case) = case {
                 for (key, value) in &case.set {
-                    axis::set(&mut table, key, *value).map_err(|problem| case.error(place, key, problem))?;
+                    axis::set(&mut table, key, *value).map_err(|problem| case.error(location, key, problem))?;
                 }
                 levels.push((CASE_AXIS.to_owned(), Level::Name(case.name.clone())));
             }
             for design in &designs {
                 let (mut table, mut levels) = (table.clone(), levels.clone());
                 for (key, level) in self.axes.keys().zip(design) {
-                    axis::set(&mut table, key, *level).map_err(|problem| axis_error(place, key, problem))?;
+                    axis::set(&mut table, key, *level).map_err(|problem| axis_error(location, key, problem))?;
                     levels.push((key.clone(), Level::Number(*level)));
                 }
                 let scenario: Scenario =
                     table.try_into().map_err(|error: toml::de::Error| text_error(error.message().to_owned()))?;
-                scenario.check(place)?;
+                scenario.check(location)?;
                 points.push(Point { levels, scenario });
             }
         }
@@ -64,15 +64,15 @@ impl Sweep {
     }
 
     /// Levels of all axes, point by point.
-    fn designs(&self, seed: u64, base: &mut Table, place: &str) -> Result<Vec<Vec<f64>>, ScenarioError> {
+    fn designs(&self, seed: u64, base: &mut Table, location: &str) -> Result<Vec<Vec<f64>>, ScenarioError> {
         let mut taken = BTreeSet::new();
         let mut designs = vec![Vec::new(); self.sobol.map_or(1, |sobol| sobol.points as usize)];
         for ((key, levels), number) in self.axes.iter().zip(0..) {
-            let error = |problem: String| axis_error(place, key, problem);
-            let (places, whole) = axis::places(base, key).map_err(error)?;
-            for place in places {
-                if !taken.insert(place.clone()) {
-                    return Err(error(format!("{place} is set twice, by this axis or by another")));
+            let error = |problem: String| axis_error(location, key, problem);
+            let (key_paths, whole) = axis::key_paths(base, key).map_err(error)?;
+            for location in key_paths {
+                if !taken.insert(location.clone()) {
+                    return Err(error(format!("{location} is set twice, by this axis or by another")));
                 }
             }
             match (levels, self.sobol) {
@@ -105,9 +105,10 @@ impl Sweep {
         for case in &self.cases {
             let mut taken = taken.clone();
             for key in case.set.keys() {
-                let (places, _) = axis::places(base, key).map_err(|problem| case.error(place, key, problem))?;
-                if let Some(twice) = places.into_iter().find(|place| !taken.insert(place.clone())) {
-                    return Err(case.error(place, key, format!("{twice} is set twice, by this case or by an axis")));
+                let (key_paths, _) =
+                    axis::key_paths(base, key).map_err(|problem| case.error(location, key, problem))?;
+                if let Some(twice) = key_paths.into_iter().find(|location| !taken.insert(location.clone())) {
+                    return Err(case.error(location, key, format!("{twice} is set twice, by this case or by an axis")));
                 }
             }
         }
@@ -116,14 +117,14 @@ impl Sweep {
 }
 
 impl Case {
-    fn error(&self, place: &str, key: &str, problem: String) -> ScenarioError {
+    fn error(&self, location: &str, key: &str, problem: String) -> ScenarioError {
         let key = format!("sweep case \"{}\": \"{key}\"", self.name);
-        ScenarioError::Axis { place: place.to_owned(), key, problem }
+        ScenarioError::Axis { location: location.to_owned(), key, problem }
     }
 }
 
-fn axis_error(place: &str, key: &str, problem: String) -> ScenarioError {
-    ScenarioError::Axis { place: place.to_owned(), key: format!("sweep axis \"{key}\""), problem }
+fn axis_error(location: &str, key: &str, problem: String) -> ScenarioError {
+    ScenarioError::Axis { location: location.to_owned(), key: format!("sweep axis \"{key}\""), problem }
 }
 
 #[cfg(test)]

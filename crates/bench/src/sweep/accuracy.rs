@@ -63,13 +63,13 @@ pub fn read_baseline(path: &Path) -> Result<SweepResult, BenchError> {
     serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))
 }
 
-/// Compares a sweep with a baseline; `place` (the baseline's file) is named in errors.
+/// Compares a sweep with a baseline; `location` (the baseline's file) is named in errors.
 ///
 /// # Errors
 /// [`BenchError::Baseline`] when the two do not have the same points, methods and parameters.
-pub fn compare(result: &SweepResult, baseline: &SweepResult, place: &str) -> Result<AccuracyCheck, BenchError> {
+pub fn compare(result: &SweepResult, baseline: &SweepResult, location: &str) -> Result<AccuracyCheck, BenchError> {
     let differ = |what: String| BenchError::Baseline {
-        path: place.to_owned(),
+        path: location.to_owned(),
         why: format!("{what}; if that is meant, --update writes the baseline anew"),
     };
     if result.points.len() != baseline.points.len() {
