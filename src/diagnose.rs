@@ -69,12 +69,12 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(gain) = &document.gain {
         let score = gain.log_score_per_observation;
         terminal.say(&format!(
-            "held out, {} units: log score a value {:.4} → {:.4} (gain {:.4} to {:.4})",
+            "cross-validated over {} runs: mean log predictive density {:.4} → {:.4} (gain {:.4} to {:.4})",
             gain.held_out_runs, score.base, score.extended, score.low, score.high
         ))?;
         if let Some(drift) = gain.drift_percent {
             terminal.say(&format!(
-                "held out, drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
+                "cross-validated drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
                 drift.base, drift.extended, drift.low, drift.high
             ))?;
         }
@@ -84,7 +84,7 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
     }
     let blind: Vec<&str> = document.blind_to.iter().map(|blind| blind.id.as_str()).collect();
     if !blind.is_empty() {
-        terminal.say(&format!("this data could not have shown: {}", blind.join(", ")))?;
+        terminal.say(&format!("not detectable in this data: {}", blind.join(", ")))?;
     }
     Ok(())
 }

@@ -198,7 +198,7 @@ const MAX_SHOWN: usize = 20;
 
 fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!(
-        "accuracy: {} numbers compared, {} moved beyond |z| = {:.2} (one false alarm in {:.0} comparisons); largest |z| = {:.2}",
+        "accuracy: {} numbers compared, {} moved beyond |z| = {:.2} (one false positive in {:.0} comparisons); largest |z| = {:.2}",
         check.compared,
         check.moved.len(),
         check.z_limit,

@@ -31,7 +31,7 @@ pub(crate) fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Fail
     }
     let mut quantities: Vec<(String, Number<'_>)> = Vec::new();
     if result.points.iter().any(|point| !point.drift.is_empty()) {
-        quantities.push(("RMS drift on the validation path, per cent of the way".to_owned(), Box::new(drift)));
+        quantities.push(("RMS drift on the validation path, per cent of the distance".to_owned(), Box::new(drift)));
     }
     for parameter in parameters {
         let title = format!("RMSE of {}, per cent of the true value", symbol(parameter));

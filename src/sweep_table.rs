@@ -68,7 +68,7 @@ fn show_drift(result: &SweepResult, axes: &Axes, terminal: &Terminal) -> Result<
     if result.points.iter().all(|point| point.drift.is_empty()) {
         return Ok(());
     }
-    terminal.say("drift on the validation path with each method's calibration, per cent of the way")?;
+    terminal.say("drift on the validation path with each method's calibration, per cent of the distance")?;
     let mut headers = axes.headers();
     headers.extend(["method", "runs", "minutes", "metres", "mean drift %", "RMS drift %"].map(ToOwned::to_owned));
     let mut rows = table(&headers.iter().map(String::as_str).collect::<Vec<_>>(), axes.keys.len() + 1);

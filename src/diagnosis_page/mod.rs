@@ -118,7 +118,7 @@ impl Page<'_> {
             "Residuals of the {of} model; {failed} of {} checks fail, together at 1 % (Holm).\n",
             checks.len()
         )?;
-        writeln!(page, "| question | answer | statistic | chance |\n| --- | --- | --- | --- |")?;
+        writeln!(page, "| question | answer | statistic | p-value |\n| --- | --- | --- | --- |")?;
         for check in checks {
             let answer = if check.passes { "yes" } else { "**no**" };
             writeln!(
@@ -168,14 +168,14 @@ impl Page<'_> {
 
     fn blind(&self, page: &mut String) -> std::fmt::Result {
         let blind = &self.document.blind_to;
-        writeln!(page, "## What these data could not have shown\n")?;
+        writeln!(page, "## What these data cannot detect\n")?;
         if blind.is_empty() {
             writeln!(
                 page,
-                "Every effect of the catalogue that goes with what is driven would have shown at a size that is large for a real robot.\n"
+                "Every effect of the catalogue that goes with what is driven would have been detected at a size that is large for a real robot.\n"
             )?;
         } else {
-            writeln!(page, "| effect | smallest size that would have shown | why |\n| --- | --- | --- |")?;
+            writeln!(page, "| effect | detection limit | why |\n| --- | --- | --- |")?;
             for blind in blind {
                 let size = blind.smallest_detectable.as_ref().map_or_else(
                     || "none".to_owned(),
@@ -190,7 +190,7 @@ impl Page<'_> {
                 );
                 writeln!(page, "| `{}` | {} | {} |", blind.id, size.trim_end(), blind.why)?;
             }
-            writeln!(page, "\nWith nine chances in ten, at a rate of false positives of 1e-3.\n")?;
+            writeln!(page, "\nDetection limits: power 0.9 at a false-positive rate of 1e-3.\n")?;
         }
         let shows: Vec<String> = self
             .document

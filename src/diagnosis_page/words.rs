@@ -36,7 +36,7 @@ pub(super) fn gain(document: &Document) -> Option<String> {
     let drift = document.gain.as_ref()?.drift_percent.filter(|drift| drift.base > 0.0)?;
     let Compared { base, extended, low, high } = drift;
     let (share, half) = (100.0 * (base - extended) / base, 50.0 * (high - low) / base);
-    let becomes = format!("{base:.3} % of the way become {extended:.3} %");
+    let becomes = format!("{base:.3} % of the distance becomes {extended:.3} %");
     Some(if low > 0.0 {
         format!(
             "On runs that it was not fitted to, the extended model removes {share:.0} ± {half:.0} % of the drift (95 %): {becomes}."
@@ -119,7 +119,7 @@ pub(super) fn fate(alternative: &Alternative) -> &'static str {
         Status::Found => "found",
         Status::NotToldApart => "cannot be told from what was found",
         Status::ExplainsLess => "explains less than what was found, or nothing beside it",
-        Status::DoesNotStandOut => "does not stand out",
+        Status::DoesNotStandOut => "not significant",
         Status::NotShown => "these data could not show it",
     }
 }

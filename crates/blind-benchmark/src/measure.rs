@@ -88,14 +88,14 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
     let mut measures = vec![
         share(
             "false_alarms",
-            "nulls with an alarm",
+            "nulls with a false positive",
             count(of(CaseKind::Null).filter(|case| case.noise == NoiseClass::White), alarm),
             0.05,
             true,
         ),
         share(
             "false_alarms_other_noise",
-            "nulls with an alarm, other noise",
+            "nulls with a false positive, other noise",
             count(of(CaseKind::Null).filter(|case| case.noise != NoiseClass::White), alarm),
             0.10,
             true,
@@ -176,7 +176,7 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
             Some((case.findings().next()?.names.len() as f64, 1.0 + hidden.aliases.len() as f64))
         })
         .collect();
-    measures.push(ratio_of_sums("set_size", "aliased: size of sets over the oracle's", &sizes, 1.2, true));
+    measures.push(ratio_of_sums("set_size", "aliased: size of ambiguity sets over the oracle's", &sizes, 1.2, true));
     measures
 }
 
@@ -364,7 +364,7 @@ fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let limit = again[BOOTSTRAPS * 95 / 100];
     Measure {
         id: "power_ratio",
-        what: "size with 90 % power over the oracle's",
+        what: "effect size with 90 % power over the oracle's",
         value,
         limit: Some(limit).filter(|limit| limit.is_finite()),
         of: points.len(),

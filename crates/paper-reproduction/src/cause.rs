@@ -96,7 +96,7 @@ impl Extension {
                 "",
                 1.0,
                 (0.0, 0.0),
-                "a robot may believe in a round number of pulses",
+                "a robot may assume a round number of pulses",
             ),
             Self::ScaleOnSquares => words(
                 "both wheels roll farther or shorter on the squares than on the short runs",

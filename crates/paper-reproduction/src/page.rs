@@ -109,7 +109,7 @@ impl Reproduction {
         }
         let worst = self.table_1.iter().map(|table| table.below_best).fold(0.0, f64::max);
         let verdict = if worst < DISCRIMINATION_LEVEL {
-            "**The published statistics cannot tell them apart**"
+            "**The published statistics cannot discriminate them**"
         } else {
             "**The published statistics prefer the best one**"
         };
@@ -227,7 +227,7 @@ impl Reproduction {
         writeln!(page, "\n{}\n", causes.sentence())?;
         writeln!(page, "One further measurement on the robot would tell; the one that tells most comes first:\n")?;
         let columns = causes.fitted.iter().map(|fitted| spoken(fitted.extension)).collect::<Vec<_>>().join(" | ");
-        writeln!(page, "| drive and read | shows | σ | {columns} | tells apart by |")?;
+        writeln!(page, "| drive and read | measures | σ | {columns} | discriminates by |")?;
         writeln!(page, "| --- | --- | --- |{} --- |", " --- |".repeat(causes.fitted.len()))?;
         for experiment in &causes.experiments {
             let predicts: Vec<String> = experiment.predicts.iter().map(|value| format!("{value:.4}")).collect();
@@ -260,7 +260,7 @@ impl Reproduction {
             )?;
             if let Some((size, unit)) = finding.separation {
                 let decimals = if size.abs() < 1.0 { 3 } else { 1 };
-                writeln!(page, "  Apart by {size:.decimals$} {unit}.")?;
+                writeln!(page, "  Difference: {size:.decimals$} {unit}.")?;
             }
             writeln!(page, "  So: {}.", finding.meaning)?;
         }
@@ -284,7 +284,7 @@ impl Causes {
             [one] => format!("Of these only **{}** has a plausible size.", spoken(*one)),
             several => format!("Of these {} have a plausible size.", names(several)),
         };
-        format!("The published numbers alone cannot tell apart: {}. {of_these}", names(&self.not_discriminated))
+        format!("The published numbers alone cannot discriminate: {}. {of_these}", names(&self.not_discriminated))
     }
 }
 

@@ -80,7 +80,7 @@ pub enum ScenarioError {
 #[non_exhaustive]
 pub enum NoFit {
     /// The room has no place to move.
-    #[error("a side of {room_m} m leaves no way for a robot that needs {clearance_m} m of it")]
+    #[error("a side of {room_m} m leaves no room for a robot that needs {clearance_m} m of it")]
     Room {
         /// The side of the room, metres.
         room_m: f64,

@@ -21,7 +21,7 @@ pub enum NoBound {
     #[error("no instrument sees the robot")]
     NoInstrument,
     /// A tachometer measures the wheels, and the bound takes looks at the pose alone.
-    #[error("a tachometer's wheel speeds are no look at the pose: leave the instrument out for a bound")]
+    #[error("a tachometer's wheel speeds are no pose measurement: leave the instrument out for a bound")]
     WheelSpeeds,
     /// The floor grid reads fewer than two distinct points.
     #[error("the robot's marked points give no heading: two of them must differ")]
@@ -38,7 +38,7 @@ pub enum NoBound {
     },
     /// A reading tells something without error.
     #[error(
-        "the look at {t_s} s has a direction without any error: the bound is zero; give the instrument or the wheels some noise"
+        "the measurement at {t_s} s has a direction without any error: the bound is zero; give the instrument or the wheels some noise"
     )]
     NoError {
         /// When, seconds from the run's start.

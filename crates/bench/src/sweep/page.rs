@@ -38,7 +38,7 @@ const QUANTITIES: [Quantity; 4] = [
 const VALIDATION_QUANTITIES: [Quantity; 3] = [
     Quantity { name: "RMS drift", unit: "%", number: drift, ideal: None, share: false },
     Quantity { name: "time for calibration", unit: "min", number: minutes, ideal: None, share: false },
-    Quantity { name: "way for calibration", unit: "m", number: metres, ideal: None, share: false },
+    Quantity { name: "distance for calibration", unit: "m", number: metres, ideal: None, share: false },
 ];
 
 fn estimator<'p>(point: &'p PointResult, method: &str, parameter: &str) -> Option<&'p EstimatorResult> {

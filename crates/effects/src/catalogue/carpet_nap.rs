@@ -80,7 +80,7 @@ impl Forward for State {
 
     fn needs_stepping(&self) -> Option<&'static str> {
         (self.effect.yaw_sin_rad_m != 0.0 || self.effect.yaw_cos_rad_m != 0.0)
-            .then_some("its turn bends the path on the way")
+            .then_some("its turn bends the path while it drives")
     }
 }
 

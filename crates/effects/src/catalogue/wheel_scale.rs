@@ -35,7 +35,7 @@ impl PhysicalEffect for WheelScale {
     }
 
     fn description() -> Description {
-        Description::of("both wheels are larger or smaller than believed, by one factor")
+        Description::of("both wheels are larger or smaller than nominal, by one factor")
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

@@ -33,7 +33,7 @@ impl PhysicalEffect for Wheelbase {
     }
 
     fn description() -> Description {
-        Description::of("the wheels act farther apart or closer together than believed")
+        Description::of("the effective wheelbase is larger or smaller than nominal")
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
