@@ -14,7 +14,8 @@ const ROWS: usize = 16;
 pub(super) fn run(sessions: &[Session<'_>], terminal: &Terminal) -> Result<ExitCode, Failure> {
     let followed = AugmentedKalman::DEFAULT.follow(sessions).map_err(|error| error.to_string())?;
     let settled = settled_at(&followed);
-    let mut table = table(&["measurement", "run", "distance m", "turn °", "left mm", "±", "right mm", "±", "wheelbase mm", "±"], 2);
+    let mut table =
+        table(&["measurement", "run", "distance m", "turn °", "left mm", "±", "right mm", "±", "wheelbase mm", "±"], 2);
     // Measurements that lie apart by a constant factor: at first much is learned, later little.
     let mut due = 1.0;
     for step in &followed {

@@ -11,9 +11,10 @@ use super::draw::Draw;
 use super::hidden::{ActingEffect, EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
 use super::oracle::{Detectability, TrueNoise};
-use super::power::{DISCRIMINATION_LEVEL, detection_limit};
+use super::power::DISCRIMINATION_LEVEL;
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
+use crate::oracle_view::{OracleView, form_share, has_random_signature, known_noncentrality, size_ratio, view};
 
 /// What a case asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -52,30 +53,6 @@ impl CaseKind {
     }
 }
 
-/// What the oracle knows of a hidden effect.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct OracleView {
-    /// The effect.
-    pub id: String,
-    /// Its kind.
-    pub kind: EffectKind,
-    /// Whether it acts in another functional form than the catalogue's.
-    pub other_form: bool,
-    /// Sizes by the hypothesis's names, shape parameters after them.
-    #[serde(rename = "sizes")]
-    pub values: Vec<(String, f64)>,
-    /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None` for gross faults.
-    pub noncentrality: Option<f64>,
-    /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
-    pub ratio: Option<f64>,
-    /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross faults and scatter.
-    pub form_share: Option<f64>,
-    /// Noncentrality of the best test between it and each other name whose sizes can be, the least first: what the other name leaves of it. Empty for gross faults.
-    pub rivals: Vec<(String, f64)>,
-    /// The other names that this test does not tell from it with nine chances in ten.
-    pub aliases: Vec<String>,
-}
-
 /// A case ready to be diagnosed.
 pub(crate) struct Case {
     seed: u64,
@@ -89,7 +66,7 @@ pub(crate) struct Case {
     /// The held-out log, without noise, and the same without the effects.
     pub(crate) held_out: Option<(Dataset, Dataset)>,
     /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its place among the hidden ones, and the log.
-    pub(crate) held_out_by_chance: Vec<(usize, Dataset)>,
+    pub(crate) held_out_has_random_signature: Vec<(usize, Dataset)>,
     /// What a calibration without the effects would find, without noise.
     pub(crate) best_drive: Option<estimation::Model>,
     pub(crate) noise: TrueNoise,
@@ -277,9 +254,11 @@ impl Case {
             Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT_RUN)?.pop())
         };
         let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
-        let mut held_out_by_chance = Vec::new();
-        for (place, effect) in hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && by_chance(effect)) {
-            held_out_by_chance.extend(log(&[effect])?.map(|log| (place, log)));
+        let mut held_out_has_random_signature = Vec::new();
+        for (place, effect) in
+            hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && has_random_signature(effect))
+        {
+            held_out_has_random_signature.extend(log(&[effect])?.map(|log| (place, log)));
         }
         Ok(Some(Self {
             seed,
@@ -290,7 +269,7 @@ impl Case {
             oracle,
             datasets,
             held_out,
-            held_out_by_chance,
+            held_out_has_random_signature,
             best_drive,
             noise,
             robot,
@@ -315,7 +294,7 @@ impl Case {
         let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else {
             return Ok(None);
         };
-        let rivals = detectability.rivals(effect.id, known(effect, &detectability));
+        let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
         Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
     }
 
@@ -337,30 +316,6 @@ enum Chosen {
     Unseen,
 }
 
-/// Whether chance has a part in an effect's signature: where in its gap a wheel was left, which fraction of a count was lost.
-fn by_chance(effect: &Hidden) -> bool {
-    effect.benchmark.has_random_signature
-}
-
-/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it.
-fn by_form(effect: &Hidden) -> bool {
-    effect.other_form || by_chance(effect)
-}
-
-/// Noncentrality of the test that knows the effect.
-fn known(effect: &Hidden, detectability: &Detectability) -> f64 {
-    if by_form(effect) { detectability.noncentrality_in_form(effect.id) } else { detectability.noncentrality() }
-}
-
-/// λ over that of the detection limit, as a ratio of sizes.
-fn ratio(effect: &Hidden, detectability: &Detectability) -> f64 {
-    match effect.kind {
-        EffectKind::Mean => (known(effect, detectability) / detection_limit(detectability.freedom(effect.id))).sqrt(),
-        // λ grows with the fourth power of the size.
-        _ => (detectability.scatter / DISCRIMINATION_LEVEL).powf(0.25),
-    }
-}
-
 /// Sets a scale at which the effect is as large as drawn, in units of the oracle's detection limit.
 fn scale(
     effect: &mut Hidden,
@@ -373,7 +328,7 @@ fn scale(
     }
     effect.scale = effect.most.min(1.0);
     let Some(first) = seen(effect)? else { return Ok(Chosen::Unseen) };
-    let at_first = ratio(effect, &first);
+    let at_first = size_ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
     let most = at_first * effect.most / effect.scale;
     if most.is_nan() || most <= low.max(1.0) {
@@ -394,7 +349,7 @@ fn scale(
             return Ok(Chosen::Unseen);
         }
         let Some(next) = seen(effect)? else { return Ok(Chosen::Unseen) };
-        let at_next = ratio(effect, &next);
+        let at_next = size_ratio(effect, &next);
         if at_next.is_nan() || at_next <= 0.0 {
             return Ok(Chosen::Unseen);
         }
@@ -408,67 +363,13 @@ fn scale(
     let described_better = || {
         found
             .0
-            .rivals(effect.id, known(effect, &found.0))
+            .rivals(effect.id, known_noncentrality(effect, &found.0))
             .first()
             .is_some_and(|(_, left)| *left < -DISCRIMINATION_LEVEL)
     };
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > MIN_SHARE && !described_better());
     let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_explained_by_geometry();
     if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
-}
-
-fn view(
-    effect: &Hidden,
-    place: usize,
-    detectability: &[Option<Detectability>],
-    both: Option<&Detectability>,
-    others: &[Hidden],
-) -> OracleView {
-    let values = effect.values().into_iter().map(|(name, size)| (name.to_owned(), size)).collect();
-    let mut view = OracleView {
-        id: effect.id.to_owned(),
-        kind: effect.kind,
-        other_form: effect.other_form,
-        values,
-        noncentrality: None,
-        ratio: None,
-        form_share: None,
-        rivals: Vec::new(),
-        aliases: Vec::new(),
-    };
-    let Some(own) = detectability[place].as_ref() else { return view };
-    if effect.kind == EffectKind::Mean {
-        let other = others.iter().position(|other| other.id != effect.id);
-        let other = other.and_then(|other| Some((&others[other], detectability[other].as_ref()?)));
-        let noncentrality = match (both, other) {
-            (Some(both), Some((other, _))) if by_form(effect) => both.noncentrality_beside(effect.id, other.id),
-            (Some(both), Some((_, other))) => {
-                // By polarisation: ⟨a, b⟩ = (|a + b|² − |a|² − |b|²)/2.
-                let (a, b) = (own.noncentrality(), other.noncentrality());
-                let product = 0.5 * (both.noncentrality() - a - b);
-                if b > 0.0 { (a - product * product / b).max(0.0) } else { a }
-            }
-            _ => known(effect, own),
-        };
-        view.noncentrality = Some(noncentrality);
-        view.ratio = Some((noncentrality / detection_limit(own.freedom(effect.id))).sqrt());
-        view.form_share = Some(form_share(effect, own));
-    } else {
-        view.noncentrality = Some(own.scatter);
-        view.ratio = Some(ratio(effect, own));
-    }
-    // What scatters may look like a mean: sliding at every start is a slip that grows with the acceleration.
-    view.rivals =
-        own.rivals(effect.id, known(effect, own)).into_iter().map(|(id, left)| (id.to_owned(), left)).collect();
-    view.aliases =
-        view.rivals.iter().filter(|(_, left)| *left < DISCRIMINATION_LEVEL).map(|(id, _)| id.clone()).collect();
-    view
-}
-
-/// How much of an effect's signature its own hypothesis takes up.
-fn form_share(effect: &Hidden, detectability: &Detectability) -> f64 {
-    let whole = detectability.noncentrality();
-    if whole > 0.0 { detectability.noncentrality_in_form(effect.id) / whole } else { 0.0 }
 }
 
 /// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
@@ -508,7 +409,7 @@ impl Trial {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
                 let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise) else { return Ok(None) };
                 noncentrality = detectability.noncentrality_in_form(hidden.id);
-                let off = ratio(&hidden, &detectability);
+                let off = size_ratio(&hidden, &detectability);
                 if (0.99..1.01).contains(&off) {
                     break;
                 }

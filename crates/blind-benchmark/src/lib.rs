@@ -13,6 +13,7 @@ mod hidden;
 mod instrument;
 mod measure;
 mod oracle;
+mod oracle_view;
 mod planned;
 mod power;
 mod result;
@@ -27,11 +28,12 @@ use rayon::prelude::*;
 
 use case::Case;
 
-pub use case::{CaseKind, OracleView};
+pub use case::CaseKind;
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};
 pub use measure::Measure;
+pub use oracle_view::OracleView;
 pub use result::{CaseResult, Planned, Reported};
 pub use robot::PathFamily;
 

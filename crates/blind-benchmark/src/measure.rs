@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::case::{CaseKind, OracleView};
+use super::case::CaseKind;
 use super::draw::Draw;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
+use super::oracle_view::OracleView;
 use super::power::limits;
 use super::result::{CaseResult, Planned, Reported};
 

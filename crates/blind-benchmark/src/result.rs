@@ -2,9 +2,10 @@
 
 use diagnose::Document;
 
-use super::case::{Case, CaseKind, OracleView};
+use super::case::{Case, CaseKind};
 use super::hidden::EffectKind;
 use super::instrument::{NoiseClass, TruthKind};
+use super::oracle_view::OracleView;
 use super::robot::PathFamily;
 
 /// One finding, as far as it is scored.

@@ -11,6 +11,7 @@
 //! catalogue and the laws follow. What has no name there is simulated as a [`SparseTerm`].
 
 mod benchmark;
+mod channel;
 mod covariate;
 mod description;
 mod effect;
@@ -23,7 +24,8 @@ mod stream;
 mod term;
 
 pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
-pub use covariate::{Channel, Covariate};
+pub use channel::Channel;
+pub use covariate::Covariate;
 pub use description::{Description, Excitation, IsolatedError, RecordFault, Summary};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};

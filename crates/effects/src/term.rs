@@ -15,7 +15,8 @@ use model_term::ModelTerm;
 use serde::{Deserialize, Serialize};
 
 use crate::IntervalError;
-use crate::covariate::{Channel, Covariate, KinematicSample};
+use crate::channel::Channel;
+use crate::covariate::{Covariate, KinematicSample};
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};

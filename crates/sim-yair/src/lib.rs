@@ -17,6 +17,7 @@ mod prepared_program;
 mod quadrature;
 mod robot;
 mod servo;
+mod servo_error;
 mod simulation;
 
 pub use prepared_program::PreparedProgram;

@@ -9,7 +9,7 @@
 
 use scenario::Motor;
 
-use crate::hctl1100::ServoError;
+use crate::servo_error::ServoError;
 
 /// A motor's motion and the constants that move it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@
 
 use scenario::{Encoder, QUADRATURE_DECODING};
 
-use crate::hctl1100::ServoError;
+use crate::servo_error::ServoError;
 
 /// Clock periods that a quadrature state must stand to be seen (HP HCTL-1100 datasheet, encoder input).
 pub(crate) const STATE_CLOCKS: f64 = 3.0;

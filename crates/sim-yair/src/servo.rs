@@ -13,10 +13,11 @@
 
 use scenario::{ControlMode, Controller, Encoder, Motor};
 
-pub use crate::hctl1100::ServoError;
-use crate::hctl1100::{Hctl1100, MOVE_MAX_COUNTS, MotorCommand, wrap_24};
+use crate::hctl1100::{Hctl1100, MotorCommand, wrap_24};
 use crate::motor::DcMotor;
 use crate::quadrature::{Counter, StateFilter, counts_per_wheel_rad};
+use crate::servo_error::MOVE_MAX_COUNTS;
+pub use crate::servo_error::ServoError;
 
 /// Samples in a row that the wheel must be quiet to count as settled.
 const SETTLED_SAMPLES: u32 = 5;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use kinematics::{Pose, Wheels};
 use model_term::TermParameter;
 
-use crate::covariate::{Channel, Covariate, KinematicSample};
+use crate::channel::Channel;
+use crate::covariate::{Covariate, KinematicSample};
 
 /// How a product of no covariates is written.
 pub(super) const CONSTANT: &str = "1";

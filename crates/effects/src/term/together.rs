@@ -9,7 +9,8 @@ use model_term::{Interval, ModelTerm, TermParameter};
 
 use super::recorded::PreviousIntervals;
 use super::sparse::{Sparse, on_channel, parameter};
-use crate::covariate::{Channel, Covariate, KinematicSample};
+use crate::channel::Channel;
+use crate::covariate::{Covariate, KinematicSample};
 
 /// Products on channels of the motion and of the wheels, a parameter each.
 #[derive(Clone)]
