@@ -39,16 +39,16 @@ const PAIRS: u64 = 2;
 impl CaseKind {
     /// The round of a case, and which of its kind it is.
     pub(crate) const fn of(number: u64) -> (Self, u64) {
-        let (block, place) = (number / BLOCK, number % BLOCK);
-        if place < NULLS {
-            (Self::Null, block * NULLS + place)
-        } else if place < NULLS + SINGLES {
-            (Self::Single, block * SINGLES + place - NULLS)
-        } else if place < NULLS + SINGLES + PAIRS {
-            (Self::Pair, block * PAIRS + place - NULLS - SINGLES)
+        let (block, index) = (number / BLOCK, number % BLOCK);
+        if index < NULLS {
+            (Self::Null, block * NULLS + index)
+        } else if index < NULLS + SINGLES {
+            (Self::Single, block * SINGLES + index - NULLS)
+        } else if index < NULLS + SINGLES + PAIRS {
+            (Self::Pair, block * PAIRS + index - NULLS - SINGLES)
         } else {
             let left = NULLS + SINGLES + PAIRS;
-            (Self::LeftOut, block * (BLOCK - left) + place - left)
+            (Self::LeftOut, block * (BLOCK - left) + index - left)
         }
     }
 }
@@ -65,8 +65,8 @@ pub(crate) struct Case {
     pub(crate) datasets: Vec<Dataset>,
     /// The held-out log, without noise, and the same without the effects.
     pub(crate) held_out: Option<(Dataset, Dataset)>,
-    /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its place among the hidden ones, and the log.
-    pub(crate) held_out_has_random_signature: Vec<(usize, Dataset)>,
+    /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its index among the hidden ones, and the log.
+    pub(crate) held_out_random: Vec<(usize, Dataset)>,
     /// What a calibration without the effects would find, without noise.
     pub(crate) best_drive: Option<estimation::Model>,
     pub(crate) noise: TrueNoise,
@@ -156,20 +156,20 @@ fn drive_session(
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
     pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
-        let (case_kind, place) = CaseKind::of(number);
+        let (case_kind, index) = CaseKind::of(number);
         for attempt in 0..ATTEMPTS {
             // Two that show on the same paths must be met; which, is drawn anew.
-            let ids = Self::ids(seed, number, case_kind, place, if case_kind == CaseKind::Pair { attempt } else { 0 });
+            let ids = Self::ids(seed, number, case_kind, index, if case_kind == CaseKind::Pair { attempt } else { 0 });
             if let Some(case) = Self::attempt(seed, number, case_kind, &ids, attempt)? {
                 return Ok(Ok(case));
             }
         }
-        Ok(Err(Self::ids(seed, number, case_kind, place, 0).first().copied().unwrap_or("")))
+        Ok(Err(Self::ids(seed, number, case_kind, index, 0).first().copied().unwrap_or("")))
     }
 
     /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn have a mean or scatter: a gross fault is one of
     /// a few discrete things.
-    fn ids(seed: u64, number: u64, case_kind: CaseKind, place: u64, attempt: u64) -> Vec<&'static str> {
+    fn ids(seed: u64, number: u64, case_kind: CaseKind, index: u64, attempt: u64) -> Vec<&'static str> {
         let mut draw = Draw::of(seed, number, "what", attempt);
         let all = hideable();
         let of =
@@ -196,7 +196,7 @@ impl Case {
                 }
                 vec![first, second]
             }
-            CaseKind::LeftOut => vec![all[place as usize % all.len()].0],
+            CaseKind::LeftOut => vec![all[index as usize % all.len()].0],
         }
     }
 
@@ -254,11 +254,11 @@ impl Case {
             Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT_RUN)?.pop())
         };
         let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
-        let mut held_out_has_random_signature = Vec::new();
-        for (place, effect) in
+        let mut held_out_random = Vec::new();
+        for (index, effect) in
             hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && has_random_signature(effect))
         {
-            held_out_has_random_signature.extend(log(&[effect])?.map(|log| (place, log)));
+            held_out_random.extend(log(&[effect])?.map(|log| (index, log)));
         }
         Ok(Some(Self {
             seed,
@@ -269,7 +269,7 @@ impl Case {
             oracle,
             datasets,
             held_out,
-            held_out_has_random_signature,
+            held_out_random,
             best_drive,
             noise,
             robot,

@@ -99,5 +99,5 @@ fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
         let variants = hypothesis(hidden.id).and_then(Hypothesis::into_variants)?;
         Some((variants.into_iter().map(of_shape).fold(f64::INFINITY, f64::min) - floor).max(0.0))
     };
-    case.held_out_by_chance.iter().filter_map(left).sum()
+    case.held_out_random.iter().filter_map(left).sum()
 }
