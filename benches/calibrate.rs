@@ -1,5 +1,6 @@
-//! Calibration and diagnosis of long logs: an hour of counts a hundred times a second and measurements ten times a second, calibrated by each method that takes any path, and
-//! diagnosed with a slip and an eccentric wheel in it.
+//! Calibration and diagnosis of long logs: an hour of counts a hundred times a second and measurements ten
+//! times a second, calibrated by each method that takes any path, and diagnosed with a slip and an eccentric
+//! wheel in it.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use dataset::Dataset;

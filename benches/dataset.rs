@@ -1,8 +1,11 @@
-//! A large dataset imported, evaluated and calibrated, beside the time that reading and parsing it takes, and the memory of each.
+//! A large dataset imported, evaluated and calibrated, beside the time that reading and parsing it takes, and
+//! the memory of each.
 //!
-//! The source is made first: a session in `OptiOdom`'s format of runs of 100 000 rows, the robot turning elsewhere every ten seconds. Argument: its size in
-//! megabytes (100 where none is given). With `--whole`, also calibrated with all runs held
-//! and fitted as a whole; with `--lasting`, the instrument's errors last for seconds, as those of real ones do, and measurements are thinned. `docs/performance.md` has a run of it.
+//! The source is made first: a session in `OptiOdom`'s format of runs of 100 000 rows, the robot turning
+//! elsewhere every ten seconds. Argument: its size in megabytes (100 where none is given). With `--whole`,
+//! also calibrated with all runs held and fitted as a whole; with `--lasting`, the instrument's errors last
+//! for seconds, as those of real ones do, and measurements are thinned. `docs/performance.md` has a run of
+//! it.
 
 use std::f64::consts::PI;
 use std::fs::File;

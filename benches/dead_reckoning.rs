@@ -1,7 +1,9 @@
-//! Dead reckoning against what it could cost: a plain loop with the C library's sine and cosine, and a copy of the same bytes.
+//! Dead reckoning against what it could cost: a plain loop with the C library's sine and cosine, and a copy
+//! of the same bytes.
 //!
-//! Every round times all contenders in turn, each by its fastest of five turns of about a millisecond, which a busy machine seldom interrupts all; what is printed
-//! are medians over rounds, of times and of ratios within a round. `docs/performance.md` has a run of it. Arguments: `--quick` for fewer rounds and no log
+//! Every round times all contenders in turn, each by its fastest of five turns of about a millisecond, which
+//! a busy machine seldom interrupts all; what is printed are medians over rounds, of times and of ratios
+//! within a round. `docs/performance.md` has a run of it. Arguments: `--quick` for fewer rounds and no log
 //! that exceeds the caches.
 
 mod plain;

@@ -1,5 +1,7 @@
-//! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and stepped, calibrated by each method, all of it together
-//! beside a bare loop that does the same, a point of a sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of the fastest of five.
+//! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and
+//! stepped, calibrated by each method, all of it together beside a bare loop that does the same, a point of a
+//! sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of
+//! the fastest of five.
 
 mod yardstick;
 
@@ -80,7 +82,8 @@ fn sweep(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The bound of the paper's protocol, which every point of a sweep computes, and of a square of one minute that is seen 20 times a second.
+/// The bound of the paper's protocol, which every point of a sweep computes, and of a square of one minute
+/// that is seen 20 times a second.
 fn bound(criterion: &mut Criterion) {
     let protocol = paper(Engine::ClosedForm);
     let mut dense = protocol.clone();
@@ -115,7 +118,8 @@ fn fastest_s(calls: u32, mut call: impl FnMut()) -> f64 {
     (0..5).map(time).fold(f64::INFINITY, f64::min)
 }
 
-/// What a trial costs beside stepping through it and beside the bare loop. In turn in every round: a busy machine slows all of them.
+/// What a trial costs beside stepping through it and beside the bare loop. In turn in every round: a busy
+/// machine slows all of them.
 #[allow(clippy::print_stdout)]
 fn ratios(_: &mut Criterion) {
     const ROUNDS: usize = 9;

@@ -20,16 +20,19 @@ use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_da
 #[derive(Args)]
 #[command(after_help = methods())]
 pub(crate) struct Arguments {
-    /// Datasets; several are one robot's sessions, calibrated together. A folder of datasets stands for all of them.
+    /// Datasets; several are one robot's sessions, calibrated together. A folder of datasets stands for all
+    /// of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Method, or `all` for each one that applies.
     #[arg(long, default_value = "joint", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name()).chain([ALL])))]
     method: String,
-    /// Find the 95 % interval of each parameter of `joint` from the likelihood's own rise, which need not be symmetric.
+    /// Find the 95 % interval of each parameter of `joint` from the likelihood's own rise, which need not be
+    /// symmetric.
     #[arg(long, conflicts_with = "online")]
     profile: bool,
-    /// Follow the parameters through the logs as the robot would on line, a measurement after the other, and say when they have settled.
+    /// Follow the parameters through the logs as the robot would on line, a measurement after the other, and
+    /// say when they have settled.
     #[arg(long, conflicts_with_all = ["method", "out"])]
     online: bool,
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
@@ -155,7 +158,7 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
         let (low, high) = found.profile(column, RISE_95).map_err(|error| error.to_string())?;
         for key in keys {
             if let Some(value) = joint.parameters.get_mut(*key) {
-                // The steps of lengths are relative, those of the mounting are added.
+                // The steps of the geometry are relative, those of the mounting are added.
                 let at = |by: f64| {
                     if Column::GEOMETRY.contains(&column) { value.value * by.exp() } else { value.value + by }
                 };

@@ -10,7 +10,8 @@ use dataset::Existing;
 
 use crate::terminal::{Failure, Terminal, cell, table};
 
-/// The blind benchmark of `diagnose`: random robots with hidden effects, nulls and effects that are left out of the catalogue, against an oracle.
+/// The blind benchmark of `diagnose`: random robots with hidden effects, nulls and effects that are left out
+/// of the catalogue, against an oracle.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// How many cases; the bars are meant for 2000 and more.

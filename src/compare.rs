@@ -120,7 +120,8 @@ fn row(label: &str, method: &ComparedMethod, trained: Option<&str>, evaluated: &
     row
 }
 
-/// Method, which sessions it refused, and why: the reason of the first one, by name where others have their own.
+/// Method, which sessions it refused, and why: the reason of the first one, by name where others have their
+/// own.
 fn refusals(comparison: &Comparison, kinds: &[(&str, usize)]) -> Vec<[String; 3]> {
     let mut rows = Vec::new();
     for method in &comparison.methods {

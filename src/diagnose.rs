@@ -10,13 +10,16 @@ use crate::diagnosis_page::Page;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
-/// What the calibrated model gets wrong: its name or that it cannot be told, the extended model, and the gain on runs that it has not seen.
+/// What the calibrated model gets wrong: its name or that it cannot be told, the extended model, and the gain
+/// on runs that it has not seen.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets; several are one robot's sessions, diagnosed together. A folder of datasets stands for all of them.
+    /// Datasets; several are one robot's sessions, diagnosed together. A folder of datasets stands for all of
+    /// them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Folder for report.md with its pictures, findings.json, and extended.toml, a scenario of the robot as found.
+    /// Folder for report.md with its pictures, findings.json, and extended.toml, a scenario of the robot as
+    /// found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take an effect out of the catalogue; may be given several times.

@@ -64,7 +64,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
 }
 
-/// Names of the datasets, and the drift under each calibration. One run is held at a time: logs may be larger than the memory.
+/// Names of the datasets, and the drift under each calibration. One run is held at a time: logs may be larger
+/// than the memory.
 fn evaluate(
     paths: &[PathBuf],
     calibrations: &[Option<NamedCalibration>],

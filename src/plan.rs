@@ -11,7 +11,8 @@ use serde::Serialize;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, read_datasets, table};
 
-/// The next experiment: what tells apart the names that a diagnosis leaves, or shows what it could not see; from a scenario, what to drive before there is any data.
+/// The next experiment: what discriminates the candidates that a diagnosis leaves, or shows what it could not
+/// see; from a scenario, what to drive before there is any data.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Datasets of one robot, or a folder of them, or a scenario file.
@@ -29,7 +30,8 @@ pub(crate) struct Arguments {
     /// Take an effect out of the catalogue; may be given several times.
     #[arg(long = "without", value_name = "ID")]
     without: Vec<String>,
-    /// Folder for plan.toml, a scenario that drives the plan with the robot as it is known; one for each speed.
+    /// Folder for plan.toml, a scenario that drives the plan with the robot as it is known; one for each
+    /// speed.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -172,7 +172,8 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A temporary file beside `path`, with the permissions of any other file of the user, that is to become `path`.
+/// A temporary file beside `path`, with the permissions of any other file of the user, that is to become
+/// `path`.
 fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
     let folder = folder_of(path);
     if !folder.is_dir() {

@@ -140,7 +140,8 @@ pub(crate) fn symbol(parameter: &str) -> &str {
     }
 }
 
-/// A value with its standard error in units of the last digit, `-3.1656(7)`: no digit is printed that the trials do not carry.
+/// A value with its standard error in units of the last digit, `-3.1656(7)`: no digit is printed that the
+/// trials do not carry.
 pub(crate) fn concise(value: f64, error: f64) -> String {
     if error.is_nan() || error <= 0.0 || !error.is_finite() {
         return format!("{value:.4}");

@@ -74,8 +74,8 @@ impl Terminal {
     }
 }
 
-/// Writes a line. A reader that has gone away (`| head`) is no failure, and stops nothing else: files are still written and the exit code still says
-/// what it has to say.
+/// Writes a line. A reader that has gone away (`| head`) is no failure, and stops nothing else: files are
+/// still written and the exit code still says what it has to say.
 fn writeln_to_stdout(text: &str) -> Result<(), Failure> {
     match writeln!(std::io::stdout().lock(), "{text}") {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),

@@ -1,4 +1,5 @@
-//! Dead reckoning as one writes it down: a step at a time, sine and cosine from the C library, sums in plain doubles.
+//! Dead reckoning as one writes it down: a step at a time, sine and cosine from the C library, sums in plain
+//! doubles.
 
 use kinematics::{Odometry, Pose, Rule, Wheels};
 

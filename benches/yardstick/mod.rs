@@ -1,8 +1,11 @@
-//! The yardstick: the paper's trial as a bare loop, to measure the library's speed against and to check its numbers.
+//! The yardstick: the paper's trial as a bare loop, to measure the library's speed against and to check its
+//! numbers.
 //!
-//! The same experiment as one closed-form trial of `scenarios/paper.toml` (30 straights of 0.5 m, 30 spins of a turn, 10 squares of 4 m) with the estimates
-//! of `direct` and `umbmark`, written out for this robot alone: no effects, no records, no session, no errors, one stream of draws for everything. It draws
-//! as often from the same distributions, so that its estimates scatter as the library's do, trial by trial with other numbers.
+//! The same experiment as one closed-form trial of `scenarios/paper.toml` (30 straights of 0.5 m, 30 spins of
+//! a turn, 10 squares of 4 m) with the estimates of `direct` and `umbmark`, written out for this robot alone:
+//! no effects, no records, no session, no errors, one stream of draws for everything. It draws as often from
+//! the same distributions, so that its estimates scatter as the library's do, trial by trial with other
+//! numbers.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -113,7 +116,8 @@ impl Yardstick {
         (start, self.read(&robot), [after[0] - before[0], after[1] - before[1]])
     }
 
-    /// A square: by how much its end's x, in the start's frame, differs from dead reckoning on nominal values.
+    /// A square: by how much its end's x, in the start's frame, differs from dead reckoning on nominal
+    /// values.
     fn square(&mut self, corner_rad: f64) -> f64 {
         let (side, corner) = (straight(4.0), spin(corner_rad));
         let mut robot = self.place();
@@ -141,7 +145,8 @@ impl Yardstick {
         Robot { x_m, y_m, theta_rad, sin_cos: theta_rad.sin_cos(), counts }
     }
 
-    /// One arc with the wheels' noise summed over it and scattered inside it (docs/effects.md; Chong & Kleeman 1997).
+    /// One arc with the wheels' noise summed over it and scattered inside it (docs/effects.md; Chong &
+    /// Kleeman 1997).
     fn drive(&mut self, robot: &mut Robot, counts: [f64; 2]) {
         let base_m = NOMINAL_BASE_M + BASE_SIGMA_M * self.stream.normal();
         let [l, r] = [TRUE_M_PER_COUNT[0] * counts[0], TRUE_M_PER_COUNT[1] * counts[1]];

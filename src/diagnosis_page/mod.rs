@@ -1,4 +1,5 @@
-//! What `yair diagnose --out DIR` writes for people: report.md with its pictures, to be read from top to bottom.
+//! What `yair diagnose --out DIR` writes for people: report.md with its pictures, to be read from top to
+//! bottom.
 
 mod pictures;
 mod words;

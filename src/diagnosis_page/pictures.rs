@@ -9,7 +9,8 @@ const BAND: f64 = 1.959_964;
 const MOST: usize = 4;
 /// With nothing that stands out, so many are drawn all the same.
 const LEAST: usize = 1;
-/// A covariate stands out when a model without fault would show as much with this chance, over all covariates and components.
+/// A covariate stands out when a model without fault would show as much with this probability, over all
+/// covariates and components.
 const STANDS_OUT: f64 = 0.01;
 
 const BEFORE: &str = "calibrated model";
@@ -18,7 +19,7 @@ const AFTER: &str = "extended model";
 /// A picture: its file's stem, a text for who does not see it, and the drawing.
 pub(super) type Picture = (&'static str, String, Figure);
 
-/// The smallest chance of a covariate's components.
+/// The smallest p-value of a covariate's components.
 fn p_value(against: &ResidualsByCovariate) -> f64 {
     against.components.iter().map(|component| component.before.varies_p_value).fold(1.0, f64::min)
 }
@@ -31,7 +32,7 @@ fn chi_square(against: &ResidualsByCovariate) -> f64 {
 pub(super) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
     let tests: usize = residuals.against.iter().map(|against| against.components.len()).sum();
     let mut all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
-    // Chances of large statistics are all zero in a double: the statistic itself goes on.
+    // p-values of large statistics are all zero in a double: the statistic itself goes on.
     all.sort_by(|a, b| chi_square(b).total_cmp(&chi_square(a)));
     let level = STANDS_OUT / tests.max(1) as f64;
     let standing = all.iter().filter(|against| p_value(against) < level).count();

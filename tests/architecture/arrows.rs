@@ -5,7 +5,8 @@ use std::process::Command;
 
 use crate::root;
 
-/// Who may use whom, dev- and build-dependencies too. `estimation` and `calib` never link what could tell them the truth.
+/// Who may use whom, dev- and build-dependencies too. `estimation` and `calib` never link what could tell
+/// them the truth.
 pub(crate) const ARROWS: &[(&str, &[&str])] = &[
     ("kinematics", &[]),
     ("atomic-file", &[]),

@@ -74,7 +74,8 @@ fn the_readme_shows_the_library_example_that_is_tested() {
 /// How a document names the originals of the real data, and which part of the data's folder they are.
 const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom"), ("calibration/reference-output/", "khepera")];
 
-/// Runs one command line of a document and returns its standard output, or `None` when it needs data that are not here.
+/// Runs one command line of a document and returns its standard output, or `None` when it needs data that are
+/// not here.
 fn run(line: &str, folder: &Path) -> Option<String> {
     let (_, arguments) = line.split_once("yair ").or_else(|| line.split_once("cargo run --release -- "))?;
     let mut words: Vec<String> = arguments.split_whitespace().map(str::to_owned).collect();
@@ -88,7 +89,8 @@ fn run(line: &str, folder: &Path) -> Option<String> {
     Some(succeed(folder, &words.iter().map(String::as_str).collect::<Vec<_>>()).stdout)
 }
 
-/// Whether a pasted output is the real one; a pasted line that begins with … stands for any number of lines, and elapsed times are not compared.
+/// Whether a pasted output is the real one; a pasted line that begins with … stands for any number of lines,
+/// and elapsed times are not compared.
 fn agrees(pasted: &[String], real: &str) -> Result<(), String> {
     let real: Vec<&str> = real.lines().map(str::trim_end).collect();
     let pasted: Vec<&str> =
@@ -118,7 +120,8 @@ fn a_pasted_output_with_another_digit_does_not_agree() {
     }
 }
 
-/// A pasted output as it should be: what is printed, with the same left out at … as before. What comes after … is found by its first line that is printed once, or else is as long as it was.
+/// A pasted output as it should be: what is printed, with the same left out at … as before. What comes after
+/// … is found by its first line that is printed once, or else is as long as it was.
 fn refreshed(pasted: &[String], real: &str) -> Vec<String> {
     let real: Vec<String> = real.lines().map(|line| line.trim_end().to_owned()).collect();
     let (timing, pasted): (Vec<_>, Vec<_>) = pasted.iter().cloned().partition(|line| line.contains(" trials in "));
@@ -155,8 +158,10 @@ fn a_refreshed_output_agrees_and_keeps_what_it_leaves_out() {
     }
 }
 
-/// Every `sh` block that is followed by a `text` block: its `yair` commands print that text. And every picture `docs/bench-NAME.svg` is the one that the sweep
-/// of NAME in `docs/bench.md` draws. With YAIR_UPDATE_DOCS=1 texts and pictures are written anew. Compared are so many at the least, real data or none.
+/// Every `sh` block that is followed by a `text` block: its `yair` commands print that text. And every
+/// picture `docs/bench-NAME.svg` is the one that the sweep of NAME in `docs/bench.md` draws. With
+/// YAIR_UPDATE_DOCS=1 texts and pictures are written anew. Compared are so many at the least, real data or
+/// none.
 fn shows_what_its_commands_print(document: &str, least: usize) {
     let update = std::env::var("YAIR_UPDATE_DOCS").is_ok_and(|value| value == "1");
     let mut compared = 0;
@@ -230,7 +235,8 @@ mod documents_show_what_commands_print {
     }
 }
 
-/// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands above the table find.
+/// The published sessions of docs/calibration.md, "here / published": the left figures are what the commands
+/// above the table find.
 #[test]
 fn published_optiodom_squares_stand_in_the_document_as_found() {
     if real_data("published_optiodom_squares_stand_in_the_document_as_found", "optiodom").is_none() {

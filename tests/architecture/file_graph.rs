@@ -1,9 +1,10 @@
 //! Files of a crate do not use each other in circles: a crate can be read from its lowest file up.
 //!
-//! The graph has a node per file and an arrow from a file to each file that defines an item which it names, by `use`
-//! or by a path in code. A name that a parent re-exports counts as an arrow to the file that defines the item, so that
-//! a re-export hides nothing; the `mod` and `pub use` lines themselves are no arrows. What stands under `#[cfg(test)]`
-//! is left out. Methods are found by their type, not by name: a method call makes no arrow.
+//! The graph has a node per file and an arrow from a file to each file that defines an item which it names,
+//! by `use` or by a path in code. A name that a parent re-exports counts as an arrow to the file that defines
+//! the item, so that a re-export hides nothing; the `mod` and `pub use` lines themselves are no arrows. What
+//! stands under `#[cfg(test)]` is left out. Methods are found by their type, not by name: a method call makes
+//! no arrow.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -93,7 +94,8 @@ fn re_exports_and_tests_make_no_circle() {
             [""; 0]
         );
     }
-    // A parent that re-exports its children, of which one uses what another defines; and a file of tests alone.
+    // A parent that re-exports its children, of which one uses what another defines; and a file of tests
+    // alone.
     let folder = [
         ("lib.rs", "mod a;"),
         ("a/mod.rs", "mod b; mod c; #[cfg(test)] mod tests; pub use b::B; pub use c::C;"),
@@ -169,8 +171,8 @@ impl Crate {
         (1..=module.len()).any(|length| self.tests.contains(&module[..length]))
     }
 
-    /// Files and items that a path means in a module: several where one name is a module's, a type's and a function's.
-    /// `followed` are the imports on the way there, each of which is followed once.
+    /// Files and items that a path means in a module: several where one name is a module's, a type's and a
+    /// function's. `followed` are the imports on the way there, each of which is followed once.
     fn definitions(
         &self,
         module: &[String],
@@ -209,7 +211,8 @@ impl Crate {
         found
     }
 
-    /// A table of contents uses the items that it lists, wherever its macro declares their modules, and re-exports them.
+    /// A table of contents uses the items that it lists, wherever its macro declares their modules, and
+    /// re-exports them.
     fn import_listed(&mut self) {
         for (module, path) in std::mem::take(&mut self.listed) {
             let Some((item, within)) = path.split_last() else { continue };
@@ -362,7 +365,8 @@ fn paths(call: &Macro) -> Vec<Names> {
 }
 
 fn paths_from(mut cursor: Cursor<'_>, found: &mut Vec<Names>) {
-    // The two tokens before: after `.` stands a field or a method, after `::` the end of a path that began with a type.
+    // The two tokens before: after `.` stands a field or a method, after `::` the end of a path that began
+    // with a type.
     let mut before = [' '; 2];
     while !cursor.eof() {
         if let Some((inside, _, _, after)) = cursor.any_group() {

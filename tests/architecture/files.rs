@@ -1,4 +1,5 @@
-//! The folders are there, every source file says what it is, no file names a machine, and every scenario file can be simulated.
+//! The folders are there, every source file says what it is, no file names a machine, and every scenario file
+//! can be simulated.
 
 use std::fs;
 

@@ -1,7 +1,9 @@
-//! The house holds itself: arrows between crates, folders and headers, scenario files, and documents that say what the command prints.
+//! The house holds itself: arrows between crates, folders and headers, scenario files, and documents that say
+//! what the command prints.
 //!
-//! Rejected by what was tried: an edge from `calib` to `effects`, a crate that no table lists, a changed digit in the README's table, a command in the
-//! README that CI does not run, an effect's parameter missing in docs/scenario.md.
+//! Rejected by what was tried: an edge from `calib` to `effects`, a crate that no table lists, a changed
+//! digit in the README's table, a command in the README that CI does not run, an effect's parameter missing
+//! in docs/scenario.md.
 
 mod arrows;
 mod commands;

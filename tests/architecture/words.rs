@@ -1,4 +1,5 @@
-//! The field's words: private names that the code once had for standard terms do not come back into identifiers.
+//! The field's words: private names that the code once had for standard terms do not come back into
+//! identifiers.
 //!
 //! Rejected by what was tried: a `struct Evidence`, a method `examine`, a constant `MOST_RUNS`.
 

@@ -1,4 +1,5 @@
-//! The gate on calibration accuracy: honest seeds pass, and each way in which an estimator was damaged on purpose is caught.
+//! The gate on calibration accuracy: honest seeds pass, and each way in which an estimator was damaged on
+//! purpose is caught.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -86,8 +87,9 @@ fn ten_honest_seeds_pass_and_their_numbers_scatter_as_their_errors_say() {
         assert_eq!(check.moved, [], "seed {seed}");
         check.changed.iter().for_each(|number| spread.push(number.z));
     }
-    // The scale of z is what the budget rests on: with errors half as large as they are it would be 2. Some 700 numbers, of which those of one trial hang
-    // together and all share one baseline: about 70 independent ones, whose spread has an error of 1/√140 = 8 %.
+    // The scale of z is what the budget rests on: with errors half as large as they are it would be 2. Some
+    // 700 numbers, of which those of one trial hang together and all share one baseline: about 70 independent
+    // ones, whose spread has an error of 1/√140 = 8 %.
     let (variance, _) = spread.variance().expect("many");
     assert!((0.7..1.3).contains(&variance.sqrt()), "{}", variance.sqrt());
 }

@@ -81,7 +81,8 @@ fn a_pair_is_what_calibrate_and_evaluate_find_and_a_kind_is_the_mean_of_its_pair
         }
     }
 
-    // Nominal wheels are 3.28 % small; straights of 2 m show it, and a spin ends where it began: 33 mm on average.
+    // Nominal wheels are 3.28 % small; straights of 2 m show it, and a spin ends where it began: 33 mm on
+    // average.
     let straights = |method: &str, trained_on: Option<&str>| {
         let kinds = entries(named(methods, "method", method), "kinds");
         let of =
@@ -115,7 +116,8 @@ fn the_table_fits_and_only_the_asked_for_methods_are_in_it() {
     assert!(all.stdout.lines().all(|line| line.chars().count() <= 100), "{}", all.stdout);
 }
 
-/// A session of a single mark can be neither calibrated on nor evaluated on, and says why; the others are compared all the same.
+/// A session of a single mark can be neither calibrated on nor evaluated on, and says why; the others are
+/// compared all the same.
 #[test]
 fn a_session_without_poses_gives_no_pair_and_says_why() {
     let temp = tempfile::tempdir().expect("a temporary folder");

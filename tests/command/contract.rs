@@ -193,7 +193,8 @@ fn calibrate_and_evaluate_keep_their_contract() {
         }
     }
     let drift = |entry: &Value| entry["drift_percent"].as_f64().expect("a drift");
-    // The robot of the scenario is 3 % off; a calibration that was not used would drift as the nominal values do.
+    // The robot of the scenario is 3 % off; a calibration that was not used would drift as the nominal values
+    // do.
     assert!(drift(calibrations.last().expect("some")) < drift(&calibrations[0]) / 2.0);
 }
 

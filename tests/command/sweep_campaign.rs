@@ -1,6 +1,8 @@
-//! Campaigns that are stopped, killed, cut into shards and run on other numbers of threads end in the same bytes.
+//! Campaigns that are stopped, killed, cut into shards and run on other numbers of threads end in the same
+//! bytes.
 //!
-//! Rejected by what was tried: sums in the order of arrival, states without the last bits of their numbers, a spool that is not cut back on going on.
+//! Rejected by what was tried: sums in the order of arrival, states without the last bits of their numbers, a
+//! spool that is not cut back on going on.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -149,7 +151,8 @@ fn another_seed_or_point_gives_other_bytes() {
     let options = SweepOptions { seed: Some(3), ..SweepOptions::default() };
     let other = SweepPlan::new(&scenario(), options).expect("a sweep").run(0, &|_| ()).expect("runs");
     assert_ne!(result.points, other.points);
-    // Points whose robots are alike scatter independently: equal levels twice on an axis give two estimates of the same.
+    // Points whose robots are alike scatter independently: equal levels twice on an axis give two estimates
+    // of the same.
     let mut twice = scenario();
     let axes = &mut twice.sweep.as_mut().expect("the paper sweeps").axes;
     axes.clear();
@@ -192,7 +195,8 @@ fn write_scenario(folder: &Path, trials: u64) {
     fs::write(folder.join("small.toml"), scenario.to_toml().expect("TOML")).expect("written");
 }
 
-/// Starts a campaign in a folder and kills it, with no time to say anything, a little after it has written its state anew. Whether it lasted so long.
+/// Starts a campaign in a folder and kills it, with no time to say anything, a little after it has written
+/// its state anew. Whether it lasted so long.
 fn killed_after_a_state(here: &Path, arguments: &[&str], state: &Path) -> bool {
     let written = || fs::metadata(state).and_then(|of| of.modified()).ok();
     let before = written();
@@ -218,7 +222,8 @@ fn a_killed_command_goes_on_where_it_was() {
     let arguments = ["sweep", "small.toml", "--rows", "--json", "--quiet", "--jobs", "1", "--out"];
     let state = here.join("killed").join(STATE);
     let mut trials = 16_000;
-    // A state is written every two seconds: a machine on which the campaign ends before its second one gets a longer campaign.
+    // A state is written every two seconds: a machine on which the campaign ends before its second one gets a
+    // longer campaign.
     loop {
         write_scenario(here, trials);
         let [first, second] = [&["killed"][..], &["killed", "--resume"]]
@@ -281,7 +286,8 @@ fn what_does_not_fit_together_is_refused_with_the_reason() {
     assert!(refusal(here, &["sweep", "small.toml", "--out", "file"]).contains("cannot write results there"));
 }
 
-/// A trial of a sweep is a dataset that can be looked into: what the rows say of it is what a method finds in it.
+/// A trial of a sweep is a dataset that can be looked into: what the rows say of it is what a method finds in
+/// it.
 #[test]
 fn a_trial_of_a_sweep_can_be_looked_into() {
     let temporary = tempfile::tempdir().expect("a folder");

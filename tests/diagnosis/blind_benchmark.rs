@@ -1,7 +1,9 @@
-//! The blind benchmark of diagnosis, a small part of it with a fixed seed, and the same floors under a fresh one.
+//! The blind benchmark of diagnosis, a small part of it with a fixed seed, and the same floors under a fresh
+//! one.
 //!
-//! The whole campaign is `just challenge`; docs/diagnose.md has its table. Here stand floors under what that measures, so far below it that only a tool that
-//! has broken falls through: one that alarms at nulls one time in two, finds half of what is plain, or names one in four of what it finds.
+//! The whole campaign is `just challenge`; docs/diagnose.md has its table. Here stand floors under what that
+//! measures, so far below it that only a tool that has broken falls through: one that alarms at nulls one
+//! time in two, finds half of what is plain, or names one in four of what it finds.
 #![allow(clippy::print_stdout)] // the seed, and what came of it
 
 use crate::support::{document, succeed, usage};
@@ -9,8 +11,8 @@ use blind_benchmark::{CaseKind, CaseResult, EffectKind, NoiseClass, challenge_ca
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// What the tool must do at the least, as shares: the bar on false positives under white noise, and floors under detection and naming, which docs/diagnose.md
-/// measures at 0.9 and 0.8.
+/// What the tool must do at the least, as shares: the bar on false positives under white noise, and floors
+/// under detection and naming, which docs/diagnose.md measures at 0.9 and 0.8.
 const ALARMS: f64 = 0.05;
 const DETECTED: f64 = 0.7;
 const NAMED: f64 = 0.55;
@@ -70,8 +72,8 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
     assert!(named >= least(reported, NAMED, share), "{named} of {reported} named");
 }
 
-/// Of cases 0 to 99 of a seed all 35 nulls and 35 singles, and the two pairs and four effects that are left out of the first block, of which nothing is asked
-/// here but an answer.
+/// Of cases 0 to 99 of a seed all 35 nulls and 35 singles, and the two pairs and four effects that are left
+/// out of the first block, of which nothing is asked here but an answer.
 #[test]
 fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
@@ -87,7 +89,8 @@ fn a_fixed_part_of_the_challenge_is_passed() {
     holds(seed, &cases, 1e-3);
 }
 
-/// Nothing can have been tuned on a seed that nobody has seen. At the floors' own rates this fails once in 10 000 runs, and the tool is better than its floors.
+/// Nothing can have been tuned on a seed that nobody has seen. At the floors' own rates this fails once in 10
+/// 000 runs, and the tool is better than its floors.
 #[test]
 #[ignore = "a campaign, not a test: `just fresh-seeds` takes a seed from the clock and gives it in YAIR_SEED"]
 fn a_part_of_the_challenge_that_nobody_has_seen_is_passed() {

@@ -1,7 +1,9 @@
-//! Effects hidden in simulated robots are found and named, nulls are left alone, and what is not in the catalogue gets no other name.
+//! Effects hidden in simulated robots are found and named, nulls are left alone, and what is not in the
+//! catalogue gets no other name.
 //!
-//! The simulator's forward faces are other code and other functional forms than the hypotheses. Every case prints its seed; a case is driven once with it.
-//! Seen to fail when the scan forgets to project the calibration out, and when wheel phases start anew in every run.
+//! The simulator's forward faces are other code and other functional forms than the hypotheses. Every case
+//! prints its seed; a case is driven once with it. Seen to fail when the scan forgets to project the
+//! calibration out, and when wheel phases start anew in every run.
 #![allow(clippy::print_stdout)] // every case with its seed
 
 use dataset::Dataset;
@@ -45,7 +47,8 @@ fn shown(document: &Document) -> Vec<String> {
     document.findings.iter().map(|finding| finding.names.join("|")).collect()
 }
 
-/// An effect with sizes that a real robot has, and the names that are right: its own, and what is the same thing to first order on every path.
+/// An effect with sizes that a real robot has, and the names that are right: its own, and what is the same
+/// thing to first order on every path.
 const HIDDEN: [(&str, &str, &[&str]); 12] = [
     ("slip_speed", "slip_s_m = 0.03", &["slip_speed"]),
     ("wheel_eccentricity", "right_amplitude = 0.004\nright_phase_rad = 1.0", &["wheel_eccentricity"]),
@@ -95,7 +98,8 @@ fn counts_of_another_number_a_turn_are_named_where_only_the_ends_of_bent_paths_a
     assert!((document.findings[0].parameters["factor"].value - 4.0).abs() < 1e-9);
 }
 
-/// Family-wise over all gates at most 5 %. As many nulls as YAIR_NULLS says, 40 without; the test fails where so many alarms have a chance of 1e-3 at 5 %.
+/// Family-wise over all gates at most 5 %. As many nulls as YAIR_NULLS says, 40 without; the test fails where
+/// so many alarms have a chance of 1e-3 at 5 %.
 #[test]
 fn nulls_are_consistent() {
     let nulls: u64 = std::env::var("YAIR_NULLS").ok().and_then(|text| text.parse().ok()).unwrap_or(40);
@@ -114,8 +118,9 @@ fn nulls_are_consistent() {
     assert!(alarms <= bound, "{alarms} alarms in {nulls}; at 5 % more than {bound} have a chance below 1e-3");
 }
 
-/// With the ends of runs alone a large effect makes a fifth of the measurements lie far off by any model without it, and what is left shows nothing: without a search among all
-/// measurements this one is `unlisted`.
+/// With the ends of runs alone a large effect makes a fifth of the measurements lie far off by any model
+/// without it, and what is left shows nothing: without a search among all measurements this one is
+/// `unlisted`.
 #[test]
 fn a_large_effect_that_shows_in_few_looks_is_not_taken_for_outliers() {
     let (yaw_rad, seed) = (0.02, 71);
@@ -132,7 +137,8 @@ fn a_large_effect_that_shows_in_few_looks_is_not_taken_for_outliers() {
     assert!((size.value - yaw_rad).abs() < 4.0 * sigma && sigma < 0.1 * yaw_rad, "{size:?}");
 }
 
-/// A wheel's phase has a sine and a cosine: left out of the catalogue, an eccentric wheel is two terms without a name, of that wheel, at the sizes that it has.
+/// A wheel's phase has a sine and a cosine: left out of the catalogue, an eccentric wheel is two terms
+/// without a name, of that wheel, at the sizes that it has.
 #[test]
 fn a_wheel_out_of_round_is_two_terms_of_that_wheel_where_it_has_no_name() {
     let (id, sizes, _) = HIDDEN[1];
@@ -152,7 +158,8 @@ fn a_wheel_out_of_round_is_two_terms_of_that_wheel_where_it_has_no_name() {
     }
 }
 
-/// Taken out of the catalogue, an effect may show as `unlisted`, or stay unseen, or among several names; a single other name would be a lie.
+/// Taken out of the catalogue, an effect may show as `unlisted`, or stay unseen, or among several names; a
+/// single other name would be a lie.
 #[test]
 fn what_is_not_in_the_catalogue_gets_no_other_name() {
     for (number, (id, sizes, right)) in HIDDEN.iter().enumerate().filter(|(_, (id, ..))| *id != "swapped_wheels") {
@@ -177,7 +184,8 @@ fn the_extended_scenario_shows_the_same_effect() {
     }
 }
 
-/// Hidden terms that no effect of the catalogue does and no other product does on these paths: channel, covariates, coefficient, what else the effect says.
+/// Hidden terms that no effect of the catalogue does and no other product does on these paths: channel,
+/// covariates, coefficient, what else the effect says.
 const TERMS: [(&str, &[&str], f64, &str); 4] = [
     ("along", &["|omega|"], 0.004, ""),
     ("yaw", &["v", "x"], 0.02, ""),
@@ -192,7 +200,8 @@ fn effect_of_term(channel: &str, covariates: &[impl AsRef<str>], coefficient: f6
     )
 }
 
-/// The one finding, which must be a term outside of the catalogue on this channel with these covariates, and this size within five standard deviations.
+/// The one finding, which must be a term outside of the catalogue on this channel with these covariates, and
+/// this size within five standard deviations.
 fn unlisted(document: &Document, channel: &str, covariates: &[&str], coefficient: f64) -> UnlistedTerm {
     let [finding] = &document.findings[..] else { panic!("{channel} {covariates:?}: {:?}", shown(document)) };
     let term = finding.unlisted_term.clone().unwrap_or_else(|| panic!("{channel} {covariates:?}: {finding:?}"));
@@ -205,7 +214,8 @@ fn unlisted(document: &Document, channel: &str, covariates: &[&str], coefficient
     term
 }
 
-/// What hides in a robot and has no name comes back with its channel and its covariates, and again from the extended scenario.
+/// What hides in a robot and has no name comes back with its channel and its covariates, and again from the
+/// extended scenario.
 #[test]
 fn a_term_of_no_name_comes_back_from_the_extended_scenario() {
     for (number, (channel, covariates, coefficient, more)) in (0..).zip(TERMS) {

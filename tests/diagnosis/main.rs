@@ -1,4 +1,5 @@
-//! Diagnosis of simulated robots: hidden effects are found and named, nulls are left alone, and planned runs tell names apart.
+//! Diagnosis of simulated robots: hidden effects are found and named, nulls are left alone, and planned runs
+//! tell names apart.
 
 mod blind_benchmark;
 mod hidden_effects;

@@ -1,7 +1,10 @@
-//! The next experiment: names that one session leaves together stand alone after the planned runs, and what was predicted of them comes true.
+//! The next experiment: names that one session leaves together stand alone after the planned runs, and what
+//! was predicted of them comes true.
 //!
-//! The diagnosis knows neither what is hidden nor the simulator; the planned runs are simulated with the hidden effect and diagnosed together with the first session.
-//! Seen to fail when the plan forgets to let the other name do its best (it then drives more of the same), and when predictions keep the old calibration fixed.
+//! The diagnosis knows neither what is hidden nor the simulator; the planned runs are simulated with the
+//! hidden effect and diagnosed together with the first session. Seen to fail when the plan forgets to let the
+//! other name do its best (it then drives more of the same), and when predictions keep the old calibration
+//! fixed.
 #![allow(clippy::print_stdout)] // every case with its seed
 
 use crate::support::{document, refusal, succeed};
@@ -19,7 +22,8 @@ const SPINS: Schedule = Schedule::Spins { turn_rad: std::f64::consts::TAU, runs:
 const SQUARES: Schedule = Schedule::Squares { side_m: 1.0, runs_each_way: 3 };
 const CIRCLES: Schedule = Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 4 };
 
-/// A robot under motion capture with calibration errors and one more effect, in a session that does not show which.
+/// A robot under motion capture with calibration errors and one more effect, in a session that does not show
+/// which.
 fn robot(effect: &str, protocols: &[Schedule]) -> Scenario {
     #[derive(serde::Deserialize)]
     struct List {
@@ -89,7 +93,8 @@ fn planned_runs_leave_the_right_name_alone() {
         let value = &predicted.values[id];
         let sigmas = (off - value.value) / value.sigma.expect("known");
         println!("  seen: {off:.5} {}, {sigmas:.1} σ from what {id} predicts", value.unit);
-        // Two-sided at 1e-3 over five cases: 3.72 standard deviations. A prediction without the covariance of the calibration is off by more.
+        // Two-sided at 1e-3 over five cases: 3.72 standard deviations. A prediction without the covariance of
+        // the calibration is off by more.
         assert!(sigmas.abs() < 3.72, "{id}: seen {off}, predicted {value:?}");
         let all: Vec<Dataset> = [first].into_iter().chain(new).collect();
         let after = diagnose(&all, &Options::default()).expect("a diagnosis").document;
@@ -99,7 +104,8 @@ fn planned_runs_leave_the_right_name_alone() {
     assert!(ambiguous >= 3, "only {ambiguous} of the sessions leave names together: nothing was tested");
 }
 
-/// One of a dozen effects, its size log-uniform between what hardly shows and what is large, in one of five sessions.
+/// One of a dozen effects, its size log-uniform between what hardly shows and what is large, in one of five
+/// sessions.
 fn drawn(case: u64) -> (&'static str, Scenario) {
     let mut stream = Address { seed: 60_000, point: 0, trial: case, run: 0 }.stream(StreamName::new("hidden"));
     let kind = stream.uniform();
@@ -127,7 +133,8 @@ fn drawn(case: u64) -> (&'static str, Scenario) {
     (id, robot(&format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n"), sessions[session]))
 }
 
-/// As many random robots as YAIR_PLANS says, 15 without. Where a plan was made to tell names apart, no other name than the right one may stand alone afterwards.
+/// As many random robots as YAIR_PLANS says, 15 without. Where a plan was made to tell names apart, no other
+/// name than the right one may stand alone afterwards.
 #[test]
 fn plans_for_random_robots_name_nothing_wrong() {
     let cases: u64 = std::env::var("YAIR_PLANS").ok().and_then(|text| text.parse().ok()).unwrap_or(15);
@@ -163,14 +170,16 @@ fn plans_for_random_robots_name_nothing_wrong() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// Where the instrument sees the robot against dead reckoning by the first session's calibration: the mean over the runs that a prediction speaks of.
+/// Where the instrument sees the robot against dead reckoning by the first session's calibration: the mean
+/// over the runs that a prediction speaks of.
 fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
     let joint = FitSettings::GEOMETRY_ONLY;
     let base = joint.fit(&[first.session()]).expect("the first session fits");
     let mut cut = new.clone();
     cut.runs.retain(|run| direction(run) == predicted.direction);
     for run in &mut cut.runs {
-        // The servos settle a little after the last command: the last row of a run is later than its motion by less than the nearest look is off.
+        // The servos settle a little after the last command: the last row of a run is later than its motion
+        // by less than the nearest look is off.
         let at_s = predicted.share_of_duration * run.odometry.t_s.last().expect("a log");
         let nearest = run.truth.iter().min_by(|a, b| (a.t_s - at_s).abs().total_cmp(&(b.t_s - at_s).abs()));
         run.truth = vec![run.truth[0], *nearest.expect("looks")];
@@ -223,8 +232,9 @@ fn what_nothing_drivable_tells_apart_is_said_so() {
     assert!(why.starts_with("no run fits"), "{why}");
 }
 
-/// Driven and fitted, a plan from a scenario determines the lengths as it said: the squared errors over the stated variances of 12 simulated plans are χ² with 36
-/// degrees of freedom, below 67.99 with a chance of 1 − 1e-3 (twice the stated σ would be needed to pass with half the information).
+/// Driven and fitted, a plan from a scenario determines the lengths as it said: the squared errors over the
+/// stated variances of 12 simulated plans are χ² with 36 degrees of freedom, below 67.99 with a chance of 1 −
+/// 1e-3 (twice the stated σ would be needed to pass with half the information).
 #[test]
 fn a_plan_without_data_keeps_what_it_promises() {
     let mut scenario = robot("[[effect]]\nkind = \"wheel_scale\"\nscale = 1.0\n", &[STRAIGHTS]);

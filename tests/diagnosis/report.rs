@@ -1,11 +1,13 @@
-//! The report of a diagnosis: what it says is what was found, its links lead somewhere, and its residuals show the effect before the extension and not after.
+//! The report of a diagnosis: what it says is what was found, its links lead somewhere, and its residuals
+//! show the effect before the extension and not after.
 
 use std::path::Path;
 
 use crate::support::succeed;
 use serde_json::Value;
 
-/// Chance of a covariate's binned means along the robot, if they are the same in all bins: under the calibrated and the extended model.
+/// Chance of a covariate's binned means along the robot, if they are the same in all bins: under the
+/// calibrated and the extended model.
 fn chances(residuals: &Value, covariate: &str, component: &str) -> (f64, f64) {
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let against = list(&residuals["against"]);
@@ -38,7 +40,8 @@ fn a_report_shows_what_was_found() {
     }
     let text = std::fs::read_to_string(out.join("residuals.json")).expect("residuals");
     let residuals: Value = serde_json::from_str(&text).expect("JSON");
-    // z = 23 is spread over twelve bins and three components; what the extended model leaves passes at 1e-3. The left wheel never shows: at 1e-3 each.
+    // z = 23 is spread over twelve bins and three components; what the extended model leaves passes at 1e-3.
+    // The left wheel never shows: at 1e-3 each.
     let (before, after) = chances(&residuals, "right_wheel_phase", "along");
     assert!(before < 1e-6 && after > 1e-3, "{before} {after}");
     let (before, after) = chances(&residuals, "left_wheel_phase", "along");

@@ -1,8 +1,10 @@
-//! Two engines, one meaning: motors under their controllers in 1 ms steps, and whole motions in closed form, scatter alike.
+//! Two engines, one meaning: motors under their controllers in 1 ms steps, and whole motions in closed form,
+//! scatter alike.
 //!
-//! Compared is what dead reckoning misses: the true end seen from the true start, against the end by the counts. Moments of both engines are compared
-//! by z tests at 4.5 standard errors, a false positive of 7e-6 each. Every comparison is also made against a closed form without the noise inside an arc
-//! (the L²/12 term), which must be told apart: it was.
+//! Compared is what dead reckoning misses: the true end seen from the true start, against the end by the
+//! counts. Moments of both engines are compared by z tests at 4.5 standard errors, a false positive of 7e-6
+//! each. Every comparison is also made against a closed form without the noise inside an arc (the L²/12
+//! term), which must be told apart: it was.
 
 use dataset::{Protocol, ProtocolSettings, Run, RunView};
 use kinematics::{BridgeCovariance, Increment, Pose, Rule, Wheels};
@@ -20,7 +22,8 @@ fn scenario(engine: Engine) -> Scenario {
     scenario.engine = engine;
     scenario.noise.wheel_sigma_m_per_sqrt_m = K_M_PER_SQRT_M;
     scenario.effects.retain(|effect| effect.id() != "quantization");
-    // The chips start together here: a late right wheel bends the path by v·δ/b, which counts read at standstills cannot show.
+    // The chips start together here: a late right wheel bends the path by v·δ/b, which counts read at
+    // standstills cannot show.
     scenario.robot.controller.right_phase_s = 0.0;
     scenario
 }

@@ -1,4 +1,5 @@
-//! Laws that every effect of the catalogue keeps, each with a specimen that breaks it. What its hypothesis says of data stands in hypotheses/.
+//! Laws that every effect of the catalogue keeps, each with a specimen that breaks it. What its hypothesis
+//! says of data stands in hypotheses/.
 
 use dataset::{Dataset, Protocol, ProtocolSettings, Run};
 use effects::{
@@ -150,8 +151,9 @@ fn perfect(engine: Engine) -> Scenario {
     scenario
 }
 
-/// Straight, spin, backward and an arc whose inner wheel runs at half of the outer one's speed: both speeds lie on the controller's lattice (40 and 20
-/// counts a sample), so that the stepped robot drives the radius that it is told.
+/// Straight, spin, backward and an arc whose inner wheel runs at half of the outer one's speed: both speeds
+/// lie on the controller's lattice (40 and 20 counts a sample), so that the stepped robot drives the radius
+/// that it is told.
 fn program() -> MotionProgram {
     let motions = vec![
         Motion::Straight { length_m: 1.0 },
@@ -388,11 +390,13 @@ fn difference(a: Pose, b: Pose) -> f64 {
     (a.x_m - b.x_m).abs().max((a.y_m - b.y_m).abs()).max((a.theta_rad - b.theta_rad).abs())
 }
 
-/// Counts are whole on both sides: 12.5 µm a wheel, 3e-5 rad, over a metre of arm after four motions 1e-4. A closed form that skipped the ramps of a motion
-/// would be off by 5e-4 for `slip_speed`; one that drove shafts instead of counts to the target, by 3e-2 for `missed_counts`.
+/// Counts are whole on both sides: 12.5 µm a wheel, 3e-5 rad, over a metre of arm after four motions 1e-4. A
+/// closed form that skipped the ramps of a motion would be off by 5e-4 for `slip_speed`; one that drove
+/// shafts instead of counts to the target, by 3e-2 for `missed_counts`.
 const ENGINES_AGREE: f64 = 2e-4;
 
-/// Effects on the record alone: what dead reckoning makes of a faulty record is no motion that the engines could agree on.
+/// Effects on the record alone: what dead reckoning makes of a faulty record is no motion that the engines
+/// could agree on.
 const RECORD: [&str; 8] = [
     "interval_error",
     "reversed_wheel",

@@ -1,5 +1,5 @@
-//! The bench of all methods (scenarios/methods.toml, docs/methods.md): everyone takes part, who sees everything is unbiased, and the summary shows the sweep's
-//! numbers.
+//! The bench of all methods (scenarios/methods.toml, docs/methods.md): everyone takes part, who sees
+//! everything is unbiased, and the summary shows the sweep's numbers.
 
 use crate::support::succeed;
 use std::sync::LazyLock;
@@ -24,8 +24,9 @@ fn list<'v>(value: &'v Value, key: &str) -> &'v [Value] {
     value[key].as_array().unwrap_or_else(|| panic!("{key} is no list in {value}"))
 }
 
-/// 18 biases within 4.5 of their standard errors, by 60 trials (Student, 59 degrees of freedom): a false positive of 6e-4. Rejects `ivanjko` with the wheels of the whole log, where the instrument's last measurement
-/// comes before the robot stands: 3.6 % of the wheelbase, 300 standard errors.
+/// 18 biases within 4.5 of their standard errors, by 60 trials (Student, 59 degrees of freedom): a false
+/// positive of 6e-4. Rejects `ivanjko` with the wheels of the whole log, where the instrument's last
+/// measurement comes before the robot stands: 3.6 % of the wheelbase, 300 standard errors.
 #[test]
 fn every_method_takes_part_and_those_that_see_everything_are_unbiased_in_usual_conditions() {
     let usual = &list(&SWEEP.0, "points")[0];

@@ -1,4 +1,5 @@
-//! `joint`: every kind of truth gives the robot back, what is not seen is named, the bound is reached, and real robots are calibrated as well as by anyone.
+//! `joint`: every kind of truth gives the robot back, what is not seen is named, the bound is reached, and
+//! real robots are calibrated as well as by anyone.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -79,8 +80,9 @@ fn keep_ends(truth: &mut Vec<TruthSample>) {
     *truth = ends.into_iter().flatten().collect();
 }
 
-/// Recorded counts are whole: 12.5 µm of a wheel, 3e-5 rad, on runs of 1.5 m and turns of 6 rad 1e-5 of a length each, and some dozen runs together: 3e-5 is
-/// allowed. The robot differs from its nominal values by 1 %, and headings left alone would show as a thousandth.
+/// Recorded counts are whole: 12.5 µm of a wheel, 3e-5 rad, on runs of 1.5 m and turns of 6 rad 1e-5 of a
+/// length each, and some dozen runs together: 3e-5 is allowed. The robot differs from its nominal values by 1
+/// %, and headings left alone would show as a thousandth.
 const ROUNDED: f64 = 3e-5;
 
 #[test]
@@ -108,7 +110,8 @@ fn every_kind_of_truth_gives_the_robot_back() {
         assert!(found.converged && found.not_observable.is_empty(), "{name}: {found:?}");
         assert!(off(&found, &truth) < ROUNDED, "{name}: {}", off(&found, &truth));
     }
-    // Positions see a heading over the way: spins of a few micrometres' way show none of their own, squares do.
+    // Positions see a heading over the way: spins of a few micrometres' way show none of their own, squares
+    // do.
     let found = calibrated(&positions);
     assert!(off(&found, &truth) < 10.0 * ROUNDED, "positions: {}", off(&found, &truth));
     // What must not pass for any: the nominal drive.
@@ -116,10 +119,11 @@ fn every_kind_of_truth_gives_the_robot_back() {
     assert!(lengths(&nominal).iter().zip(lengths(&truth)).any(|(a, b)| (a / b - 1.0).abs() > 100.0 * ROUNDED));
 }
 
-/// The paper's squares of 4 m, read at their ends alone: the robot turns 3 % too far in each corner, so that they do not close, and what is left open shows the
-/// scale to a per cent. Wheels over wheelbase are seen to some per mille by the headings (0.5 mm marks 0.46 m apart), the wheels' ratio to a part in ten thousand.
-/// Bounds are ten times that; σ of ten runs is itself known to a quarter, so that 5 σ are allowed of the scale. Rejects a fit whose outliers are told before its
-/// scale has settled, which lost all ten runs.
+/// The paper's squares of 4 m, read at their ends alone: the robot turns 3 % too far in each corner, so that
+/// they do not close, and what is left open shows the scale to a per cent. Wheels over wheelbase are seen to
+/// some per mille by the headings (0.5 mm marks 0.46 m apart), the wheels' ratio to a part in ten thousand.
+/// Bounds are ten times that; σ of ten runs is itself known to a quarter, so that 5 σ are allowed of the
+/// scale. Rejects a fit whose outliers are told before its scale has settled, which lost all ten runs.
 #[test]
 fn ends_of_large_squares_show_what_they_leave_open() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml");
@@ -185,15 +189,17 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
             // The product of the lengths over nominal is what a common scale moves.
             _ => lengths(&found.geometry).iter().zip(lengths(&nominal)).map(|(a, b)| a / b).product::<f64>(),
         };
-        // The directions that are seen move a little of everything; 2 % of scale, which these robots have, would not pass.
+        // The directions that are seen move a little of everything; 2 % of scale, which these robots have,
+        // would not pass.
         assert!((kept - 1.0).abs() < 0.02, "{unobservable:?} {kept}");
     }
     let (mix, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 5);
     assert!(calibrated(&mix).not_observable.is_empty());
 }
 
-/// Where thousands of measurements make the cost a parabola, the interval at 95 % is 1.96 σ to each side: it is allowed 2 %, as σ is that of the information at the
-/// minimum and the cost's own curvature changes a little on the way. An interval of one σ, or of 1.64, would not pass.
+/// Where thousands of measurements make the cost a parabola, the interval at 95 % is 1.96 σ to each side: it
+/// is allowed 2 %, as σ is that of the information at the minimum and the cost's own curvature changes a
+/// little on the way. An interval of one σ, or of 1.64, would not pass.
 #[test]
 fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     let (dataset, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 6);
@@ -212,9 +218,11 @@ fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     assert!(refused.contains("Latency"), "{refused}");
 }
 
-/// 300 trials of each case: RMSE²/bound has a standard error of √(2/300) = 8.2 %, a coverage of 1.3 %, a ratio of RMSEs of two cases √(1/300) = 5.8 %. At 4 of
-/// each beside the claims (5 %, 93.5 to 96.5 %, 15 %; 20 000 trials of docs/methods.md) nine numbers are a false positive of 6e-4; that all 300 intervals cover has a chance of 2e-5 at 96.5 %. Rejects measurements taken one in two,
-/// which doubles the mean square, and outliers that are believed, which multiply it by ten.
+/// 300 trials of each case: RMSE²/bound has a standard error of √(2/300) = 8.2 %, a coverage of 1.3 %, a
+/// ratio of RMSEs of two cases √(1/300) = 5.8 %. At 4 of each beside the claims (5 %, 93.5 to 96.5 %, 15 %;
+/// 20 000 trials of docs/methods.md) nine numbers are a false positive of 6e-4; that all 300 intervals cover
+/// has a chance of 2e-5 at 96.5 %. Rejects measurements taken one in two, which doubles the mean square, and
+/// outliers that are believed, which multiply it by ten.
 #[test]
 fn the_bound_is_reached_and_outliers_hardly_matter() {
     let temp = tempfile::tempdir().expect("a folder");
@@ -235,8 +243,9 @@ fn the_bound_is_reached_and_outliers_hardly_matter() {
     }
 }
 
-/// The best figures that published parameters reach on the sessions of June 2020, each within 5 % or below, and circles at least a tenth below in both
-/// (millimetres and degrees, means of final errors over ordered pairs of sessions).
+/// The best figures that published parameters reach on the sessions of June 2020, each within 5 % or below,
+/// and circles at least a tenth below in both (millimetres and degrees, means of final errors over ordered
+/// pairs of sessions).
 #[test]
 fn published_optiodom_sessions_are_met_or_beaten() {
     let Some(folder) = real_data("published_optiodom_sessions_are_met_or_beaten", "optiodom/diff") else { return };
@@ -294,9 +303,11 @@ fn published_khepera_lies_within_the_intervals() {
     }
 }
 
-/// A marker that sits elsewhere in each session, and stamps that are late by another time in each run. Readings of 0.3 mm and 0.5 mrad, some thousand of them a
-/// session and a hundred a run in which the robot turns at more than 1 rad/s, find a place to 0.1 mm and 0.1 mrad, and a latency to 0.5 ms, at five
-/// standard errors; what all share would be 25 mm off. Without them in the model a mix cannot find lengths to 5 σ that it states.
+/// A marker that sits elsewhere in each session, and stamps that are late by another time in each run.
+/// Readings of 0.3 mm and 0.5 mrad, some thousand of them a session and a hundred a run in which the robot
+/// turns at more than 1 rad/s, find a place to 0.1 mm and 0.1 mrad, and a latency to 0.5 ms, at five standard
+/// errors; what all share would be 25 mm off. Without them in the model a mix cannot find lengths to 5 σ that
+/// it states.
 #[test]
 fn sessions_and_runs_may_have_an_instrument_of_their_own() {
     let mounted = [Pose::new(0.03, -0.012, 0.02), Pose::new(-0.02, 0.01, -0.015)];

@@ -1,4 +1,5 @@
-//! Real logs of a Khepera III with a laser (Censi et al. 2013) through the command: relative truth only, with gaps.
+//! Real logs of a Khepera III with a laser (Censi et al. 2013) through the command: relative truth only, with
+//! gaps.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +9,8 @@ use crate::support::{document, real_data, refusal, run_in, succeed};
 /// Counts of a wheel turn, as the data's description says.
 const TICKS_PER_REV: f64 = 2764.8;
 
-/// Objects, and total counts of both wheels, by a way of its own: text for the number of objects, a generic parser for the sums.
+/// Objects, and total counts of both wheels, by a way of its own: text for the number of objects, a generic
+/// parser for the sums.
 fn counted(log: &str) -> (usize, [i64; 2]) {
     let mut totals = [0; 2];
     for object in serde_json::Deserializer::from_str(log).into_iter::<serde_json::Value>() {

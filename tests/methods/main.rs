@@ -1,4 +1,5 @@
-//! The calibration methods: each gives a known robot back, none beats the Cramér–Rao bound, published results come out, and real robots are calibrated.
+//! The calibration methods: each gives a known robot back, none beats the Cramér–Rao bound, published results
+//! come out, and real robots are calibrated.
 
 mod all_methods;
 mod closed_form;

@@ -1,4 +1,5 @@
-//! Large datasets: one step over everything from the fit of pieces is the fit of everything, and the command says that it was taken.
+//! Large datasets: one step over everything from the fit of pieces is the fit of everything, and the command
+//! says that it was taken.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -24,7 +25,8 @@ const WHEEL_SIGMA: f64 = 4e-4;
 const MEASUREMENT_SIGMA_M: f64 = 5e-4;
 const MEASUREMENT_SIGMA_RAD: f64 = 1e-3;
 
-/// A row and a measurement every 50 ms, other speeds every ten seconds, more to the left than to the right; the model of `joint` to the letter, the instrument `ahead_m` of the drive's centre.
+/// A row and a measurement every 50 ms, other speeds every ten seconds, more to the left than to the right;
+/// the model of `joint` to the letter, the instrument `ahead_m` of the drive's centre.
 fn run(seed: u64, ahead_m: f64) -> Run {
     let mut chance = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = move |sigma: f64| sigma * chance.sample::<f64, _>(StandardNormal);
@@ -76,7 +78,8 @@ fn in_one_step(dir: &Path) -> Calibration {
     Joint::DEFAULT.calibrate_large(&mut blocks, |_, warning| panic!("{warning}")).expect("calibrated")
 }
 
-/// How far two calibrations lie apart, over the second one's sigma, and the ratio of their sigmas: the most over the parameters.
+/// How far two calibrations lie apart, over the second one's sigma, and the ratio of their sigmas: the most
+/// over the parameters.
 #[track_caller]
 fn apart(a: &Calibration, b: &Calibration) -> (f64, f64) {
     let (a, b): (Vec<_>, Vec<_>) = (a.estimates().collect(), b.estimates().collect());
@@ -88,10 +91,11 @@ fn apart(a: &Calibration, b: &Calibration) -> (f64, f64) {
     })
 }
 
-/// The one step misses the whole fit by two things. Its noise is that of the pieces: a variance is off by √(2/65 536) = 0.55 % of itself as far as measurements show it,
-/// and the wheels' by a few times that; an estimate whose weights are off by a share ε moves by less than ε of its sigma, and its sigma by ε/2. And the step
-/// itself bends, by less than its square, which [`Calibration::converged`] keeps below 5 % of a sigma. Together: 0.1 sigma, and sigmas within 2 %
-/// (0.013 and 0.4 % seen).
+/// The one step misses the whole fit by two things. Its noise is that of the pieces: a variance is off by
+/// √(2/65 536) = 0.55 % of itself as far as measurements show it, and the wheels' by a few times that; an
+/// estimate whose weights are off by a share ε moves by less than ε of its sigma, and its sigma by ε/2. And
+/// the step itself bends, by less than its square, which [`Calibration::converged`] keeps below 5 % of a
+/// sigma. Together: 0.1 sigma, and sigmas within 2 % (0.013 and 0.4 % seen).
 const APART_SIGMAS: f64 = 0.1;
 const RATIO: f64 = 1.02;
 

@@ -1,4 +1,5 @@
-//! The published numbers of Sousa et al. (J Intell Robot Syst 105, 39, 2022), from their logs: errors under the nominal values, and UMBmark.
+//! The published numbers of Sousa et al. (J Intell Robot Syst 105, 39, 2022), from their logs: errors under
+//! the nominal values, and UMBmark.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,8 @@ use dataset::import::importer;
 use dataset::{Dataset, Protocol, WheelLog};
 use kinematics::{DriveGeometry, Pose, Rule, Wheels, wrap_to_pi};
 
-/// One unit of the last published digit. Rounding explains half of it; that it is enough was seen, and that each wrong specimen below misses it.
+/// One unit of the last published digit. Rounding explains half of it; that it is enough was seen, and that
+/// each wrong specimen below misses it.
 const LAST_DIGIT: f64 = 1e-6;
 
 /// A row of `published-results.csv`, by column.
@@ -173,7 +175,8 @@ fn published_optiodom_nominal() {
     assert_eq!((circles_by_the_exact_arc, from_the_second_row), (0, 0), "rows that a wrong specimen reproduced");
 }
 
-/// Every session through the command, from the logs to the document: under each row's values, and as `nominal` where the row's are the session's.
+/// Every session through the command, from the logs to the document: under each row's values, and as
+/// `nominal` where the row's are the session's.
 #[test]
 fn published_optiodom_nominal_through_the_command() {
     let Some(folder) = real_data("published_optiodom_nominal_through_the_command", "optiodom") else { return };
@@ -233,7 +236,8 @@ fn published_optiodom_umbmark() {
             .map(|key| found["methods"][0]["parameters"][key]["value"].as_f64().expect("a value"));
         assert!(agree(found, expected), "{}: {found:?}, published {expected:?}", row.text("session"));
 
-        // What must not pass: the wheels swapped (the x form sees no swap of the counts alone), and the other form of UMBmark.
+        // What must not pass: the wheels swapped (the x form sees no swap of the counts alone), and the other
+        // form of UMBmark.
         let by = |method: Umbmark, dataset: &Dataset| {
             let geometry = method.calibrate(&[dataset.session()]).expect("squares both ways").geometry;
             [geometry.wheel_separation_m(), geometry.wheel_diameter_m().right, geometry.wheel_diameter_m().left]

@@ -1,4 +1,5 @@
-//! The bare loop that `cargo bench --bench trial` times the closed-form trial against does the same work: its estimates have the library's mean and spread.
+//! The bare loop that `cargo bench --bench trial` times the closed-form trial against does the same work: its
+//! estimates have the library's mean and spread.
 
 use crate::yardstick::Yardstick;
 use bench::{Moments, Trial};
@@ -26,8 +27,9 @@ fn of_library(trial: &mut Trial, number: u64) -> [Calibration; 2] {
 
 const PARAMETERS: [Parameter; 3] = [Parameter::LeftPerTick, Parameter::RightPerTick, Parameter::WheelSeparation];
 
-/// The yardstick does the same work: its estimates have the library's mean and spread. Twelve means and twelve variances at 4.5 standard errors, a false positive of
-/// 7e-6 each. A yardstick without the noise inside an arc has UMBmark's spread too small by a third.
+/// The yardstick does the same work: its estimates have the library's mean and spread. Twelve means and
+/// twelve variances at 4.5 standard errors, a false positive of 7e-6 each. A yardstick without the noise
+/// inside an arc has UMBmark's spread too small by a third.
 #[test]
 fn the_yardstick_does_the_librarys_work() {
     const TRIALS: u64 = 4000;

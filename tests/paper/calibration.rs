@@ -1,4 +1,5 @@
-//! The paper's robot under the paper's protocols: `direct` gives its parameters back, UMBmark reads what follows from them.
+//! The paper's robot under the paper's protocols: `direct` gives its parameters back, UMBmark reads what
+//! follows from them.
 
 use bench::Moments;
 use calib::methods::direct::Direct;
@@ -25,7 +26,8 @@ fn mm_per_pulse(calibration: &calib::Calibration, parameter: Parameter, ticks_pe
     calibration.estimate(parameter).expect("the robot reports ticks").value * ticks_per_pulse * 1e3
 }
 
-/// The contradiction in table 2: the robot of table 2's direct column, driven round 4 m squares on nominal odometry.
+/// The contradiction in table 2: the robot of table 2's direct column, driven round 4 m squares on nominal
+/// odometry.
 #[test]
 fn paper_umbmark_of_the_direct_parameters_to_the_last_digit() {
     let mut scenario = noise_free(paper());
@@ -51,7 +53,8 @@ fn paper_direct_is_exact_without_noise() {
     ];
     let simulation = sim_yair::simulate(&scenario, 1, 0).expect("simulates");
     let found = Direct::DEFAULT.calibrate(&[simulation.dataset.session()]).expect("straights and spins");
-    // Whole counts are commanded and the wheels stop where they began within a count: nothing is rounded, so 1e-9 is left for f64.
+    // Whole counts are commanded and the wheels stop where they began within a count: nothing is rounded, so
+    // 1e-9 is left for f64.
     assert!((mm_per_pulse(&found, Parameter::LeftPerTick, 80.0) / 1.0334 - 1.0).abs() < 1e-9);
     assert!((mm_per_pulse(&found, Parameter::RightPerTick, 80.0) / 1.0322 - 1.0).abs() < 1e-9);
     assert!((found.geometry.wheel_separation_m() / 0.363 - 1.0).abs() < 1e-9);
@@ -76,8 +79,9 @@ fn clockwise(info: &RunInfo) -> bool {
     info.settings.turn_rad.is_none_or(|turn_rad| turn_rad < 0.0)
 }
 
-/// 5000 trials of the paper's protocol with its noise. Rejects, as was tried: unsigned chords (the left wheel off by 0.016 % over all runs, twice that
-/// backward) and (14) as printed (the wheelbase off by 3.4 % over all spins).
+/// 5000 trials of the paper's protocol with its noise. Rejects, as was tried: unsigned chords (the left wheel
+/// off by 0.016 % over all runs, twice that backward) and (14) as printed (the wheelbase off by 3.4 % over
+/// all spins).
 #[test]
 fn paper_direct_gives_the_robot_back_in_every_direction() {
     let mut scenario = paper();
@@ -117,7 +121,8 @@ fn paper_direct_gives_the_robot_back_in_every_direction() {
     }
 }
 
-/// A calibrator drives the robot itself, through the trait that a real robot could implement. Five standard deviations for each method, on one fixed seed.
+/// A calibrator drives the robot itself, through the trait that a real robot could implement. Five standard
+/// deviations for each method, on one fixed seed.
 #[test]
 fn each_method_drives_its_own_protocol_on_the_simulated_robot() {
     let scenario = paper();
@@ -131,7 +136,8 @@ fn each_method_drives_its_own_protocol_on_the_simulated_robot() {
         }
         let base = found.expect("drives and calibrates").estimate(Parameter::WheelSeparation).expect("a wheelbase");
         let expected_m = match method.name() {
-            // UMBmark reads the unmeasured scale of 3.3 % as a short wheelbase: 350.54 mm, as above; by headings it is 363/1.0328.
+            // UMBmark reads the unmeasured scale of 3.3 % as a short wheelbase: 350.54 mm, as above; by
+            // headings it is 363/1.0328.
             "umbmark" => 0.35054,
             "jung_chung" => 0.35147,
             _ => 0.363,
@@ -150,7 +156,8 @@ fn straights_and_spins(mut scenario: Scenario) -> dataset::Dataset {
     sim_yair::simulate(&scenario, 77, 0).expect("simulates").dataset
 }
 
-/// (4) and (5): C = (1+α_c) C_nom + ε_c with ε_c normal, drawn anew every run. Five standard errors of a mean and of a variance over 4000 runs.
+/// (4) and (5): C = (1+α_c) C_nom + ε_c with ε_c normal, drawn anew every run. Five standard errors of a mean
+/// and of a variance over 4000 runs.
 #[test]
 fn paper_eq_4_and_5_the_sensitivity_is_normal_about_its_corrected_nominal() {
     let mut scenario = noise_free(paper());
@@ -201,7 +208,8 @@ fn paper_eq_10_the_wheelbase_is_its_corrected_nominal() {
     assert!((found.geometry.wheel_separation_m() / (1.02 * 0.363) - 1.0).abs() < 1e-9);
 }
 
-/// (12) and (13): B = (φ_R + φ_L)/2 with φ_i = 2 C_i ΔN_i/θ, pulses and turn taken by their size as the paper prints them.
+/// (12) and (13): B = (φ_R + φ_L)/2 with φ_i = 2 C_i ΔN_i/θ, pulses and turn taken by their size as the paper
+/// prints them.
 #[test]
 fn paper_eq_12_and_13_the_base_is_the_mean_of_the_circles_of_both_contacts() {
     let simulation = {
@@ -223,8 +231,8 @@ fn paper_eq_12_and_13_the_base_is_the_mean_of_the_circles_of_both_contacts() {
     }
 }
 
-/// "Statistical filtering rejects atypical values": three skids of the left wheel by 3 % are thrown out, on the left wheel only, and without the rule the
-/// sensitivity is off by far more than its standard deviation.
+/// "Statistical filtering rejects atypical values": three skids of the left wheel by 3 % are thrown out, on
+/// the left wheel only, and without the rule the sensitivity is off by far more than its standard deviation.
 #[test]
 fn paper_outliers_are_rejected_wheel_by_wheel() {
     let mut measured = straights_and_spins(paper());

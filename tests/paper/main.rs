@@ -1,4 +1,5 @@
-//! The paper: its protocol gives its robot back, its tables come out, and its trial does the work of a bare loop.
+//! The paper: its protocol gives its robot back, its tables come out, and its trial does the work of a bare
+//! loop.
 
 mod bare_loop;
 mod calibration;

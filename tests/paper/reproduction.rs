@@ -14,8 +14,9 @@ fn row<'r>(rows: &'r [Row], statistic: &str) -> &'r Row {
     rows.iter().find(|row| row.statistic == statistic).expect("a row of table 1")
 }
 
-/// Every published statistic lies where 99.9 % of the simulated ones do, under every hypothesis: 16 statistics, three hypotheses, and a wrong model
-/// is out at once: with C_R off by 0.1 % the right mean falls beyond the last of 2000.
+/// Every published statistic lies where 99.9 % of the simulated ones do, under every hypothesis: 16
+/// statistics, three hypotheses, and a wrong model is out at once: with C_R off by 0.1 % the right mean falls
+/// beyond the last of 2000.
 #[test]
 fn paper_table_1_falls_inside_its_simulation() {
     for table in &REPRODUCTION.table_1 {
@@ -35,7 +36,7 @@ fn paper_table_1_falls_inside_its_simulation() {
     assert!((0.5e-3..0.65e-3).contains(&measuring.reading_sigma_m), "{}", measuring.reading_sigma_m);
     let mean = row(&measuring.right, "mean");
     assert!(mean.percentiles[2] < 1.0322 * 1.001, "0.1 % of C_R is told apart");
-    // The hypotheses cannot be told apart: under 3 in log likelihood.
+    // The hypotheses cannot be discriminated: under 3 in log likelihood.
     assert!(REPRODUCTION.table_1.iter().all(|table| table.below_best < 3.0));
 }
 
@@ -92,12 +93,14 @@ fn the_pictures_in_the_documents_are_the_ones_that_the_command_draws() {
     }
 }
 
-/// What reconciles the published numbers, and what does not. The sizes follow by hand too: 360/350.54 is 2.7 %, of which the fit leaves some to the ratio.
+/// What reconciles the published numbers, and what does not. The sizes follow by hand too: 360/350.54 is 2.7
+/// %, of which the fit leaves some to the ratio.
 #[test]
 fn paper_causes_only_a_wheelbase_that_differs_in_corners_fits_and_is_plausible() {
     let causes = &REPRODUCTION.causes;
     let fitted = |extension| causes.fitted.iter().find(|fitted| fitted.extension == extension).expect("fitted");
-    // One degree of freedom is left: a misfit of 7.9 has a probability of 0.5 %. The model as it stands misses by hundreds.
+    // One degree of freedom is left: a misfit of 7.9 has a probability of 0.5 %. The model as it stands
+    // misses by hundreds.
     let corner = fitted(Extension::CornerWheelbase);
     assert!(corner.misfit < 7.9 && corner.prior_sigma && (2.2..2.8).contains(&corner.size), "{corner:?}");
     assert!(fitted(Extension::None).misfit > 100.0);

@@ -34,7 +34,8 @@ pub(crate) fn succeed(folder: &Path, arguments: &[&str]) -> Ended {
     ended
 }
 
-/// Runs what must succeed with `--json --quiet`: exactly one document on standard output, nothing on standard error.
+/// Runs what must succeed with `--json --quiet`: exactly one document on standard output, nothing on standard
+/// error.
 #[track_caller]
 pub(crate) fn document(folder: &Path, arguments: &[&str]) -> Value {
     let ended = succeed(folder, &[arguments, &["--json", "--quiet"]].concat());

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use tempfile::NamedTempFile;
 
-/// A temporary file beside `path` that holds `bytes` and is to become `path` by `persist`. It has the permissions of any other file of the user.
+/// A temporary file beside `path` that holds `bytes` and is to become `path` by `persist`. It has the
+/// permissions of any other file of the user.
 ///
 /// # Errors
 /// The system's, when the folder of `path` is not there or cannot be written.

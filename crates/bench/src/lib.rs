@@ -1,9 +1,11 @@
-//! Monte-Carlo bench: how far each calibration method's estimates fall from the truth that the simulator hides.
+//! Monte-Carlo bench: how far each calibration method's estimates fall from the truth that the simulator
+//! hides.
 //!
-//! A [`SweepPlan`] is a design of points over a scenario's keys; at every point each trial drives the simulated robot through the protocols and gives what it
-//! measured to every method. Bias, variance, RMSE, quantiles and coverage carry their Monte-Carlo standard errors, and the RMSE is set against the Cramér–Rao
-//! bound of what was driven. Trials are addressed by (seed, point, trial) and summed in one fixed tree: the result is the same to the bit whatever the
-//! number of threads, shards and interruptions.
+//! A [`SweepPlan`] is a design of points over a scenario's keys; at every point each trial drives the
+//! simulated robot through the protocols and gives what it measured to every method. Bias, variance, RMSE,
+//! quantiles and coverage carry their Monte-Carlo standard errors, and the RMSE is set against the Cramér–Rao
+//! bound of what was driven. Trials are addressed by (seed, point, trial) and summed in one fixed tree: the
+//! result is the same to the bit whatever the number of threads, shards and interruptions.
 
 mod bound;
 mod error;

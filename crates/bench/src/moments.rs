@@ -1,4 +1,5 @@
-//! Running moments to the fourth, mergeable (Pébay 2008): what a Monte-Carlo error of a bias, a variance and an RMSE needs, in constant memory.
+//! Running moments to the fourth, mergeable (Pébay 2008): what a Monte-Carlo error of a bias, a variance and
+//! an RMSE needs, in constant memory.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,8 @@ impl Moments {
         self.merge(&Self { count: 1.0, mean: error, m2: 0.0, m3: 0.0, m4: 0.0 });
     }
 
-    /// Takes another sample in. The result depends on the order of merges in its last bits: callers merge in a fixed order.
+    /// Takes another sample in. The result depends on the order of merges in its last bits: callers merge in
+    /// a fixed order.
     pub fn merge(&mut self, other: &Self) {
         if other.count == 0.0 {
             return;
@@ -134,7 +136,8 @@ mod tests {
 
     #[test]
     fn monte_carlo_errors_are_the_scatter_of_repeated_campaigns() {
-        // 2000 campaigns of 200 draws: their scatter has a relative error of about 1/√4000 = 1.6 %; the errors' own bias at n = 200 is under 2 %.
+        // 2000 campaigns of 200 draws: their scatter has a relative error of about 1/√4000 = 1.6 %; the
+        // errors' own bias at n = 200 is under 2 %.
         let campaigns: Vec<Moments> = (0..2000).map(|seed| moments(&sample(100 + seed, 200))).collect();
         for of in [Moments::bias, Moments::variance, Moments::rmse] {
             let (mut found, mut stated) = (Moments::default(), 0.0);

@@ -1,4 +1,5 @@
-//! One case: a random robot, what is hidden in it, what it brings home, and what the oracle knows. Addressed by seed and number alone.
+//! One case: a random robot, what is hidden in it, what it brings home, and what the oracle knows. Addressed
+//! by seed and number alone.
 
 use dataset::{Dataset, Provenance, Run};
 use effects::{Needs, StreamName};
@@ -65,7 +66,8 @@ pub(crate) struct Case {
     pub(crate) datasets: Vec<Dataset>,
     /// The held-out log, without noise, and the same without the effects.
     pub(crate) held_out: Option<(Dataset, Dataset)>,
-    /// The held-out log with one effect alone, for each of the catalogue's form in which chance has a part: its index among the hidden ones, and the log.
+    /// The held-out log with one effect alone, for each of the catalogue's form with a random signature: its
+    /// index among the hidden ones, and the log.
     pub(crate) held_out_random: Vec<(usize, Dataset)>,
     /// What a calibration without the effects would find, without noise.
     pub(crate) best_drive: Option<estimation::Model>,
@@ -83,7 +85,8 @@ const HELD_OUT_RUN: u32 = 16;
 const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
 const MAX_STEPS: usize = 5;
-/// Another form of which the hypothesis takes up less is another effect: the forms of tests/effects/hypotheses leave at most 0.65² of their squares.
+/// Another form of which the hypothesis takes up less is another effect: the forms of
+/// tests/effects/hypotheses leave at most 0.65² of their squares.
 const MIN_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;
@@ -121,7 +124,8 @@ fn drive_session(
         scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     }
     scenario.effects.extend(case.robot.harmless(ids));
-    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of what the oracle sees.
+    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of
+    // what the oracle sees.
     if noisy && point < HELD_OUT_RUN {
         scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
@@ -167,8 +171,8 @@ impl Case {
         Ok(Err(Self::ids(seed, number, case_kind, index, 0).first().copied().unwrap_or("")))
     }
 
-    /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn have a mean or scatter: a gross fault is one of
-    /// a few discrete things.
+    /// What is hidden: left-out rounds take the catalogue in turn, the others draw. Nineteen of twenty drawn
+    /// have a mean or scatter: a gross fault is one of a few discrete things.
     fn ids(seed: u64, number: u64, case_kind: CaseKind, index: u64, attempt: u64) -> Vec<&'static str> {
         let mut draw = Draw::of(seed, number, "what", attempt);
         let all = hideable();
@@ -276,8 +280,9 @@ impl Case {
         }))
     }
 
-    /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only effect, which is a mean: other names, each with the noncentrality of the
-    /// test between it and the true one by all that was driven.
+    /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only
+    /// effect, which is a mean: other names, each with the noncentrality of the test between it and the true
+    /// one by all that was driven.
     pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<FurtherRuns>, ChallengeError> {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
         let measurement = DriveContext {
@@ -359,7 +364,8 @@ fn scale(
     }
     let off = wanted / found.1;
     let close = (1.0 / MAX_RATIO_ERROR..=MAX_RATIO_ERROR).contains(&off);
-    // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other effect.
+    // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other
+    // effect.
     let described_better = || {
         found
             .0
@@ -387,7 +393,8 @@ pub(crate) struct Trial {
 
 #[cfg(test)]
 impl Trial {
-    /// The first robot that shows the effect, in its catalogue's form, under white noise and many measurements.
+    /// The first robot that shows the effect, in its catalogue's form, under white noise and many
+    /// measurements.
     pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, ChallengeError> {
         for attempt in 0..50 {
             let mut draw = Draw::of(seed, 0, "trial", attempt);

@@ -26,7 +26,7 @@ impl Draw {
         self.0.log_uniform(low, high)
     }
 
-    /// One with this chance.
+    /// True with this probability.
     pub(crate) fn chance(&mut self, probability: f64) -> bool {
         self.0.uniform() < probability
     }

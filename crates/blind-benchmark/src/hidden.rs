@@ -1,7 +1,8 @@
-//! What is hidden in a robot: an effect of the catalogue with a random direction of its sizes, held shape parameters off the hypotheses' grid, and a scale.
+//! What is hidden in a robot: an effect of the catalogue with a random direction of its sizes, held shape
+//! parameters off the hypotheses' grid, and a scale.
 //!
-//! Directions are drawn in units of what is plausible; the scale is set by the oracle's detection limit. No size goes beyond three times what is plausible:
-//! such robots do not exist, and the tool may say so.
+//! Directions are drawn in units of what is plausible; the scale is set by the oracle's detection limit. No
+//! size goes beyond three times what is plausible: such robots do not exist, and the tool may say so.
 
 use effects::{
     Benchmark, CATALOGUE, Effect, Forward, HostRobot, Hypothesis, Needs, ParameterLaw, ParameterValues, Stream,

@@ -1,7 +1,8 @@
-//! What the outside instrument shows of a run: which looks, and what they err by.
+//! What the outside instrument shows of a run: which measurements, and their errors.
 //!
-//! The simulator's instrument looks without error; here its measurements are chosen (dense, sparse, the ends alone, or displacements between two of them) and
-//! disturbed: white, heavy-tailed (Student's t with three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white noise).
+//! The simulator's instrument measures without error; here its measurements are chosen (dense, sparse, the
+//! ends alone, or displacements between two of them) and disturbed: white, heavy-tailed (Student's t with
+//! three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white noise).
 
 use dataset::{Displacement, Run, TruthNoise, TruthSample};
 use effects::{CATALOGUE, DroppedSamples, Effect, Sign, hypothesis};
@@ -119,8 +120,8 @@ impl InstrumentModel {
         TruthNoise { sigma_xy_m: known(self.sigma_xy_m), sigma_theta_rad: known(self.sigma_theta_rad) }
     }
 
-    /// Variances of position and heading that independent errors of the same weight would have: those of errors that last grow by (1 + ρ)/(1 − ρ), ρ being
-    /// the correlation from measurement to measurement.
+    /// Variances of position and heading that independent errors of the same weight would have: those of
+    /// errors that last grow by (1 + ρ)/(1 − ρ), ρ being the correlation from measurement to measurement.
     pub(crate) fn variances(&self) -> [f64; 2] {
         let factor = if self.class == NoiseClass::Correlated {
             let between_s = self.every.min(200) as f64 / super::robot::RATE_HZ;
@@ -142,7 +143,8 @@ impl InstrumentModel {
         taken
     }
 
-    /// Replaces the noise-free measurements of a run by what is recorded of them; without draws, still without error.
+    /// Replaces the noise-free measurements of a run by what is recorded of them; without draws, still
+    /// without error.
     pub(crate) fn measurement(&self, run: &mut Run, draw: Option<&mut Draw>) {
         let taken = self.taken(run.truth.len());
         let exact: Vec<(f64, Pose)> = taken

@@ -1,10 +1,13 @@
-//! The blind benchmark of diagnosis: random robots with known imperfections, diagnosed from their records alone, and scored against an oracle.
+//! The blind benchmark of diagnosis: random robots with known imperfections, diagnosed from their records
+//! alone, and scored against an oracle.
 //!
-//! A case is addressed by (seed, number): what is hidden, in whom, driven how, seen how, are draws of that address, so that any case can be driven again
-//! alone and no number of threads changes a bit. The tool under test gets datasets in memory and nothing else; the answer is looked at afterwards. Robots
-//! do effects by the catalogue's forward faces or in other functional forms, and neither is the code of the hypotheses. The oracle ([`OracleView`]) says what
-//! is detectable on a case's paths and which names its data cannot tell apart. Blocks of twenty cases hold seven nulls, seven single effects, two pairs
-//! and four effects that are left out of the catalogue in turn.
+//! A case is addressed by (seed, number): what is hidden, in whom, driven how, seen how, are draws of that
+//! address, so that any case can be driven again alone and no number of threads changes a bit. The tool under
+//! test gets datasets in memory and nothing else; the answer is looked at afterwards. Robots do effects by
+//! the catalogue's simulation models or in other functional forms, and neither is the code of the hypotheses.
+//! The oracle ([`OracleView`]) says what is detectable on a case's paths and which names its data cannot
+//! discriminate. Blocks of twenty cases hold seven nulls, seven single effects, two pairs and four effects
+//! that are left out of the catalogue in turn.
 
 mod case;
 mod draw;
@@ -69,7 +72,8 @@ pub struct Confusion {
     pub cases: Vec<u64>,
 }
 
-/// Drives one case again: what was hidden and what was said; `Err` with the id where no robot drawn for an effect shows it.
+/// Drives one case again: what was hidden and what was said; `Err` with the id where no robot drawn for an
+/// effect shows it.
 ///
 /// # Errors
 /// [`ChallengeError`] when it cannot be simulated.

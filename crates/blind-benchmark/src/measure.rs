@@ -1,4 +1,5 @@
-//! Measures over cases: shares with their one-sided limits, the power's ratio, gains, calibration; each against its bar.
+//! Measures over cases: shares with their one-sided limits, the power's ratio, gains, calibration; each
+//! against its bar.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +44,8 @@ fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool
     all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
 }
 
-/// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their names.
+/// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their
+/// names.
 const CLEAR_RATIO: f64 = 2.0;
 /// A pair counts where the oracle finds each beside the other at this many detection limits.
 const PAIR_RATIO: f64 = 1.6;
@@ -181,7 +183,8 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
     measures
 }
 
-/// Sets that the planned runs leave with the right name alone, of those of which the oracle could tell it after some runs on that floor and in that time.
+/// Sets that the planned runs leave with the right name alone, of those of which the oracle could tell it
+/// after some runs on that floor and in that time.
 fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     let sets = || cases.iter().filter_map(|case| Some((case, case.planned.as_ref()?)));
     let alone = |(case, planned): &(&CaseResult, &Planned)| {
@@ -341,7 +344,8 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
 /// Draws of the cases again, with replacement, for the limit of the power's ratio.
 const BOOTSTRAPS: usize = 400;
 
-/// The size, in detection limits, from which on nine of ten cases are detected: where the best monotone curve of detection over size crosses 0.9.
+/// The size, in detection limits, from which on nine of ten cases are detected: where the best monotone curve
+/// of detection over size crosses 0.9.
 fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let mut points: Vec<(f64, f64)> = cases
         .iter()
@@ -375,7 +379,8 @@ fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     }
 }
 
-/// Where a monotone fit (pool adjacent violators; Ayer et al. 1955) of (size, 0 or 1), sorted by size, first reaches a level.
+/// Where a monotone fit (pool adjacent violators; Ayer et al. 1955) of (size, 0 or 1), sorted by size, first
+/// reaches a level.
 fn crossing(points: &[(f64, f64)], level: f64) -> Option<f64> {
     // Blocks: first size, sum, number.
     let mut blocks: Vec<(f64, f64, f64)> = Vec::new();
@@ -400,7 +405,8 @@ mod tests {
     fn a_monotone_curve_crosses_where_it_should() {
         let step: Vec<(f64, f64)> = (0..100).map(|k| (f64::from(k), f64::from(u8::from(k >= 40)))).collect();
         assert_eq!(crossing(&step, 0.9), Some(40.0));
-        // One miss far up: the block above it still has more than nine of ten, the one it is pooled with as well.
+        // One miss far up: the block above it still has more than nine of ten, the one it is pooled with as
+        // well.
         let mut missed = step.clone();
         missed[80].1 = 0.0;
         assert_eq!(crossing(&missed, 0.9), Some(40.0));

@@ -1,12 +1,14 @@
 //! The oracle: what a case's runs show of a hidden effect to who knows everything but its size.
 //!
-//! The robot drives once more with the same draws, but without any noise, and is looked at without error. The likelihood of the true noise, at the drive that
-//! fits best without the effect, then sees what of the signature the geometry parameters leave. Its χ² less what the drive's geometry parameters take up is the noncentrality λ of the test that knows the effect; how
-//! much less of it another name's hypothesis takes up is that of the test between the two names. Of another form, and where chance has a part in the
-//! signature, it is what the effect's own hypothesis takes up that counts: nobody can know more.
-//! No measurement is rejected as an outlier.
-//! Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what a score test of the variance has (one-sided, so 8.56).
-//! Approximate: errors that last are taken as white ones with the same weight over long times, heavy tails as normal with the same variance.
+//! The robot drives once more with the same draws, but without any noise, and is looked at without error. The
+//! likelihood of the true noise, at the drive that fits best without the effect, then sees what of the
+//! signature the geometry parameters leave. Its χ² less what the drive's geometry parameters take up is the
+//! noncentrality λ of the test that knows the effect; how much less of it another name's hypothesis takes up
+//! is that of the test between the two names. Of another form, and where the is random in part signature, it
+//! is what the effect's own hypothesis takes up that counts: nobody can know more. No measurement is rejected
+//! as an outlier. Scatter has no mean: with excess variance e of the innovations, run by run, ½ Σ e² is what
+//! a score test of the variance has (one-sided, so 8.56). Approximate: errors that last are taken as white
+//! ones with the same weight over long times, heavy tails as normal with the same variance.
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, hypothesis};
@@ -18,7 +20,8 @@ use kinematics::DriveGeometry;
 use model_term::{ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector};
 
-/// What is known of the geometry parameters before any data, as a share: the tool holds to nominal what it sees worse.
+/// What is known of the geometry parameters before any data, as a share: the tool holds to nominal what it
+/// sees worse.
 const GEOMETRY_PRIOR_SD: f64 = 0.05;
 /// A rival's sizes are free up to so many times what is plausible.
 const RIVAL_SD: f64 = 10.0;
@@ -35,11 +38,12 @@ struct Candidate {
 
 /// What noise-free runs show at the true drive.
 pub(crate) struct Detectability {
-    /// At the geometry parameters that a calibration without the effect would find: a turn lost all along a path is of second order in it before that.
+    /// At the geometry parameters that a calibration without the effect would find: a turn lost all along a
+    /// path is of second order in it before that.
     total: NormalEquations,
-    /// χ² of the signature at the true lengths.
+    /// χ² of the signature at the true geometry.
     at_truth: f64,
-    /// The drive with those lengths.
+    /// The drive with that geometry.
     best: Model,
     candidates: Vec<Candidate>,
     free: Vec<usize>,
@@ -64,12 +68,14 @@ impl TrueNoise {
     }
 }
 
-/// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on average over the measurements' errors.
+/// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
+/// average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
     measurement(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * seen.total.chi_square)
 }
 
-/// The same with the geometry parameters and the terms' sizes at their best for these runs, from those of the model on: what a form cannot say.
+/// The same with the geometry parameters and the terms' sizes at their best for these runs, from those of the
+/// model on: what a form cannot say.
 pub(crate) fn misfit_of_form(
     datasets: &[Dataset],
     model: &Model,
@@ -111,7 +117,7 @@ fn measurement(
     Some(NoiseFreePass { total, z })
 }
 
-/// Steps of Gauss and Newton to the best lengths.
+/// Steps of Gauss and Newton to the best geometry.
 const GAUSS_NEWTON_STEPS: usize = 3;
 
 /// The step of the geometry parameters to their best, without any effect.
@@ -133,8 +139,8 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
 }
 
 impl Detectability {
-    /// Looks at noise-free runs with every name's hypotheses at hand. `without` are the same runs without the effect: what they show, rounded counts and
-    /// measurements between two rows, is not the effect's.
+    /// Looks at noise-free runs with every name's hypotheses at hand. `without` are the same runs without the
+    /// effect: what they show, rounded counts and measurements between two rows, is not the effect's.
     pub(crate) fn of(
         datasets: &[Dataset],
         without: &[Dataset],
@@ -175,7 +181,8 @@ impl Detectability {
         Some(Self { scatter: scatter(&seen.z), total: seen.total, at_truth, best, candidates, free })
     }
 
-    /// How much of χ² the geometry parameters and some candidates take up at their best, and the candidates' sizes there with standard deviations.
+    /// How much of χ² the geometry parameters and some candidates take up at their best, and the candidates'
+    /// sizes there with standard deviations.
     fn explained(&self, candidates: &[&Candidate]) -> (f64, Vec<(f64, f64)>) {
         let mut at = self.free.clone();
         let mut prior: Vec<f64> = at.iter().map(|_| GEOMETRY_PRIOR_SD.powi(-2)).collect();
@@ -189,17 +196,20 @@ impl Detectability {
         (-free.gradient.dot(&step), values)
     }
 
-    /// The signature's χ² with the geometry parameters at their best: noncentrality of the test by the true form.
+    /// The signature's χ² with the geometry parameters at their best: noncentrality of the test by the true
+    /// form.
     pub(crate) fn noncentrality(&self) -> f64 {
         (self.total.chi_square - self.explained(&[]).0).max(0.0)
     }
 
-    /// Whether the drive's geometry parameters take up all but a hundredth of the signature: what is left then is of second order, and no test of the effect's.
+    /// Whether the drive's geometry parameters take up all but a hundredth of the signature: what is left
+    /// then is of second order, and no test of the effect's.
     pub(crate) fn is_explained_by_geometry(&self) -> bool {
         self.noncentrality() < 0.01 * self.at_truth
     }
 
-    /// The shape of a name that takes up most, beside the geometry parameters, and how much: noncentrality of the test by the hypothesis's own form.
+    /// The shape of a name that takes up most, beside the geometry parameters, and how much: noncentrality of
+    /// the test by the hypothesis's own form.
     fn best_shape(&self, id: &str) -> Option<(&Candidate, f64)> {
         let alone = self.explained(&[]).0;
         self.candidates
@@ -226,7 +236,8 @@ impl Detectability {
         self.noncentrality_in_form(id)
     }
 
-    /// How many directions of an effect's own hypothesis a plausible size would show by a standard deviation; at least one.
+    /// How many directions of an effect's own hypothesis a plausible size would show by a standard deviation;
+    /// at least one.
     pub(crate) fn freedom(&self, id: &str) -> usize {
         self.candidates
             .iter()
@@ -251,8 +262,9 @@ impl Detectability {
             .max(1)
     }
 
-    /// Every other name with the noncentrality of the test between it and the true one, the least first: how much less than `own` of the true signature its
-    /// hypothesis takes up. Names whose best sizes no effect can have are none.
+    /// Every other name with the noncentrality of the test between it and the true one, the least first: how
+    /// much less than `own` of the true signature its hypothesis takes up. Names whose best sizes no effect
+    /// can have are none.
     pub(crate) fn rivals(&self, id: &str, own: f64) -> Vec<(&'static str, f64)> {
         let alone = self.explained(&[]).0;
         let mut rivals: Vec<(&'static str, f64)> = Vec::new();
@@ -282,7 +294,7 @@ impl Detectability {
         rivals
     }
 
-    /// The lengths at their best, as the drive that a calibration without the effect would find.
+    /// The geometry at its best, as the drive that a calibration without the effect would find.
     pub(crate) fn best_drive(&self) -> Model {
         self.best.clone()
     }

@@ -16,24 +16,29 @@ pub struct OracleView {
     /// Sizes by the hypothesis's names, shape parameters after them.
     #[serde(rename = "sizes")]
     pub values: Vec<(String, f64)>,
-    /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None` for gross faults.
+    /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None`
+    /// for gross faults.
     pub noncentrality: Option<f64>,
-    /// Its size over the smallest that this test finds with nine chances in ten. `None` for gross faults.
+    /// Its size over the smallest that this test finds with power 0.9. `None` for gross faults.
     pub ratio: Option<f64>,
-    /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross faults and scatter.
+    /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross
+    /// faults and scatter.
     pub form_share: Option<f64>,
-    /// Noncentrality of the best test between it and each other name whose sizes can be, the least first: what the other name leaves of it. Empty for gross faults.
+    /// Noncentrality of the best test between it and each other name whose sizes can be, the least first:
+    /// what the other name leaves of it. Empty for gross faults.
     pub rivals: Vec<(String, f64)>,
-    /// The other names that this test does not tell from it with nine chances in ten.
+    /// The other names that this test does not tell from it with power 0.9.
     pub aliases: Vec<String>,
 }
 
-/// Whether chance has a part in an effect's signature: where in its gap a wheel was left, which fraction of a count was lost.
+/// Whether an effect's signature is random in part: where in its gap a wheel was left, which fraction of a
+/// count was lost.
 pub(crate) fn has_random_signature(effect: &Hidden) -> bool {
     effect.benchmark.has_random_signature
 }
 
-/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and where chance has a part in it.
+/// Whether only what its hypothesis takes up of an effect's signature can be known: of another form, and
+/// where it is random in part.
 pub(crate) fn is_known_by_form_alone(effect: &Hidden) -> bool {
     effect.other_form || has_random_signature(effect)
 }
@@ -58,7 +63,8 @@ pub(crate) fn size_ratio(effect: &Hidden, detectability: &Detectability) -> f64 
     }
 }
 
-/// What the oracle knows of one hidden effect of a case: `detectability` of each hidden effect alone, `both` of a pair together.
+/// What the oracle knows of one hidden effect of a case: `detectability` of each hidden effect alone, `both`
+/// of a pair together.
 pub(crate) fn view(
     effect: &Hidden,
     index: usize,

@@ -1,7 +1,9 @@
 //! The planned run: whether what diagnosis says to drive next leaves the right name alone.
 //!
-//! The robot of a case drives as planned, with what it hides and under the case's noise, and all of its sessions are diagnosed together. What can be told at all is the oracle's to say:
-//! after the planned runs, or after a battery of all kinds of runs on the same floor and in the same time, it must tell the right name from every other one of the set.
+//! The robot of a case drives as planned, with what it hides and under the case's noise, and all of its
+//! sessions are diagnosed together. What can be told at all is the oracle's to say: after the planned runs,
+//! or after a battery of all kinds of runs on the same floor and in the same time, it must tell the right
+//! name from every other one of the set.
 
 use std::f64::consts::TAU;
 
@@ -83,7 +85,8 @@ fn sessions(case: &Case, next: &NextExperiment) -> Vec<SessionPlan> {
     next.sessions.iter().map(|planned| session(case, planned.speed_m_s, &planned.schedules)).collect()
 }
 
-/// All kinds of runs on the floor over which the robot moved so far, as often as they fit the time that plans have where nobody says otherwise.
+/// All kinds of runs on the floor over which the robot moved so far, as often as they fit the time that plans
+/// have where nobody says otherwise.
 fn battery(case: &Case) -> Vec<SessionPlan> {
     let [x_m, y_m] = diagnose::moved_over_m(&case.datasets);
     let (shorter_m, longer_m) = (x_m.min(y_m), x_m.max(y_m));

@@ -6,10 +6,11 @@ use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Discrete, Poisson};
 
 /// Level of the oracle's tests.
 const LEVEL: f64 = 0.05;
-/// Power at which a size counts as detectable, and two names as told apart.
+/// Power at which a size counts as detectable, and two candidates as discriminated.
 const POWER: f64 = 0.9;
 
-/// Noncentrality at which two names are told apart at the level and power above: their log likelihood ratio is N(±λ/2, λ), so √λ = z(0.95) + z(0.9).
+/// Noncentrality at which two candidates are discriminated at the level and power above: their log likelihood
+/// ratio is N(±λ/2, λ), so √λ = z(0.95) + z(0.9).
 pub(crate) const DISCRIMINATION_LEVEL: f64 = 8.564;
 
 /// Power of a χ² test at 5 % with this noncentrality.
@@ -53,7 +54,8 @@ mod tests {
 
     #[test]
     fn published_noncentralities_for_ninety_per_cent() {
-        // Cohen 1988, table 9.3 (λ at a = .05, power .90): 10.51, 12.65, 14.17, 15.41 for 1 to 4 degrees of freedom, to its last digit.
+        // Cohen 1988, table 9.3 (λ at a = .05, power .90): 10.51, 12.65, 14.17, 15.41 for 1 to 4 degrees of
+        // freedom, to its last digit.
         for (freedom, expected) in [(1, 10.51), (2, 12.65), (3, 14.17), (4, 15.41)] {
             assert!((detection_limit(freedom) - expected).abs() < 0.006, "{freedom}");
         }

@@ -17,7 +17,8 @@ pub struct Reported {
     pub probability: f64,
     /// Its z.
     pub z: f64,
-    /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 % interval holds the truth.
+    /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 %
+    /// interval holds the truth.
     pub covered: Vec<bool>,
     /// Its sentence.
     pub sentence: String,
@@ -81,7 +82,7 @@ impl CaseResult {
 pub struct Planned {
     /// The set before.
     pub names: Vec<String>,
-    /// Whether there was a plan that tells names apart.
+    /// Whether there was a plan that discriminates the candidates.
     pub planned: bool,
     /// Whether the oracle tells the right name from all others of the set after the planned runs.
     #[serde(rename = "told_by_plan")]

@@ -1,7 +1,9 @@
-//! Random robots and what they drive: geometry, speeds, noise, calibration errors and one of several families of paths.
+//! Random robots and what they drive: geometry, speeds, noise, calibration errors and one of several families
+//! of paths.
 //!
-//! A robot drives one or two sessions, each at its own speed, and a held-out log on other paths of the family. Loads and jitter of the log, which some effects
-//! need to show at all, are there in many cases without such an effect: a record that has them says nothing.
+//! A robot drives one or two sessions, each at its own speed, and a held-out log on other paths of the
+//! family. Loads and jitter of the log, which some effects need to show at all, are there in many cases
+//! without such an effect: a record that has them says nothing.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -18,15 +20,15 @@ const TEMPLATE: &str = include_str!("../../../scenarios/motion-capture.toml");
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PathFamily {
-    /// Straights both ways, spins, squares and circles.
+    /// Straights in both directions, spins, squares and circles.
     Protocols,
     /// Straights, spins and arcs in any order, with reversals.
     Free,
     /// Straights and arcs, never backward and never on the spot.
     Forward,
-    /// UMBmark's squares, both ways round.
+    /// UMBmark's squares, in both directions.
     Squares,
-    /// Circles of two radii, both ways round, and straights.
+    /// Circles of two radii, in both directions, and straights.
     Circles,
 }
 
@@ -91,7 +93,8 @@ impl RandomRobot {
         let share = if two { 0.5 } else { 1.0 };
         let sessions: Vec<SessionPlan> =
             (0..if two { 2 } else { 1 }).map(|_| session(&base, family, share, draw)).collect();
-        // At the first session's speed, on other paths of the family: what was never excited is no fair question.
+        // At the first session's speed, on other paths of the family: what was never excited is no fair
+        // question.
         let scenario = sessions[0].scenario.clone();
         let held_out = SessionPlan { programs: programs(family, &scenario, 0.5, draw), scenario };
         Ok(Self { family, sessions, held_out, payload_kg, jitter_s })
@@ -124,7 +127,8 @@ impl RandomRobot {
 /// Measurements of the simulated instrument a second, of which a case takes some.
 pub(crate) const RATE_HZ: f64 = 20.0;
 
-/// Radius of the tightest arc in wheelbases: the inner wheel runs at a sixth of the outer one's speed, which the controllers can still do.
+/// Radius of the tightest arc in wheelbases: the inner wheel runs at a sixth of the outer one's speed, which
+/// the controllers can still do.
 const MIN_ARC_RADIUS_RATIO: f64 = 0.7;
 
 fn session(base: &Scenario, family: PathFamily, share: f64, draw: &mut Draw) -> SessionPlan {

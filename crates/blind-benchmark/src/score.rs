@@ -64,8 +64,10 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
     Ok(result)
 }
 
-/// What the tool's model gains on the held-out log over the best calibration without the effect, and what the true terms gain there: all of it but what chance makes of
-/// an effect, which nobody can know before. Looks without error: on average over their errors the log score differs by these. Only means gain. A tool that says nothing gains nothing: its own base is not held against it.
+/// What the tool's model gains on the held-out log over the best calibration without the effect, and what the
+/// true terms gain there: all of it but the random part of an effect, which nobody can know before. Looks
+/// without error: on average over their errors the log score differs by these. Only means gain. A tool that
+/// says nothing gains nothing: its own base is not held against it.
 fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, ChallengeError> {
     let mean = case.oracle.iter().all(|hidden| kind_of(&hidden.id) == Some(EffectKind::Mean));
     let (Some((held_out, plain)), Some(best), Some(truth)) = (&case.held_out, &case.best_drive, case.truth()) else {
@@ -85,7 +87,8 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
     Ok(Some([found, possible]))
 }
 
-/// What is left of the effects in which chance has a part, each alone, with its own term and the geometry parameters at the sizes and in the shape that leave least.
+/// What is left of the effects with a random signature, each alone, with its own term and the geometry
+/// parameters at the sizes and in the shape that leave least.
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];

@@ -1,4 +1,5 @@
-//! The benchmark benched: is the oracle's power what it says, does the tool get nothing of the answer, does a case stand by itself?
+//! The benchmark benched: is the oracle's power what it says, does the tool get nothing of the answer, does a
+//! case stand by itself?
 
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -8,7 +9,7 @@ use super::hidden::EffectKind;
 use super::power::power;
 use super::*;
 
-/// Chance of either side of a binomial count at which a test fails.
+/// Probability of either side of a binomial count at which a test fails.
 const ALPHA: f64 = 1e-4;
 
 fn is_likely(successes: usize, of: usize, probability: f64) -> bool {
@@ -18,8 +19,9 @@ fn is_likely(successes: usize, of: usize, probability: f64) -> bool {
         || (count == 0 && binomial.cdf(0) > ALPHA)
 }
 
-/// The oracle's own test on data with noise, by the catalogue's hypothesis and the true variances: at 5 % it alarms on nulls so often, and finds an effect of
-/// the oracle's limit with the power that its noncentrality says. Half or twice the noncentrality is rejected.
+/// The oracle's own test on data with noise, by the catalogue's hypothesis and the true variances: at 5 % it
+/// rejects nulls so often, and finds an effect of the oracle's limit with the power that its noncentrality
+/// says. Half or twice the noncentrality is rejected.
 #[test]
 fn the_oracle_has_the_power_that_it_states() {
     const TRIALS: usize = 160;
@@ -53,7 +55,8 @@ fn a_case_stands_by_itself() {
     assert_ne!(other.as_ref(), Ok(last), "another seed is another case");
 }
 
-/// No name, note or key of a dataset tells what is hidden; loads and jitter stand in cases without such an effect too.
+/// No name, note or key of a dataset tells what is hidden; loads and jitter stand in cases without such an
+/// effect too.
 #[test]
 fn records_do_not_tell_what_is_hidden() {
     let mut loads_elsewhere = 0;

@@ -1,7 +1,7 @@
 //! Counters of finite width: unwrapping them when the width is known, suspecting them when it is not.
 //!
-//! A counter of `n` bits jumps by 2ⁿ when it passes its end. As long as no true increment reaches 2ⁿ⁻¹, the increment modulo 2ⁿ in
-//! [−2ⁿ⁻¹, 2ⁿ⁻¹) is the true one.
+//! A counter of `n` bits jumps by 2ⁿ when it passes its end. As long as no true increment reaches 2ⁿ⁻¹, the
+//! increment modulo 2ⁿ in [−2ⁿ⁻¹, 2ⁿ⁻¹) is the true one.
 
 use kinematics::Side;
 
@@ -14,8 +14,9 @@ const USUAL_BITS: [u8; 4] = [8, 16, 24, 32];
 /// Widths for which [`unwrap`] is defined: one bit has no sign, and 64 need no help.
 pub(crate) const ACCEPTED_BITS: std::ops::RangeInclusive<u8> = 2..=63;
 
-/// Unwrapping must make the largest increment this many times smaller before it is believed: a robot that once moved fast between two
-/// rows has increments of all sizes, a wrap leaves nothing between the usual ones and nearly 2ⁿ.
+/// Unwrapping must make the largest increment this many times smaller before it is believed: a robot that
+/// once moved fast between two rows has increments of all sizes, a wrap leaves nothing between the usual ones
+/// and nearly 2ⁿ.
 const BELIEVED_SHRINKAGE: u64 = 4;
 
 /// An increment modulo 2^bits, in [−2^(bits−1), 2^(bits−1)).
@@ -35,11 +36,12 @@ pub(crate) fn unwrap(ticks: &mut [i64], bits: u8) {
     }
 }
 
-/// The width, 8, 16, 24 or 32 bits, of the counter whose wrapping these cumulative counts show, if they show one.
+/// The width, 8, 16, 24 or 32 bits, of the counter whose wrapping these cumulative counts show, if they show
+/// one.
 ///
-/// They do when they span less than 2ⁿ counts, some increment exceeds 2ⁿ⁻¹, such increments are at most half of all, and unwrapping makes
-/// the largest increment at least four times smaller. Two rows alone show nothing: a run that was read at its ends only may
-/// have made any number of counts.
+/// They do when they span less than 2ⁿ counts, some increment exceeds 2ⁿ⁻¹, such increments are at most half
+/// of all, and unwrapping makes the largest increment at least four times smaller. Two rows alone show
+/// nothing: a run that was read at its ends only may have made any number of counts.
 #[must_use]
 pub fn suspected_wrap(ticks: &[i64]) -> Option<u8> {
     let span = ticks.iter().max()?.abs_diff(*ticks.iter().min()?);
@@ -116,7 +118,8 @@ mod tests {
             // Passes 0 and half a turn of the counter, so that it wraps whether it is signed or not.
             let ticks: Vec<i64> = [-(1_i64 << (bits - 1)), 0, 1_i64 << (bits - 1)].into_iter()
                 .flat_map(|around| (-3..3).map(move |k| sign * (around + k * step + jitter * (k & 1)))).collect();
-            // The jumps between the three stretches are this test's; each stretch by itself is what a robot logs.
+            // The jumps between the three stretches are this test's; each stretch by itself is what a robot
+            // logs.
             for stretch in ticks.chunks(6) {
                 let seen = shown(stretch, bits, signed);
                 let wraps = seen.windows(2).any(|pair| (pair[1] - pair[0]).unsigned_abs() > 1 << (bits - 1));

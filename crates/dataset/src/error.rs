@@ -1,7 +1,8 @@
 //! Why a dataset was not read, written or imported: one variant a reason that a caller can act on.
 //!
-//! Every message is one line that names the file, the line and the column where they exist, and what was expected there. Text that was
-//! found in a file is shown clipped and escaped, so that a gigabyte of garbage stays one line too.
+//! Every message is one line that names the file, the line and the column where they exist, and what was
+//! expected there. Text that was found in a file is shown clipped and escaped, so that a gigabyte of garbage
+//! stays one line too.
 
 use std::path::PathBuf;
 

@@ -1,8 +1,9 @@
-//! What a robot measured and the protocols it drives: the vocabulary that calibrators and the simulator share.
+//! What a robot measured and the protocols it drives: the vocabulary that calibrators and the simulator
+//! share.
 //!
-//! A [`Dataset`] holds one robot's runs: what it counted ([`Odometry`]) and what an outside instrument saw of it (poses,
-//! displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`], [`RunView`]), so that a subset of the
-//! runs costs nothing.
+//! A [`Dataset`] holds one robot's runs: what it counted ([`Odometry`]) and what an outside instrument saw of
+//! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
+//! [`RunView`]), so that a subset of the runs costs nothing.
 
 mod counter;
 mod error;

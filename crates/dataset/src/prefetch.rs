@@ -2,7 +2,8 @@
 
 use std::sync::mpsc::sync_channel;
 
-/// Calls `each` with every item, while another thread makes the next; two are held at most beside the one in use. Stops at the first error.
+/// Calls `each` with every item, while another thread makes the next; two are held at most beside the one in
+/// use. Stops at the first error.
 ///
 /// # Errors
 /// The first that `each` gives.

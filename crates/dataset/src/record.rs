@@ -58,7 +58,8 @@ pub struct NominalRobot {
     pub right_wheel_diameter_m: f64,
     /// Nominal distance between the wheel contacts, metres.
     pub wheel_separation_m: f64,
-    /// Counts for one turn of a wheel, after decoding and gears; a real number. Absent when the robot reports no ticks.
+    /// Counts for one turn of a wheel, after decoding and gears; a real number. Absent when the robot reports
+    /// no ticks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ticks_per_rev: Option<f64>,
     /// Width of the tick counter, when it wraps and is to be unwrapped.

@@ -1,4 +1,5 @@
-//! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies nothing.
+//! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies
+//! nothing.
 
 use kinematics::{Count, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, atan2, unwrap_near};
 
@@ -124,10 +125,11 @@ impl<'a> RunView<'a> {
         Some(angles)
     }
 
-    /// Dead reckons the run from `start` and calls `visit` with time and pose at every row; `start` is the pose at the first row.
+    /// Dead reckons the run from `start` and calls `visit` with time and pose at every row; `start` is the
+    /// pose at the first row.
     ///
-    /// `m_per_rad` and `wheel_separation_m` are the geometry to be used; the nominal robot gives the ticks of a turn and, for a robot
-    /// that reports only its twist, the geometry from which its wheels are rebuilt.
+    /// `m_per_rad` and `wheel_separation_m` are the geometry to be used; the nominal robot gives the ticks of
+    /// a turn and, for a robot that reports only its twist, the geometry from which its wheels are rebuilt.
     pub fn dead_reckon(
         &self,
         robot: &NominalRobot,
@@ -164,8 +166,8 @@ impl<'a> RunView<'a> {
         }
     }
 
-    /// The instrument's poses of the run as (time, pose): from the truth where it has headings, else from the marked points read
-    /// at one instant. Empty when neither gives poses.
+    /// The instrument's poses of the run as (time, pose): from the truth where it has headings, else from the
+    /// marked points read at one instant. Empty when neither gives poses.
     #[must_use]
     pub fn observed_poses(&self) -> Vec<(f64, Pose)> {
         let from_truth: Vec<_> = self
@@ -191,8 +193,9 @@ impl<'a> RunView<'a> {
         poses.next().zip(poses.last())
     }
 
-    /// The body's pose at every instant at which at least two marked points were read: the rigid motion that fits them best
-    /// (least squares, in closed form in the plane). Headings continue without jumps of whole turns.
+    /// The body's pose at every instant at which at least two marked points were read: the rigid motion that
+    /// fits them best (least squares, in closed form in the plane). Headings continue without jumps of whole
+    /// turns.
     fn poses_from_points(&self) -> impl Iterator<Item = (f64, Pose)> {
         let mut previous_rad = None;
         self.run.point_readings.chunk_by(|a, b| a.t_s == b.t_s).filter_map(move |readings| {
@@ -208,7 +211,8 @@ impl<'a> RunView<'a> {
     }
 }
 
-/// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer than two distinct points.
+/// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer
+/// than two distinct points.
 fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
     let (mut count, mut body, mut room) = (0.0, Point::default(), Point::default());
     for (b, r) in pairs.clone() {

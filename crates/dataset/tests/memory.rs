@@ -1,4 +1,5 @@
-//! Memory of large and of hopeless files. A program with one test, as the peak is the process's; `benches/dataset.rs` measures the time.
+//! Memory of large and of hopeless files. A program with one test, as the peak is the process's;
+//! `benches/dataset.rs` measures the time.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};

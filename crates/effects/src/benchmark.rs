@@ -283,7 +283,8 @@ mod tests {
         assert_eq!(forms, 9);
     }
 
-    /// Records that have what an effect needs must not tell that it is hidden, so it can be there without any harm.
+    /// Records that have what an effect needs must not tell that it is hidden, so it can be there without any
+    /// harm.
     #[test]
     fn what_needs_something_of_the_records_can_be_there_without_harm() {
         for id in CATALOGUE {

@@ -13,11 +13,11 @@ pub enum Channel {
     Across,
     /// The heading, rad/s.
     Yaw,
-    /// The way of each wheel's contact, by what that wheel does, m/s.
+    /// The travel of each wheel's contact, by what that wheel does, m/s.
     Wheels,
-    /// The way of the left wheel's contact, m/s.
+    /// The travel of the left wheel's contact, m/s.
     LeftWheel,
-    /// The way of the right wheel's contact, m/s.
+    /// The travel of the right wheel's contact, m/s.
     RightWheel,
     /// What the instrument sees, ahead of the robot, metres.
     #[serde(rename = "seen_along")]
@@ -70,13 +70,13 @@ impl Channel {
         Self::INSTRUMENT.contains(&self)
     }
 
-    /// Is it the way of wheels, each by what it does itself?
+    /// Is it the travel of wheels, each by what it does itself?
     #[must_use]
     pub fn is_of_wheels(self) -> bool {
         Self::WHEELS.contains(&self)
     }
 
-    /// Is it the way of this wheel, alone or among others?
+    /// Is it the travel of this wheel, alone or among others?
     pub(crate) fn is_of(self, side: Side) -> bool {
         self == Self::Wheels || self == if side == Side::Left { Self::LeftWheel } else { Self::RightWheel }
     }

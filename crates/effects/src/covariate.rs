@@ -1,7 +1,7 @@
 //! The covariates of terms outside of the catalogue: their names, normalisation and values.
 //!
-//! Both faces of [`crate::SparseTerm`] read this one list, and so do scenarios and findings: a name means the same wherever it stands. How the speeds, the
-//! heading or the way come about is each face's own.
+//! Both models of [`crate::SparseTerm`] read this one list, and so do scenarios and findings: a name means
+//! the same wherever it stands. How the speeds, the heading or the way come about is each model's own.
 
 use std::collections::BTreeMap;
 
@@ -32,15 +32,18 @@ pub enum Covariate {
     WheelAcceleration,
     /// `exp(-|wheel v| / 0.05 m/s)`: of the speed of the wheel's own contact; 1 where it stands.
     SlowWheel,
-    /// `exp(-wheel distance since reversal / 2 mm)`: of the way since the wheel's contact last went the other way, on average over the interval; 0 before it first does.
+    /// `exp(-wheel distance since reversal / 2 mm)`: of the distance since the wheel's contact last reversed,
+    /// on average over the interval; 0 before it first does.
     WheelSinceReversal,
-    /// `row length`: how much longer the logged interval is by its stamps than by the beat of its run's rows, over 2 % of itself.
+    /// `row length`: how much longer the logged interval is by its stamps than by the beat of its run's rows,
+    /// over 2 % of itself.
     RowLength,
     /// `cos(theta)`: of the heading in the room.
     CosHeading,
     /// `sin(theta)`: of the heading in the room.
     SinHeading,
-    /// `v cos(left wheel)`, `v cos(5 right wheel)`: cosine of so many times a wheel's angle, on average over the interval, times its contact's speed.
+    /// `v cos(left wheel)`, `v cos(5 right wheel)`: cosine of so many times a wheel's angle, on average over
+    /// the interval, times its contact's speed.
     CosPhase(Side, u8),
     /// `v sin(left wheel)`, `v sin(5 right wheel)`: the same of the sine.
     SinPhase(Side, u8),
@@ -50,7 +53,8 @@ pub enum Covariate {
     SessionTime,
     /// `distance driven` in the session, over 100 m.
     Way,
-    /// `exp(-distance since reversal / 0.1 m)`: of the way since the robot last went the other way; 0 before it first does.
+    /// `exp(-distance since reversal / 0.1 m)`: of the distance since the robot last reversed; 0 before it
+    /// first does.
     SinceReversal,
     /// `curvature`: ω over √(ω² + (v / 0.2 m)²): 1 on the spot to the left, −1 to the right, 0 straight on.
     Curvature,
@@ -60,7 +64,8 @@ pub enum Covariate {
     X,
     /// `y`: place in the room, over 1 m.
     Y,
-    /// A covariate of the run, by its own name, less its mean and over its standard deviation. A run that does not say it has none of it: no payload is a payload of 0.
+    /// A covariate of the run, by its own name, less its mean and over its standard deviation. A run that
+    /// does not say it has none of it: no payload is a payload of 0.
     OfRun {
         /// Its name in the run's record.
         key: String,
@@ -146,7 +151,8 @@ impl Covariate {
         .to_owned()
     }
 
-    /// The covariate of a name; `None` where it is none of [`Self::NAMED`], nor a wheel's phase with up to 24 cycles a turn.
+    /// The covariate of a name; `None` where it is none of [`Self::NAMED`], nor a wheel's phase with up to 24
+    /// cycles a turn.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let of = |cycles| {
@@ -155,7 +161,8 @@ impl Covariate {
         Self::NAMED.into_iter().chain((2..=MAX_CYCLES).flat_map(of)).find(|covariate| covariate.name() == name)
     }
 
-    /// The covariate of a run whose values over the runs are these, 0 for one that does not say it; `None` where they do not differ.
+    /// The covariate of a run whose values over the runs are these, 0 for one that does not say it; `None`
+    /// where they do not differ.
     #[must_use]
     pub fn of_run(key: &str, values: &[f64]) -> Option<Self> {
         let n = values.len() as f64;
@@ -198,7 +205,8 @@ impl Covariate {
         )
     }
 
-    /// Is it of the log's rows, and not of the robot? It goes with the speed of both wheels alone: a stamp that is off.
+    /// Is it of the log's rows, and not of the robot? It goes with the speed of both wheels alone: a stamp
+    /// that is off.
     #[must_use]
     pub const fn is_of_rows(&self) -> bool {
         matches!(self, Self::RowLength)
@@ -215,7 +223,8 @@ impl Covariate {
         matches!(self, Self::Speed | Self::AbsSpeed | Self::YawRate | Self::AbsYawRate)
     }
 
-    /// How many times as large as others a product with it may be, as it has faded soon: after a reversal 20 mm or 20 mrad of the robot in all, and all of a wheel's way.
+    /// How many times as large as others a product with it may be, as it has faded soon: after a reversal 20
+    /// mm or 20 mrad of the robot in all, and all of a wheel's travel.
     pub(crate) const fn fades(&self) -> f64 {
         match self {
             Self::SinceReversal => 10.0,
@@ -268,7 +277,7 @@ const CASTOR_DECAY_M: f64 = 0.1;
 /// Way of a wheel since its reversal over which 1/e is left, metres: that of teeth, keys and tyres.
 const WHEEL_FADES_M: f64 = 2e-3;
 
-/// What is left of 1 on average between two ways since a reversal.
+/// What is left of 1 on average between two distances since a reversal.
 fn mean_left([from_m, to_m]: [f64; 2]) -> f64 {
     let left = |distance_m: f64| (-distance_m / WHEEL_FADES_M).exp();
     let over = (to_m - from_m) / WHEEL_FADES_M;
@@ -308,7 +317,8 @@ pub(crate) struct KinematicSample<'r> {
 }
 
 impl KinematicSample<'_> {
-    /// A wheel's speed times the mean over the interval of a sine, and of a cosine, that comes back so many times a turn.
+    /// A wheel's speed times the mean over the interval of a sine, and of a cosine, that comes back so many
+    /// times a turn.
     pub(crate) fn of_cycle(&self, side: Side, cycles: u8) -> (f64, f64) {
         let cycles = f64::from(cycles);
         let (sin, cos) = sin_cos(cycles * self.wheel_rad[side]);

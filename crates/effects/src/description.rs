@@ -1,5 +1,6 @@
-//! What is known of an effect beside its two faces: its meaning for people, what excites it, how a single
-//! large error of it looks, how its fault of the records is treated, and how the blind benchmark draws it.
+//! What is known of an effect beside its two models: its meaning for people, what excites it, the signature
+//! of a single large error of it looks, how its fault of the records is treated, and how the blind benchmark
+//! draws it.
 //!
 //! Diagnosis, plans, pages and the benchmark ask these properties; none of them compares ids. So a new effect
 //! states here all that they must know of it.
@@ -17,11 +18,12 @@ pub struct Description {
     pub summary: Summary,
     /// What excites it.
     pub excitation: Excitation,
-    /// How a single large error of it looks; `None` where its errors are not single ones.
+    /// The signature of a single large error of it; `None` where its errors are not single ones.
     pub isolated_error: Option<IsolatedError>,
     /// How its fault of the records is treated; of record faults only.
     pub record_fault: RecordFault,
-    /// Its mean term depends on single rows of the log, not only on what the wheels did between two measurements.
+    /// Its mean term depends on single rows of the log, not only on what the wheels did between two
+    /// measurements.
     pub goes_by_rows: bool,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
@@ -72,8 +74,8 @@ pub enum Excitation {
     Conditions(&'static str),
 }
 
-/// How a single large error of an effect measurements in the innovations at and after it. Each grid holds the scales
-/// that the error's size is integrated over.
+/// How a single large error of an effect measurements in the innovations at and after it. Each grid holds the
+/// scales that the error's size is integrated over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IsolatedError {
     /// One wheel loses distance, anywhere where it drives: how much, metres.
@@ -100,7 +102,7 @@ pub enum IsolatedError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecordFault {
     /// The log alone can show it. What leaves no trace is possible in any records, and is tried only where
-    /// the base fit is hard to believe.
+    /// the base fit is implausible.
     pub leaves_a_trace: bool,
     /// The rewriting restores the counts only roughly, so that outliers and scatter that are left say nothing
     /// new.

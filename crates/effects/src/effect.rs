@@ -78,13 +78,14 @@ pub trait PhysicalEffect {
     /// [`EffectError`] names the parameter and its range.
     fn check(&self) -> Result<(), EffectError>;
 
-    /// What the effect makes of the drive's geometry for good. Only the geometry effects, which every calibration fits, answer here.
+    /// What the effect makes of the drive's geometry for good. Only the geometry effects, which every
+    /// calibration fits, answer here.
     fn true_geometry(&self, geometry: DriveGeometry) -> DriveGeometry {
         geometry
     }
 
-    /// Standard deviation of the wheel separation from motion to motion, metres; what a bound on calibration takes a motion's scatter from. `Err` says why
-    /// the scatter is none that is drawn once a motion.
+    /// Standard deviation of the wheel separation from motion to motion, metres; what a bound on calibration
+    /// takes a motion's scatter from. `Err` says why the scatter is none that is drawn once a motion.
     ///
     /// # Errors
     /// The reason, for people.
@@ -92,12 +93,14 @@ pub trait PhysicalEffect {
         Ok(0.0)
     }
 
-    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where measurements scatter far less, it is another effect.
+    /// Standard deviation of where a contact is that the effect's mean cannot be without, metres: where
+    /// measurements scatter far less, it is another effect.
     fn scatter_of_contact_m(&self) -> f64 {
         0.0
     }
 
-    /// The simulation model: the effect's state during one run, or `None` when all it does is in [`Self::true_geometry`].
+    /// The simulation model: the effect's state during one run, or `None` when all it does is in
+    /// [`Self::true_geometry`].
     fn forward(&self) -> Option<Box<dyn Forward>> {
         None
     }
@@ -107,12 +110,13 @@ pub trait PhysicalEffect {
     where
         Self: Sized;
 
-    /// What is known of the effect beside its two faces.
+    /// What is known of the effect beside its two models.
     fn description() -> Description
     where
         Self: Sized;
 
-    /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make one.
+    /// The effect with the sizes that a fit of its hypothesis found, by name, or `None` when they do not make
+    /// one.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self>
     where
         Self: Sized,
@@ -121,8 +125,8 @@ pub trait PhysicalEffect {
         None
     }
 
-    /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is another
-    /// than [`Self::from_estimates`] makes of them.
+    /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is
+    /// another than [`Self::from_estimates`] makes of them.
     fn at_scale(values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Self>
     where
         Self: Sized,

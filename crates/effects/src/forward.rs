@@ -1,8 +1,9 @@
 //! The simulation model: the stages of one simulated step and the hooks with which an effect changes them.
 //!
-//! A step is a stretch of constant wheel rates: a fraction of a millisecond in the stepping engine, a whole motion in the closed form. Every
-//! stage has filled its own fields and all earlier ones when its hook is called; a hook changes the fields of its stage only. A hook that is
-//! exact only for short steps says so in [`Forward::needs_stepping`], and the closed form then refuses the scenario.
+//! A step is a stretch of constant wheel rates: a fraction of a millisecond in the stepping engine, a whole
+//! motion in the closed form. Every stage has filled its own fields and all earlier ones when its hook is
+//! called; a hook changes the fields of its stage only. A hook that is exact only for short steps says so in
+//! [`Forward::needs_stepping`], and the closed form then refuses the scenario.
 
 use dataset::RunInfo;
 use kinematics::{Pose, Wheels};
@@ -111,7 +112,8 @@ pub struct PoseReading {
     pub world_from_body: Pose,
 }
 
-/// Which hooks of an effect do anything. The simulator calls no others, so that an effect costs nothing at the stages that it leaves alone.
+/// Which hooks of an effect do anything. The simulator calls no others, so that an effect costs nothing at
+/// the stages that it leaves alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hooks {
     /// [`Forward::on_run_start`].
@@ -227,12 +229,14 @@ pub trait Forward: Send {
         None
     }
 
-    /// Does the effect depend on how fast the wheels turn? The closed form then takes each motion's ramps apart instead of moving at one speed.
+    /// Does the effect depend on how fast the wheels turn? The closed form then takes each motion's ramps
+    /// apart instead of moving at one speed.
     fn depends_on_speed(&self) -> bool {
         false
     }
 
-    /// How many counts make one recorded tick, when the effect coarsens the record: the dataset then states that resolution.
+    /// How many counts make one recorded tick, when the effect coarsens the record: the dataset then states
+    /// that resolution.
     fn counts_per_tick(&self) -> Option<u32> {
         None
     }

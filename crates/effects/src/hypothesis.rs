@@ -1,8 +1,9 @@
 //! The estimation model: how recorded data would show an effect.
 //!
-//! Most effects add to the mean of a motion or of what the instrument sees, linearly in their sizes ([`Hypothesis::Terms`]); what is not linear, a hinge speed
-//! or a decay length, is one of a few shapes. Gross faults rewrite the records ([`Hypothesis::Records`]). What only scatters has no mean: the checks of a fit
-//! show it ([`Hypothesis::Scatter`]).
+//! Most effects add to the mean of a motion or of what the instrument sees, linearly in their sizes
+//! ([`Hypothesis::Terms`]); what is not linear, a hinge speed or a decay length, is one of a few shapes.
+//! Gross faults rewrite the records ([`Hypothesis::Records`]). What only scatters has no mean: the checks of
+//! a fit show it ([`Hypothesis::Scatter`]).
 
 use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Pose, Twist, Wheels, sin_cos};
@@ -12,13 +13,15 @@ use model_term::{Interval, ModelTerm};
 pub enum Hypothesis {
     /// The three geometry parameters of the drive, which every calibration fits.
     Geometry,
-    /// A mean term; several where a shape parameter is to be tried at several values, which then pay for their trials.
+    /// A mean term; several where a shape parameter is to be tried at several values, which then pay for
+    /// their trials.
     Terms(Vec<Variant>),
-    /// The records as they would be without the fault, one for each form that it takes; `None` where the fault is impossible in these records.
+    /// The records as they would be without the fault, one for each form that it takes; `None` where the
+    /// fault is impossible in these records.
     Records(fn(&Dataset) -> Vec<RecordCorrection>),
     /// It scatters: it shows in these checks of a fit and in no mean.
     Scatter(&'static [Sign]),
-    /// Both: a mean, and what chance does beside it.
+    /// Both: a mean, and a variance beside it.
     TermsAndScatter(Vec<Variant>, &'static [Sign]),
     /// Innocent, or not told from data alone.
     Silent,
@@ -119,7 +122,8 @@ impl LastAngle {
 
 /// Every run of a dataset with its wheels' record changed.
 ///
-/// `columns` takes both wheels' cumulative counts or angles of a run, `twist` the twist of a row where that is all that a robot reports.
+/// `columns` takes both wheels' cumulative counts or angles of a run, `twist` the twist of a row where that
+/// is all that a robot reports.
 pub(crate) fn rewrite_wheels(
     dataset: &Dataset,
     mut columns: impl FnMut(&mut WheelLog),
@@ -139,7 +143,8 @@ pub(crate) fn rewrite_wheels(
     records
 }
 
-/// A twist whose wheels, by the nominal drive, turn otherwise; the twist itself where the drive is not physical.
+/// A twist whose wheels, by the nominal drive, turn otherwise; the twist itself where the drive is not
+/// physical.
 pub(crate) fn by_wheels(robot: &NominalRobot, twist: Twist, change: impl Fn(Wheels<f64>) -> Wheels<f64>) -> Twist {
     robot.geometry().map_or(twist, |geometry| geometry.twist(change(geometry.wheel_speed_m_s(twist))))
 }
@@ -167,6 +172,6 @@ pub enum Sign {
     ScatterWithTurn,
     /// Errors that grow with the speed at the instant of a measurement.
     ScatterWithSpeed,
-    /// Errors of looks at a robot that creeps, and of none at a fast one.
+    /// Errors of measurements of a creeping robot, and of none of a fast one.
     TailsAtLowSpeed,
 }

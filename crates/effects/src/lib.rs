@@ -1,11 +1,13 @@
-//! What makes real wheel odometry deviate: one file a physical effect in `catalogue/`, and this table of contents.
+//! What makes real wheel odometry deviate: one file a physical effect in `catalogue/`, and this table of
+//! contents.
 //!
-//! An effect has two faces that share a file and its parameters, never code. The *forward* face ([`Forward`]) is how the world does it: it acts
-//! inside the simulator's step, at whichever of the stages command → motor → wheel → floor → encoder → clock → instrument it touches.
-//! The *hypothesis* face ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
+//! An effect has two models that share a file and its parameters, never code. The *simulation model*
+//! ([`Forward`]) is how the world does it: it acts inside the simulator's step, at whichever of the stages
+//! command → motor → wheel → floor → encoder → clock → instrument it touches. The *estimation model*
+//! ([`Hypothesis`]) is how recorded data would show it: it sees recorded quantities only.
 //!
-//! What everything else must know of an effect, from its meaning to how the blind benchmark draws it, stands in
-//! its [`Description`]: nothing outside of this crate writes an id.
+//! What everything else must know of an effect, from its meaning to how the blind benchmark draws it, stands
+//! in its [`Description`]: nothing outside of this crate writes an id.
 //!
 //! Adding an effect is one new file in `catalogue/` and its line in `contents!` below: scenario parsing, the
 //! catalogue and the laws follow. What has no name there is simulated as a [`SparseTerm`].
@@ -66,7 +68,8 @@ macro_rules! contents {
         }
         $(pub use catalogue::$module::$Type;)*
 
-        /// One effect of the catalogue with its sizes, or a term outside of it; `kind` in a scenario is its id.
+        /// One effect of the catalogue with its sizes, or a term outside of it; `kind` in a scenario is its
+        /// id.
         #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(tag = "kind", rename_all = "snake_case")]
         pub enum Effect {
@@ -97,7 +100,8 @@ macro_rules! contents {
                 }
             }
 
-            /// How data would show the effect; a term outside of the catalogue is its own one shape, or `None` where it is not physical.
+            /// How data would show the effect; a term outside of the catalogue is its own one shape, or
+            /// `None` where it is not physical.
             #[must_use]
             pub fn hypothesis(&self) -> Option<Hypothesis> {
                 match self {
@@ -116,7 +120,7 @@ macro_rules! contents {
             }
         }
 
-        /// What is known of an effect beside its two faces, by its id; `None` for an unknown id.
+        /// What is known of an effect beside its two models, by its id; `None` for an unknown id.
         #[must_use]
         pub fn description(id: &str) -> Option<Description> {
             match id {
@@ -135,7 +139,8 @@ macro_rules! contents {
             .filter(|effect: &Effect| effect.physical().check().is_ok())
         }
 
-        /// The effect of an id with sizes that the blind benchmark drew, at a scale in a robot; `None` when they do not make a physical one.
+        /// The effect of an id with sizes that the blind benchmark drew, at a scale in a robot; `None` when
+        /// they do not make a physical one.
         #[must_use]
         pub fn effect_at_scale(id: &str, values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Effect> {
             match id {
@@ -145,7 +150,8 @@ macro_rules! contents {
             .filter(|effect: &Effect| effect.physical().check().is_ok())
         }
 
-        /// The effect of an id without any harm, for records of a robot that have what it needs though it is not hidden.
+        /// The effect of an id without any harm, for records of a robot that have what it needs though it is
+        /// not hidden.
         #[must_use]
         pub fn harmless(id: &str, robot: &HostRobot) -> Option<Effect> {
             match id {
@@ -203,7 +209,8 @@ contents! {
     truth_outliers::TruthOutliers,
 }
 
-/// Puts effects into the order in which they act, so that a scenario's order does not matter; terms outside of the catalogue act last.
+/// Puts effects into the order in which they act, so that a scenario's order does not matter; terms outside
+/// of the catalogue act last.
 pub fn sort_by_stage(effects: &mut [Effect]) {
     effects.sort_by_key(|effect| CATALOGUE.iter().position(|id| *id == effect.id()).unwrap_or(CATALOGUE.len()));
 }

@@ -1,8 +1,10 @@
-//! What covariates and castors remember of a run: which way something last went, and how far since it last went the other way.
+//! What covariates and castors remember of a run: which way something last went, and how far since it last
+//! reversed.
 
 use kinematics::Wheels;
 
-/// The side to which a value that drifts last went: it is held within a band, which it must cross to go to the other side.
+/// The side to which a value that drifts last went: it is held within a band, which it must cross to go to
+/// the other side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hysteresis {
     half_width: f64,
@@ -16,7 +18,8 @@ impl Hysteresis {
         Self { half_width, within: 0.0, sense: 0.0 }
     }
 
-    /// 1 or −1, once the value has gone this far on, or back where that is negative; 0 before it has first left the band's middle.
+    /// 1 or −1, once the value has gone this far on, or back where that is negative; 0 before it has first
+    /// left the band's middle.
     pub(crate) fn after(&mut self, by: f64) -> f64 {
         self.within = (self.within + by).clamp(-self.half_width, self.half_width);
         if self.within.abs() >= self.half_width {
@@ -32,7 +35,7 @@ const REVERSAL_M: f64 = 1e-3;
 /// A turn that counts, radians: what straight driving wanders by is far less.
 pub(crate) const TURN_RAD: f64 = 0.03;
 
-/// The way since something last went the other way.
+/// The distance since something last reversed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reversals {
     went: Hysteresis,
@@ -43,7 +46,7 @@ impl Reversals {
     /// None yet.
     pub(crate) const NONE: Self = Self { went: Hysteresis::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
 
-    /// The way since the last one, after going this far on, or back where that is negative.
+    /// The distance since the last one, after going this far on, or back where that is negative.
     pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
         let before = self.went.sense;
         if self.went.after(distance_m) * before < 0.0 {
@@ -62,7 +65,7 @@ pub(crate) struct MotionHistoryTracker {
     turned: Hysteresis,
 }
 
-/// What is remembered at a moment: ways since reversals, and the sense of the last turn.
+/// What is remembered at a moment: distances since reversals, and the sense of the last turn.
 pub(crate) struct MotionHistory {
     pub(crate) since_reversal_m: f64,
     pub(crate) wheel_since_reversal_m: Wheels<[f64; 2]>,

@@ -1,10 +1,12 @@
 //! The regular beat behind the irregular stamps of a log.
 
-/// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by, a beat.
+/// Rows from which a beat is found: the line through so many is off by a twentieth of what stamps jitter by,
+/// a beat.
 const MIN_ROWS: usize = 24;
 /// Rows after which a row counts for the beat by a part e less: a log's clock need not keep one beat all day.
 const FORGETTING_ROWS: f64 = 500.0;
-/// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with a row lost in it, hardly one as short.
+/// Stamps that jitter by a third of the beat make a gap of one beat as long as this many, and no longer; with
+/// a row lost in it, hardly one as short.
 const MAX_ONE_PERIOD: f64 = 1.7;
 /// Nor as short as this: such a row came by itself, at a standstill.
 const MIN_ONE_PERIOD: f64 = 0.3;
@@ -18,7 +20,8 @@ const MAX_MISSED: u32 = 3;
 pub(crate) struct SamplingPeriodEstimator {
     /// Times of the rows from which the beat is yet to be found.
     first_s: Vec<f64>,
-    /// Of the rows of the beat: weight, means of number and time, and sums of squares and products about them.
+    /// Of the rows of the beat: weight, means of number and time, and sums of squares and products about
+    /// them.
     rows: f64,
     mean: [f64; 2],
     square: f64,
@@ -53,7 +56,8 @@ impl SamplingPeriodEstimator {
         self.product = keeps * self.product + off[0] * (time_s - self.mean[1]);
     }
 
-    /// Takes a row before anything is known of the beat. Once there are enough of them, their gaps are so many times the middle one.
+    /// Takes a row before anything is known of the beat. Once there are enough of them, their gaps are so
+    /// many times the middle one.
     fn warm_up(&mut self, from_s: f64, row_s: f64) {
         if self.first_s.is_empty() {
             self.first_s.push(from_s);
@@ -120,7 +124,8 @@ mod tests {
                 let row_s = stamp_s(row).max(before_s + 1e-3);
                 sampling_period.next_row(before_s, row_s);
                 square += sampling_period.late_s * sampling_period.late_s;
-                // Never later than a row can be: 8 ms either way, and what the line through the first rows does not know of the beat.
+                // Never later than a row can be: 8 ms either way, and what the line through the first rows
+                // does not know of the beat.
                 assert!(sampling_period.late_s.abs() < between_s, "seed {seed} row {row}: {}", sampling_period.late_s);
                 before_s = row_s;
             }

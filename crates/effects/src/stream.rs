@@ -1,10 +1,13 @@
-//! Addressed randomness: a draw is a function of seed, point, trial, run and the stream's name, never of what was drawn elsewhere.
+//! Addressed randomness: a draw is a function of seed, point, trial, run and the stream's name, never of what
+//! was drawn elsewhere.
 //!
-//! So a new stream disturbs no other, a skipped trial neither, and one thread or sixteen give the same bits. Each address seeds its own xoshiro256++
-//! (Blackman & Vigna 2019) through an injective mix of the address's words, so two addresses never share a state.
+//! So a new stream disturbs no other, a skipped trial neither, and one thread or sixteen give the same bits.
+//! Each address seeds its own xoshiro256++ (Blackman & Vigna 2019) through an injective mix of the address's
+//! words, so two addresses never share a state.
 //!
-//! The draws are those of `rand_xoshiro` and `rand_distr` to the bit, which a test holds. Two short cuts on the way to them halve what chance costs a
-//! Monte-Carlo trial, some 350 streams and 1300 normal draws: a generator that takes its state in registers, and the common case of a normal draw inline.
+//! The draws are those of `rand_xoshiro` and `rand_distr` to the bit, which a test holds. Two short cuts on
+//! the way to them halve what random draws cost a Monte-Carlo trial, some 350 streams and 1300 normal draws:
+//! a generator that takes its state in registers, and the common case of a normal draw inline.
 
 use std::convert::Infallible;
 use std::sync::LazyLock;
@@ -82,7 +85,8 @@ impl Streams {
     #[inline]
     #[must_use]
     pub fn stream(&self, name: StreamName) -> Stream {
-        // A bijection of the address's words and the name's: each was mixed with the ones before it, and is now with the ones after it.
+        // A bijection of the address's words and the name's: each was mixed with the ones before it, and is
+        // now with the ones after it.
         let name = mix(name.0 ^ self.place);
         let place = mix(self.place ^ name);
         let trial = mix(self.trial ^ place);
@@ -101,8 +105,9 @@ const fn mix(word: u64) -> u64 {
 
 /// xoshiro256++ (Blackman & Vigna 2019) by its state, which must not be zero: one address in 2²⁵⁶ has that.
 ///
-/// `rand_xoshiro` takes its state as 32 bytes in memory. To write them as four words and to read them back as two pairs, which is what that compiles to,
-/// keeps a processor waiting until all earlier writes are done: a sixth of the time of a trial.
+/// `rand_xoshiro` takes its state as 32 bytes in memory. To write them as four words and to read them back as
+/// two pairs, which is what that compiles to, keeps a processor waiting until all earlier writes are done: a
+/// sixth of the time of a trial.
 #[derive(Debug, Clone)]
 struct Xoshiro256PlusPlus([u64; 4]);
 
@@ -135,8 +140,8 @@ impl TryRng for Xoshiro256PlusPlus {
 /// Layers of the ziggurat by which `rand_distr` draws normals (Doornik 2005, ZIGNOR).
 const LAYERS: usize = 256;
 
-/// Half-widths x₀ > x₁ > … > x₂₅₆ = 0 of its layers, read out of it: of a word with layer i in its low byte and u = 2⁻¹⁰ in the bits above it makes u·xᵢ,
-/// exactly.
+/// Half-widths x₀ > x₁ > … > x₂₅₆ = 0 of its layers, read out of it: of a word with layer i in its low byte
+/// and u = 2⁻¹⁰ in the bits above it makes u·xᵢ, exactly.
 static HALF_WIDTHS: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(|| {
     const U: f64 = 1.0 / 1024.0;
     std::array::from_fn(|layer| {
@@ -231,7 +236,8 @@ impl Stream {
     }
 }
 
-/// A normal draw from its beginning, and the generator after it: by value, so that the common case keeps its generator in registers.
+/// A normal draw from its beginning, and the generator after it: by value, so that the common case keeps its
+/// generator in registers.
 #[cold]
 #[inline(never)]
 fn normal_in_full(mut rng: Xoshiro256PlusPlus) -> (f64, Xoshiro256PlusPlus) {
@@ -281,8 +287,8 @@ mod tests {
 
     #[test]
     fn first_draws_of_neighbouring_addresses_are_independent_normals() {
-        // Mean, variance and the correlation of neighbours over 40 000 trials: standard errors 1/√n, √(2/n), 1/√n; at 5 of each, three
-        // numbers raise a false positive once in 6e5 seeds.
+        // Mean, variance and the correlation of neighbours over 40 000 trials: standard errors 1/√n, √(2/n),
+        // 1/√n; at 5 of each, three numbers raise a false positive once in 6e5 seeds.
         let n = 40_000_u32;
         let draw = |trial| Address { trial: u64::from(trial), ..ADDRESS }.stream(StreamName::new("wheel")).normal();
         let (mut sum, mut squares, mut products, mut previous) = (0.0, 0.0, 0.0, draw(n));
@@ -299,8 +305,8 @@ mod tests {
         assert!((products / n).abs() < 5.0 / n.sqrt());
     }
 
-    /// A million draws: 12 000 of them outside of their layer, 260 in the tail beyond x₁. Rejects, as was tried: layers off by one, a fallback that goes
-    /// on from the word that was used up.
+    /// A million draws: 12 000 of them outside of their layer, 260 in the tail beyond x₁. Rejects, as was
+    /// tried: layers off by one, a fallback that goes on from the word that was used up.
     #[test]
     fn the_draws_are_those_of_rand_xoshiro_and_rand_distr() {
         let mut stream = ADDRESS.stream(StreamName::new("wheel"));
@@ -326,7 +332,8 @@ mod tests {
     #[test]
     fn the_ziggurat_has_layers_of_falling_width() {
         assert!(HALF_WIDTHS.windows(2).all(|pair| pair[0] > pair[1]));
-        // Marsaglia & Tsang 2000: r = 3.6541528853610088 for 256 layers. The one below it is as wide as its area makes a box of it.
+        // Marsaglia & Tsang 2000: r = 3.6541528853610088 for 256 layers. The one below it is as wide as its
+        // area makes a box of it.
         assert_eq!(HALF_WIDTHS[1], 3.654_152_885_361_009);
     }
 

@@ -1,12 +1,15 @@
-//! `term`: what no name of the catalogue explains, as a coefficient times a product of at most three covariates on one channel.
+//! `term`: what no name of the catalogue explains, as a coefficient times a product of at most three
+//! covariates on one channel.
 //!
-//! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the way of wheels, each by covariates of its own; seen_along, seen_across and
-//! seen_heading are off by coefficient · Π covariates, and seen_late is so long ago.
+//! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the travel of wheels,
+//! each by covariates of its own; seen_along, seen_across and seen_heading are off by coefficient · Π
+//! covariates, and seen_late is so long ago.
 //! [`Sparse`] is the estimation model, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the simulation model, as
-//! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes with.
+//! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only
+//! what it goes with.
 //!
-//! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised because a threshold on raw coefficients depends on
-//! units.
+//! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised
+//! because a threshold on raw coefficients depends on units.
 
 use std::collections::BTreeMap;
 
@@ -48,7 +51,8 @@ impl Sparse {
         Box::new(Recorded::new(self))
     }
 
-    /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of [`Self::shares_moments`].
+    /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of
+    /// [`Self::shares_moments`].
     #[must_use]
     pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
         all.iter().all(Self::shares_moments).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
@@ -61,11 +65,14 @@ impl Sparse {
 pub struct SparseTerm {
     /// What it adds to.
     pub channel: Channel,
-    /// Names of one to three covariates ([`Covariate`]), or keys of `of_runs`; `["1"]` for a constant. The same one may come several times.
+    /// Names of one to three covariates ([`Covariate`]), or keys of `of_runs`; `["1"]` for a constant. The
+    /// same one may come several times.
     pub covariates: Vec<String>,
-    /// Size where the covariates' product is 1: m/s along and across, rad/s in yaw; metres and radians on what the instrument sees.
+    /// Size where the covariates' product is 1: m/s along and across, rad/s in yaw; metres and radians on
+    /// what the instrument sees.
     pub coefficient: f64,
-    /// What runs have in turn, over and over, of covariates that are the runs' own. Every run's record says its value, unless another effect has said it.
+    /// What runs have in turn, over and over, of covariates that are the runs' own. Every run's record says
+    /// its value, unless another effect has said it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub of_runs: BTreeMap<String, Vec<f64>>,
 }
@@ -285,7 +292,7 @@ impl Forward for State {
         (!exact).then_some("what it goes with changes within a motion")
     }
 
-    /// What goes with v or ω alone goes with the way or the turn, however fast.
+    /// What goes with v or ω alone goes with the distance or the turn, however fast.
     fn depends_on_speed(&self) -> bool {
         self.size.coefficient != 0.0 && self.sparse.covariates.iter().filter(|of| of.is_a_speed()).count() > 1
     }

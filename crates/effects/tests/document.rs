@@ -76,9 +76,11 @@ type Labelled = Vec<(&'static str, String)>;
 /// The first line of an effect's header, and what follows each label; the error says what is missing.
 fn header(id: &str, source: &str) -> Result<(String, Labelled), String> {
     let lines: Vec<&str> = source.lines().map_while(|line| line.strip_prefix("//!")).map(str::trim).collect();
-    let (first, rest) = lines.split_first().ok_or_else(|| format!("{id}: no header"))?;
+    // The title ends at the first empty line; it may be wrapped.
+    let end = lines.iter().position(|line| line.is_empty()).ok_or_else(|| format!("{id}: no header"))?;
+    let (title, rest) = (lines[..end].join(" "), &lines[end..]);
     let first =
-        first.strip_prefix(&format!("`{id}`: ")).ok_or_else(|| format!("{id}: the header begins with its id"))?;
+        title.strip_prefix(&format!("`{id}`: ")).ok_or_else(|| format!("{id}: the header begins with its id"))?;
     let text = rest.join(" ").trim().to_owned();
     let mut starts: Vec<(usize, &'static str)> = Vec::new();
     for label in LABELS.into_iter().chain(FURTHER_LABELS) {

@@ -12,8 +12,8 @@ const CERTAINLY_WRAPPED_RAD: f64 = 3.0;
 
 /// Derivative of [`sinc`]: `(cos x − sinc x)/x`, −x/3 near zero.
 ///
-/// The closed form loses about `1e-16/x²` of relative accuracy to cancellation, the series (to x⁷) about `x⁸/1e5`; they cross
-/// near x = 0.05.
+/// The closed form loses about `1e-16/x²` of relative accuracy to cancellation, the series (to x⁷) about
+/// `x⁸/1e5`; they cross near x = 0.05.
 #[must_use]
 pub fn sinc_derivative(x: f64) -> f64 {
     if x.abs() < SINC_DERIVATIVE_SERIES_BELOW {
@@ -62,7 +62,8 @@ mod tests {
             let difference = (sinc(x + h) - sinc(x - h)) / (2.0 * h);
             assert!((sinc_derivative(x) - difference).abs() < 3e-11, "{x}");
         }
-        // The branch itself: closed form and series may differ by the closed form's cancellation, 1e-16/0.05² = 4e-14 relative.
+        // The branch itself: closed form and series may differ by the closed form's cancellation, 1e-16/0.05²
+        // = 4e-14 relative.
         let x = SINC_DERIVATIVE_SERIES_BELOW;
         let closed = (x.cos() - sinc(x)) / x;
         assert!((sinc_derivative(x * (1.0 - 1e-15)) - closed).abs() < 1e-14);

@@ -1,20 +1,24 @@
-//! Covariance of dead reckoning when each wheel's travel carries noise of variance `k²|s|` (Chong & Kleeman 1997; Kelly 2004).
+//! Covariance of dead reckoning when each wheel's travel carries noise of variance `k²|s|` (Chong & Kleeman
+//! 1997; Kelly 2004).
 //!
-//! The noise is a random walk along the wheel's path, so one step of any length must give what many short ones give. Its sum
-//! over the step moves the end through the Jacobian of the arc; what is left when the sum is held fixed (a Brownian bridge)
-//! scatters the end position within the step. For a straight of length `L` whose heading varies by `σ_θ²` at the end that
-//! scatter is `σ_θ² L²/12` across the path: `L²/4` from the sum and `L²/12` from the bridge make the exact `L²/3`.
+//! The noise is a random walk along the wheel's path, so one step of any length must give what many short
+//! ones give. Its sum over the step moves the end through the Jacobian of the arc; what is left when the sum
+//! is held fixed (a Brownian bridge) scatters the end position within the step. For a straight of length `L`
+//! whose heading varies by `σ_θ²` at the end that scatter is `σ_θ² L²/12` across the path: `L²/4` from the
+//! sum and `L²/12` from the bridge make the exact `L²/3`.
 //!
-//! On an arc, noise of the right wheel at the fraction `u` of the path moves the end by `const − s_L/(bθ)·τ(u)`, and of the left by
-//! `const + s_R/(bθ)·τ(u)`, with `τ(u)` the unit tangent there. So the bridge's covariance is `(k_R²|s_R| s_L² + k_L²|s_L| s_R²)/(b²θ²)` times
-//! the covariance of `τ` over the path, which is diagonal in the chord's frame: along `½(1+sinc θ) − sinc²(θ/2)`, across `½(1−sinc θ)`.
+//! On an arc, noise of the right wheel at the fraction `u` of the path moves the end by `const −
+//! s_L/(bθ)·τ(u)`, and of the left by `const + s_R/(bθ)·τ(u)`, with `τ(u)` the unit tangent there. So the
+//! bridge's covariance is `(k_R²|s_R| s_L² + k_L²|s_L| s_R²)/(b²θ²)` times the covariance of `τ` over the
+//! path, which is diagonal in the chord's frame: along `½(1+sinc θ) − sinc²(θ/2)`, across `½(1−sinc θ)`.
 
 use nalgebra::{Matrix3, Matrix3x2, Vector2};
 
 use crate::trig::{sin_cos, sinc_given_sine};
 use crate::{Increment, Pose, Wheels, sinc, sinc_derivative};
 
-/// Random-walk noise of each wheel's travel over the ground: standard deviation per square root of travel, m/√m.
+/// Random-walk noise of each wheel's travel over the ground: standard deviation per square root of travel,
+/// m/√m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WheelNoise {
     /// `k` of each wheel, m/√m: after `s` metres the travel's standard deviation is `k·√|s|`.
@@ -30,8 +34,8 @@ impl WheelNoise {
     }
 }
 
-/// Below this turn the path covariance of the tangent comes from its series: at 0.3 rad the series' first neglected terms are
-/// under 1e-12 of the whole and the closed form's cancellation (1e-16/θ⁴) is about 1e-14.
+/// Below this turn the path covariance of the tangent comes from its series: at 0.3 rad the series' first
+/// neglected terms are under 1e-12 of the whole and the closed form's cancellation (1e-16/θ⁴) is about 1e-14.
 const TANGENT_SERIES_BELOW_RAD: f64 = 0.3;
 
 /// Scatter of an arc's end position when the noise sums of both wheels are held fixed, in the chord's frame.
@@ -44,7 +48,8 @@ pub struct BridgeCovariance {
 }
 
 impl BridgeCovariance {
-    /// Scatter within an arc of given wheel travels (metres) whose travels vary by `travel_var_m2` (m²) over it.
+    /// Scatter within an arc of given wheel travels (metres) whose travels vary by `travel_var_m2` (m²) over
+    /// it.
     #[inline]
     #[must_use]
     pub fn within(travel_m: Wheels<f64>, travel_var_m2: Wheels<f64>, wheel_separation_m: f64) -> Self {
@@ -69,7 +74,8 @@ fn tangent_variance_over_turn_squared(turn_rad: f64) -> (f64, f64) {
     }
 }
 
-/// Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − …, ½(1−sinc θ) = θ²/12 − θ⁴/240 + θ⁶/10080 − …
+/// Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − …, ½(1−sinc θ) = θ²/12 − θ⁴/240 +
+/// θ⁶/10080 − …
 #[inline(always)]
 fn tangent_series(turn_rad: f64) -> (f64, f64) {
     let tt = turn_rad * turn_rad;
@@ -108,9 +114,11 @@ impl OdometryCovariance {
         &self.matrix
     }
 
-    /// Carries the covariance over one step that starts at `world_from_body` with given wheel travels, metres.
+    /// Carries the covariance over one step that starts at `world_from_body` with given wheel travels,
+    /// metres.
     ///
-    /// Exact to first order in the noise for a step of constant curvature of any length: cutting the step in two changes nothing.
+    /// Exact to first order in the noise for a step of constant curvature of any length: cutting the step in
+    /// two changes nothing.
     pub fn propagate(
         &mut self,
         world_from_body: Pose,
@@ -201,7 +209,8 @@ mod tests {
             for (column, (plus, minus)) in columns.iter().enumerate() {
                 let difference = [(plus.x_m - minus.x_m) / (2.0 * h), (plus.y_m - minus.y_m) / (2.0 * h), (plus.theta_rad - minus.theta_rad) / (2.0 * h)];
                 for (row, difference) in difference.into_iter().enumerate() {
-                    // Third derivatives stay under s/b³ ≈ 60: truncation 1e-11, rounding 1e-16/1e-6 = 1e-10 times a few metres and radians.
+                    // Third derivatives stay under s/b³ ≈ 60: truncation 1e-11, rounding 1e-16/1e-6 = 1e-10
+                    // times a few metres and radians.
                     let tolerance = 2e-9;
                     prop_assert!((jacobian[(row, column)] - difference).abs() < tolerance);
                     prop_assert!((jacobian[(row, column)] + 1e-3 - difference).abs() > tolerance);
@@ -234,7 +243,8 @@ mod tests {
         let theta_var = 2e-6 / (SEPARATION_M * SEPARATION_M);
         assert!((straight.across_var_m2 / (theta_var * 9.0 / 12.0) - 1.0).abs() < 1e-14);
         assert_eq!(straight.along_var_m2, 0.0);
-        // On the spot the centre's noise, (δ_R+δ_L)/2, is spread over all directions: half of its variance on each axis.
+        // On the spot the centre's noise, (δ_R+δ_L)/2, is spread over all directions: half of its variance on
+        // each axis.
         let half_m = std::f64::consts::PI * SEPARATION_M;
         let spin = BridgeCovariance::within(Wheels { left: -half_m, right: half_m }, wheel_var, SEPARATION_M);
         assert!((spin.along_var_m2 / (0.5e-6 / 2.0) - 1.0).abs() < 1e-12);
@@ -245,15 +255,17 @@ mod tests {
     fn the_series_and_the_closed_form_meet() {
         let below = tangent_variance_over_turn_squared(TANGENT_SERIES_BELOW_RAD * (1.0 - 1e-15));
         let above = tangent_variance_over_turn_squared(TANGENT_SERIES_BELOW_RAD);
-        // Cancellation of the closed form: ε/(θ⁴/720) relative, 2e-11 at 0.3 rad for `along`, ε/(θ²/12) for `across`.
+        // Cancellation of the closed form: ε/(θ⁴/720) relative, 2e-11 at 0.3 rad for `along`, ε/(θ²/12) for
+        // `across`.
         assert!((below.0 / above.0 - 1.0).abs() < 1e-10, "{below:?} {above:?}");
         assert!((below.1 / above.1 - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn many_noisy_small_steps_scatter_as_predicted() {
-        // 4000 runs of 200 steps each round a 1.5 rad arc; each variance has relative standard error √(2/4000) = 2.2 %; five of
-        // them for 3 numbers make a false positive of 2e-6. Leaving out the bridge is off by 25 %.
+        // 4000 runs of 200 steps each round a 1.5 rad arc; each variance has relative standard error
+        // √(2/4000) = 2.2 %; five of them for 3 numbers make a false positive of 2e-6. Leaving out the bridge
+        // is off by 25 %.
         let (runs, steps) = (4000_u32, 200_u32);
         let travel_m = Wheels { left: 0.7, right: 0.7 + 1.5 * SEPARATION_M };
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(7);

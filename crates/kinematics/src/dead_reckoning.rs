@@ -1,10 +1,11 @@
 //! Dead reckoning from cumulative wheel counts, online; `trajectory.rs` gives the same bits over a whole log.
 //!
-//! Position follows eq. (3), `x += ΔS cos(θ+Δθ/2)`, with the arc as the chord ([`Rule::Midpoint`], the paper) or the exact
-//! chord `ΔS·sinc(Δθ/2)` ([`Rule::ExactArc`]). Heading is *not* summed: it is a function of the counts since the start,
-//! `θ = θ₀ + (C_R N_R − C_L N_L)/B`, so ten million steps leave no rounding drift in it and steps do not wait for each other.
-//! Displacements are summed from nothing over 64 steps at a time, and what the sum of these sums drops is carried along: the place's error does not grow
-//! with the number of steps either. `whole_log.rs` does the same with columns.
+//! Position follows eq. (3), `x += ΔS cos(θ+Δθ/2)`, with the arc as the chord ([`Rule::Midpoint`], the paper)
+//! or the exact chord `ΔS·sinc(Δθ/2)` ([`Rule::ExactArc`]). Heading is *not* summed: it is a function of the
+//! counts since the start, `θ = θ₀ + (C_R N_R − C_L N_L)/B`, so ten million steps leave no rounding drift in
+//! it and steps do not wait for each other. Displacements are summed from nothing over 64 steps at a time,
+//! and what the sum of these sums drops is carried along: the place's error does not grow with the number of
+//! steps either. `whole_log.rs` does the same with columns.
 
 use crate::trig::{SHIFTER, along, step_sinc};
 use crate::{Pose, Wheels};
@@ -24,7 +25,8 @@ pub trait Count: Copy + Send + Sync {
     /// Does [`Self::column_since`] convert by bits, which gives nonsense beyond its range?
     const CONVERTS_BY_BITS: bool = false;
 
-    /// `self − earlier` as a real number. Integers subtract before they convert, so large counters lose nothing.
+    /// `self − earlier` as a real number. Integers subtract before they convert, so large counters lose
+    /// nothing.
     fn since(self, earlier: Self) -> f64;
 
     /// [`Self::since`] of a whole column, and whether the differences of these numbers are the steps between the readings, exactly.
@@ -61,7 +63,8 @@ impl Count for i64 {
         self.wrapping_sub(earlier) as f64
     }
 
-    /// Before AVX-512 no vector instruction makes doubles of 64-bit integers: the integer is added to the bits of 1.5·2⁵², and 1.5·2⁵² taken away.
+    /// Before AVX-512 no vector instruction makes doubles of 64-bit integers: the integer is added to the
+    /// bits of 1.5·2⁵², and 1.5·2⁵² taken away.
     #[inline(always)]
     fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
         let mut beyond = 0;
@@ -116,8 +119,9 @@ impl Odometry {
     }
 }
 
-/// Heading for the counts since the start: θ₀ + (C_R N_R − C_L N_L)/B, written so that only what the wheels differ by is rounded. The product of each wheel's
-/// own counts after 100 km is 3·10⁵ rad, whose last place is 6·10⁻¹¹ rad.
+/// Heading for the counts since the start: θ₀ + (C_R N_R − C_L N_L)/B, written so that only what the wheels
+/// differ by is rounded. The product of each wheel's own counts after 100 km is 3·10⁵ rad, whose last place
+/// is 6·10⁻¹¹ rad.
 #[inline(always)]
 pub(crate) fn heading_rad(start_rad: f64, rad_per_count: Wheels<f64>, left: f64, right: f64) -> f64 {
     start_rad + (rad_per_count.right * (right - left) + (rad_per_count.right - rad_per_count.left) * left)
@@ -126,7 +130,8 @@ pub(crate) fn heading_rad(start_rad: f64, rad_per_count: Wheels<f64>, left: f64,
 /// How many displacements are summed from nothing before they are added to the place.
 pub(crate) const GROUP: usize = 64;
 
-/// One coordinate of the robot's place, metres: where the group of steps began, what its sum dropped, and the group's own sum.
+/// One coordinate of the robot's place, metres: where the group of steps began, what its sum dropped, and the
+/// group's own sum.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CompensatedSum {
     pub(crate) anchor_m: f64,
@@ -256,7 +261,8 @@ mod tests {
 
     #[test]
     fn heading_does_not_drift_with_the_number_of_steps() {
-        // A million steps of 3 and 4 counts: the summed heading would carry ~1e6 roundings, the cumulative one carries one.
+        // A million steps of 3 and 4 counts: the summed heading would carry ~1e6 roundings, the cumulative
+        // one carries one.
         let odometry = yair(Rule::ExactArc);
         let n = 1_000_000_i64;
         let mut state = odometry.start(Pose::IDENTITY, Wheels::both(0_i64));

@@ -138,7 +138,8 @@ impl Increment {
         self.perturbed_arc(0.0, 0.0).pose()
     }
 
-    /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead along it and to its left, metres.
+    /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead
+    /// along it and to its left, metres.
     #[inline]
     #[must_use]
     pub fn perturbed_arc(self, along_m: f64, across_m: f64) -> Frame {

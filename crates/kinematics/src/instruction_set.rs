@@ -1,8 +1,9 @@
 //! Loops over columns compiled several times, and run by the widest vectors that the machine has.
 //!
-//! The library is built for any x86-64 (SSE2), or for whatever else it is built for; loops that stand to gain are compiled for AVX2 and AVX-512 as well. `pulp`
-//! asks the processor and holds the one unsafe call that this takes. No product and sum is fused in any of them, so that all give the same bits; a test forces
-//! each that the machine has.
+//! The library is built for any x86-64 (SSE2), or for whatever else it is built for; loops that stand to gain
+//! are compiled for AVX2 and AVX-512 as well. `pulp` asks the processor and holds the one unsafe call that
+//! this takes. No product and sum is fused in any of them, so that all give the same bits; a test forces each
+//! that the machine has.
 
 /// A set of vector instructions that loops are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,7 +17,8 @@ pub enum InstructionSet {
     Avx512,
 }
 
-/// A loop over columns. To be compiled for each instruction set `run` and all that it calls must be `#[inline(always)]`.
+/// A loop over columns. To be compiled for each instruction set `run` and all that it calls must be
+/// `#[inline(always)]`.
 pub trait Kernel {
     /// What the loop returns.
     type Output;

@@ -1,7 +1,8 @@
 //! Planar kinematics of a differential drive: poses, the drive geometry, dead reckoning and its covariance.
 //!
-//! Everything here is pure arithmetic on SI quantities in right-handed frames (x forward, y left, counter-clockwise
-//! positive; REP 103). Frames stand in names, so that products read like dominoes: `world_from_body * body_from_marker`.
+//! Everything here is pure arithmetic on SI quantities in right-handed frames (x forward, y left,
+//! counter-clockwise positive; REP 103). Frames stand in names, so that products read like dominoes:
+//! `world_from_body * body_from_marker`.
 //!
 //! | symbol of the paper | here |
 //! | --- | --- |
@@ -11,8 +12,8 @@
 //! | `S_L`, `S_R` | [`Wheels`] of metres |
 //! | eq. 3 | [`Rule::Midpoint`] |
 //!
-//! Source: Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial mediante la
-//! corrección de errores sistemáticos".
+//! Source: Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial
+//! mediante la corrección de errores sistemáticos".
 
 mod angle;
 mod covariance;

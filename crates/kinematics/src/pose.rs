@@ -31,8 +31,8 @@ impl Point {
 
 /// A planar rigid transform `a_from_b`: where frame `b` stands in frame `a`.
 ///
-/// `theta_rad` is *not* wrapped: a robot that has spun twice is at 4π, because whole turns carry information about
-/// the wheelbase. Use [`crate::wrap_to_pi`] to compare directions.
+/// `theta_rad` is *not* wrapped: a robot that has spun twice is at 4π, because whole turns carry information
+/// about the wheelbase. Use [`crate::wrap_to_pi`] to compare directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose {
     /// Position of b's origin along a's x axis, metres.
@@ -94,7 +94,8 @@ impl Mul<Point> for Pose {
     }
 }
 
-/// A pose `a_from_b` with the sine and cosine of its heading at hand: several products from the left cost one sine and cosine, and give the same bits as
+/// A pose `a_from_b` with the sine and cosine of its heading at hand: several products from the left cost one
+/// sine and cosine, and give the same bits as
 /// [`Pose`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -146,7 +147,8 @@ impl From<Pose> for Frame {
 impl Mul for Frame {
     type Output = Self;
 
-    /// `a_from_b * b_from_c = a_from_c`, sine and cosine by the addition theorem: each product adds a rounding of 2e-16 rad to them, where the product with a
+    /// `a_from_b * b_from_c = a_from_c`, sine and cosine by the addition theorem: each product adds a
+    /// rounding of 2e-16 rad to them, where the product with a
     /// [`Pose`] adds none and costs a sine and cosine.
     #[inline]
     fn mul(self, b_from_c: Self) -> Self {

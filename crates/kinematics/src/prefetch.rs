@@ -1,7 +1,9 @@
 //! Memory asked for before it is used.
 //!
-//! A processor that waits for memory does not compute, and it holds only so many unfinished stores: an ordinary store first reads the line it writes to. Lines asked for some groups
-//! of steps ahead are there when their turn comes. Nothing depends on it but time, and where a processor has no such instruction nothing is done.
+//! A processor that waits for memory does not compute, and it holds only so many unfinished stores: an
+//! ordinary store first reads the line it writes to. Lines asked for some groups of steps ahead are there
+//! when their turn comes. Nothing depends on it but time, and where a processor has no such instruction
+//! nothing is done.
 
 /// Bytes of a line of the caches.
 const LINE: usize = 64;

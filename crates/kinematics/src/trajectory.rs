@@ -72,8 +72,8 @@ impl Odometry {
         poses
     }
 
-    /// Calls `visit` with pose and covariance at every row of a log in order, storing nothing: each step an exact arc ([`OdometryCovariance::propagate`])
-    /// of wheels whose travel carries `noise`.
+    /// Calls `visit` with pose and covariance at every row of a log in order, storing nothing: each step an
+    /// exact arc ([`OdometryCovariance::propagate`]) of wheels whose travel carries `noise`.
     ///
     /// # Panics
     /// When the two columns differ in length.

@@ -1,13 +1,17 @@
-//! Sine, cosine and arctangent without calls and tables: what dead reckoning and the closed form spend their time on.
+//! Sine, cosine and arctangent without calls and tables: what dead reckoning and the closed form spend their
+//! time on.
 //!
-//! Arguments up to [`LARGEST_RAD`] are reduced by Cody & Waite (1980), multiples of π/2 in three parts whose first two multiply exactly; the rest goes
-//! through the minimax polynomials of fdlibm (Sun Microsystems 1993, `k_sin.c`, `k_cos.c`, `s_atan.c`), under 2⁻⁵⁸ off. Results are within 1.5 units of the
-//! last place, beyond the borders they are the C library's. [`Direction`] is what loops over columns take: no branch, a third fewer operations, true to 2⁻⁵¹ of
-//! the circle. Products and sums are rounded one by one, never fused, so that every instruction set, one argument or eight at a time, gives the same bits.
+//! Arguments up to [`LARGEST_RAD`] are reduced by Cody & Waite (1980), multiples of π/2 in three parts whose
+//! first two multiply exactly; the rest goes through the minimax polynomials of fdlibm (Sun Microsystems
+//! 1993, `k_sin.c`, `k_cos.c`, `s_atan.c`), under 2⁻⁵⁸ off. Results are within 1.5 units of the last place,
+//! beyond the borders they are the C library's. [`Direction`] is what loops over columns take: no branch, a
+//! third fewer operations, true to 2⁻⁵¹ of the circle. Products and sums are rounded one by one, never fused,
+//! so that every instruction set, one argument or eight at a time, gives the same bits.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_4};
 
-/// Up to here an argument is reduced in-house, radians: its multiple of π/2 is under 2²⁰, and 2²⁰ times a part of 33 bits is exact.
+/// Up to here an argument is reduced in-house, radians: its multiple of π/2 is under 2²⁰, and 2²⁰ times a
+/// part of 33 bits is exact.
 const LARGEST_RAD: f64 = 1e6;
 
 /// π/2 in three parts, the first two of 33 bits (fdlibm, `e_rem_pio2.c`).
@@ -19,7 +23,8 @@ pub(crate) const SHIFTER: f64 = 6_755_399_441_055_744.0;
 /// π in two parts, the first of 33 bits: twice those of [`HALF_PI`].
 const WHOLE_PI: [f64; 2] = [2.0 * HALF_PI[0], 2.0 * 6.077_100_506_506_192e-11];
 
-/// A [`Direction`] is found up to so many half turns, 1.6·10⁶ rad: times the first part of [`WHOLE_PI`] they are exact.
+/// A [`Direction`] is found up to so many half turns, 1.6·10⁶ rad: times the first part of [`WHOLE_PI`] they
+/// are exact.
 const MAX_HALF_TURNS: u64 = 1 << 19;
 
 /// 2 sin(x/2) = x + x³·(T₀ + T₁x² + …) up to π/2, by Remez' exchange to 6e-18 of the sine.
@@ -122,7 +127,8 @@ fn reduced(x: f64) -> (f64, f64) {
     let (coarse, fine) = (x - quarters * HALF_PI[0], quarters * HALF_PI[1]);
     let rest = coarse - fine;
     let (sin, cos) = small(rest + (((coarse - rest) - fine) - quarters * HALF_PI[2]));
-    // Odd quarters swap sine and cosine; the second and third turn the sine's sign, the first and second the cosine's.
+    // Odd quarters swap sine and cosine; the second and third turn the sine's sign, the first and second the
+    // cosine's.
     let (sin, cos) = (sin.to_bits(), cos.to_bits());
     let swap = (sin ^ cos) & (quarter & 1).wrapping_neg();
     let (sin_sign, cos_sign) = ((quarter & 2) << 62, (quarter.wrapping_add(1) & 2) << 62);
@@ -131,8 +137,9 @@ fn reduced(x: f64) -> (f64, f64) {
 
 /// Where an angle points: sine and cosine but for a sign that both have.
 ///
-/// Half turns are taken off, and sine and cosine of what is left come from those of its half, 2sc and 1 − 2s²: two polynomials do without the choice between
-/// them that quarters take. Errors are of the circle's radius, not of a sine next to zero.
+/// Half turns are taken off, and sine and cosine of what is left come from those of its half, 2sc and 1 −
+/// 2s²: two polynomials do without the choice between them that quarters take. Errors are of the circle's
+/// radius, not of a sine next to zero.
 #[derive(Clone, Copy)]
 pub(crate) struct Direction {
     sin: f64,
@@ -180,7 +187,8 @@ impl Direction {
     }
 }
 
-/// Way of some metres into the direction of any angle, along x and y, to the bits of [`Direction`] where there is one.
+/// Way of some metres into the direction of any angle, along x and y, to the bits of [`Direction`] where
+/// there is one.
 #[inline(always)]
 pub(crate) fn along(chord_rad: f64, chord_m: f64) -> [f64; 2] {
     let direction = Direction::of(chord_rad);
@@ -192,8 +200,8 @@ pub(crate) fn along(chord_rad: f64, chord_m: f64) -> [f64; 2] {
     }
 }
 
-/// The cardinal sine of a step's half turn, and what has the highest bit set where that is above ¼ rad. Loops collect the latter by `|`; where the angle is no
-/// number the bit may lack.
+/// The cardinal sine of a step's half turn, and what has the highest bit set where that is above ¼ rad. Loops
+/// collect the latter by `|`; where the angle is no number the bit may lack.
 #[inline(always)]
 pub(crate) fn short_sinc(half_rad: f64) -> (f64, u64) {
     let square = half_rad * half_rad;
@@ -238,7 +246,8 @@ pub(crate) fn sinc_given_sine(x: f64, sine: f64) -> f64 {
     if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sine / x }
 }
 
-/// Angle of the vector (x, y) from the x axis, radians in [−π, π]: [`f64::atan2`], faster where the angle is small.
+/// Angle of the vector (x, y) from the x axis, radians in [−π, π]: [`f64::atan2`], faster where the angle is
+/// small.
 #[inline]
 #[must_use]
 pub fn atan2(y: f64, x: f64) -> f64 {
@@ -271,8 +280,9 @@ mod tests {
         (0..=COUNT).map(move |k| largest * (f64::from(k) / f64::from(COUNT) * 1.999_999_7 - 1.0))
     }
 
-    /// Ours is within 1.5 units of the last place and theirs within 0.55 (glibc states as much): no more than two doubles apart. Rejects polynomials
-    /// that lack their last term, and a reduction by a π/2 of two parts (thousands of units next to a zero).
+    /// Ours is within 1.5 units of the last place and theirs within 0.55 (glibc states as much): no more than
+    /// two doubles apart. Rejects polynomials that lack their last term, and a reduction by a π/2 of two
+    /// parts (thousands of units next to a zero).
     #[test]
     fn sine_and_cosine_agree_with_the_c_library() {
         for largest in [1.0 / 32.0, FRAC_PI_4, 1.0, 10.0, 1e3, 1e5, LARGEST_RAD] {
@@ -301,8 +311,9 @@ mod tests {
         assert_eq!(sin_cos(1e300), 1e300_f64.sin_cos());
     }
 
-    /// Relative errors of the half angle's sine (2 roundings, 2.2e-16) and cosine (1.1e-16, and 0.9e-16 of the polynomial), and a rounding: 2⁻⁵¹ at most. Along
-    /// the direction and across it they must cancel to 1e-17, or 10⁵ m lose more than 1e-12 m. Rejects polynomials that lack their last term, and a π of one
+    /// Relative errors of the half angle's sine (2 roundings, 2.2e-16) and cosine (1.1e-16, and 0.9e-16 of
+    /// the polynomial), and a rounding: 2⁻⁵¹ at most. Along the direction and across it they must cancel to
+    /// 1e-17, or 10⁵ m lose more than 1e-12 m. Rejects polynomials that lack their last term, and a π of one
     /// part.
     #[test]
     fn a_direction_agrees_with_the_c_library() {
@@ -358,7 +369,8 @@ mod tests {
         }
     }
 
-    /// A unit and a half of rounding against half a unit, and the division's: three doubles. Rejects a polynomial that lacks its last term.
+    /// A unit and a half of rounding against half a unit, and the division's: three doubles. Rejects a
+    /// polynomial that lacks its last term.
     #[test]
     fn the_arctangent_agrees_with_the_c_library_all_round() {
         for angle in arguments(PI) {

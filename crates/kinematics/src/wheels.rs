@@ -1,4 +1,4 @@
-//! One value for each of the two wheels, told apart by name and never by position.
+//! One value for each of the two wheels, distinguished by name and never by position.
 
 use std::ops::{Index, IndexMut};
 

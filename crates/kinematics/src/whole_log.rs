@@ -1,7 +1,9 @@
-//! Dead reckoning over columns of counts: block by block, each stage a loop without branches over the block, so that a compiler makes vectors of it.
+//! Dead reckoning over columns of counts: block by block, each stage a loop without branches over the block,
+//! so that a compiler makes vectors of it.
 //!
-//! Headings follow from the counts since the start, chords from headings; neither waits for the step before it. What is left of the chain are the sums of
-//! displacements, and these start from nothing in every group of 64 steps, four groups at a time. The bits are those of
+//! Headings follow from the counts since the start, chords from headings; neither waits for the step before
+//! it. What is left of the chain are the sums of displacements, and these start from nothing in every group
+//! of 64 steps, four groups at a time. The bits are those of
 //! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
 //! turned in a step) goes through it instead.
 
@@ -17,7 +19,8 @@ const GROUPS: usize = 4;
 /// Steps of a block.
 pub(crate) const BLOCK: usize = GROUPS * GROUP;
 
-/// Steps ahead of those being written, and of those being read, whose memory is asked for; from two to eight groups cost the same within the noise of a log of 10⁷ steps.
+/// Steps ahead of those being written, and of those being read, whose memory is asked for; from two to eight
+/// groups cost the same within the noise of a log of 10⁷ steps.
 const WRITE_PREFETCH_STEPS: usize = 2 * GROUP;
 const READ_PREFETCH_STEPS: usize = BLOCK;
 
@@ -242,7 +245,8 @@ impl Columns {
         self.theta_rad.set_before(state.world_from_body.theta_rad);
     }
 
-    /// Displacement of every step of a group, the readings before it being `before`; false where a number is beyond the loops' range.
+    /// Displacement of every step of a group, the readings before it being `before`; false where a number is
+    /// beyond the loops' range.
     #[inline(always)]
     fn displace<C: Count>(
         &mut self,
@@ -283,8 +287,8 @@ impl Columns {
     }
 }
 
-/// Counts since the start and headings of a group; are the differences of those counts the steps between the readings? Columns are arguments of their own:
-/// compilers know of these that none overlaps another.
+/// Counts since the start and headings of a group; are the differences of those counts the steps between the
+/// readings? Columns are arguments of their own: compilers know of these that none overlaps another.
 #[inline(always)]
 fn since_start<C: Count>(
     state: &DeadReckoning<C>,
@@ -305,7 +309,8 @@ fn since_start<C: Count>(
     differences_are_steps
 }
 
-/// Displacements from headings and steps, which are the differences of `since` or stand in it; false where a number is beyond the loop's range.
+/// Displacements from headings and steps, which are the differences of `since` or stand in it; false where a
+/// number is beyond the loop's range.
 #[inline(always)]
 #[allow(clippy::needless_range_loop)] // one step of several columns; compilers make no vectors of it otherwise
 fn displace<const EXACT_ARC: bool, const DIFFERENCES: bool>(
@@ -387,8 +392,9 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
         }
     }
 
-    /// A block of which `used` steps are steps. Its displacements are found while the block before is placed and its poses are written, group by group: the
-    /// memory writes while the processor computes. `soon` are the counts whose memory is asked for meanwhile.
+    /// A block of which `used` steps are steps. Its displacements are found while the block before is placed
+    /// and its poses are written, group by group: the memory writes while the processor computes. `soon` are
+    /// the counts whose memory is asked for meanwhile.
     #[inline(always)]
     fn block(&mut self, columns: &mut Columns, (counts, soon): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
         let (mut before, mut is_within) = (self.state.counts, true);

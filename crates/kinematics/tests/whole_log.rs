@@ -1,4 +1,5 @@
-//! Whole logs: the bits of dead reckoning one step at a time, by every instruction set, and close to the truth after 10⁷ steps.
+//! Whole logs: the bits of dead reckoning one step at a time, by every instruction set, and close to the
+//! truth after 10⁷ steps.
 
 use kinematics::{Count, InstructionSet, Odometry, OdometryCovariance, Pose, Rule, WheelNoise, Wheels, sinc};
 use nalgebra::Matrix3;
@@ -83,7 +84,8 @@ fn every_instruction_set_gives_the_bits_of_one_step_after_the_other() {
     );
 }
 
-/// Blocks that the loops are not made for: a step of half a radian and more, headings of 10⁶ rad, counters that jump by 2⁵² or wrap, and no number at all.
+/// Blocks that the loops are not made for: a step of half a radian and more, headings of 10⁶ rad, counters
+/// that jump by 2⁵² or wrap, and no number at all.
 #[test]
 fn what_is_beyond_the_loops_range_goes_one_by_one() {
     let with = |row: usize, jump: i64| {
@@ -132,10 +134,12 @@ impl Sum {
     }
 }
 
-/// Ten million steps over 100 km of way, against headings and sums of 32 digits with the C library's sine of the leading 16 and its slope for the rest: what
-/// that leaves is 10⁷ independent roundings of a centimetre, 1e-2·1e-16·√1e7 = 3e-15 m. Ours rounds each displacement likewise; headings of up to 900 rad are
-/// rounded to 6e-14, which adds 1e-2·6e-14·√1e7 = 2e-12 m, and twice that before it is over; the place rounds once. Seen: 6e-12. The plain loop, which sums in
-/// doubles, fails; so did headings by each wheel's own product, by 2e-10 m.
+/// Ten million steps over 100 km of distance, against headings and sums of 32 digits with the C library's
+/// sine of the leading 16 and its slope for the rest: what that leaves is 10⁷ independent roundings of a
+/// centimetre, 1e-2·1e-16·√1e7 = 3e-15 m. Ours rounds each displacement likewise; headings of up to 900 rad
+/// are rounded to 6e-14, which adds 1e-2·6e-14·√1e7 = 2e-12 m, and twice that before it is over; the place
+/// rounds once. Seen: 6e-12. The plain loop, which sums in doubles, fails; so did headings by each wheel's
+/// own product, by 2e-10 m.
 #[test]
 fn ten_million_steps_end_within_1e_11_metres_of_the_truth() {
     let counts = wandering(10_000_001);
@@ -196,7 +200,8 @@ fn golden_bits_of_a_whole_log() {
     assert_eq!(digest.map(|digest| format!("{digest:016x}")), ["62ca77eb2efb2938", "512d524fccb51619"]);
 }
 
-/// Covariance along a log is that of its steps one by one, and of one long step where the robot keeps its curvature (to the rounding of 400 products).
+/// Covariance along a log is that of its steps one by one, and of one long step where the robot keeps its
+/// curvature (to the rounding of 400 products).
 #[test]
 fn covariance_along_a_log() {
     let column = |step: i64| -> Vec<i64> { (0..=400).map(|k| k * step).collect() };

@@ -1,7 +1,9 @@
-//! A term of the measurement model: what an unmodelled effect adds to the odometry or to what the instrument sees, as a function of recorded quantities.
+//! A term of the measurement model: what an unmodelled effect adds to the odometry or to what the instrument
+//! sees, as a function of recorded quantities.
 //!
-//! The trait lives here, below both the calibrators, whose likelihood consumes terms, and the effects, which implement them. A term sees what was
-//! recorded, the geometry in force and where the fit puts the robot; it cannot see what a simulator hid.
+//! The trait lives here, below both the calibrators, whose likelihood consumes terms, and the effects, which
+//! implement them. A term sees what was recorded, the geometry in force and where the fit puts the robot; it
+//! cannot see what a simulator hid.
 
 use kinematics::{Increment, Pose, Twist, Wheels};
 
@@ -14,7 +16,8 @@ pub struct Interval<'r> {
     pub t_s: f64,
     /// Length, seconds.
     pub dt_s: f64,
-    /// Start and end of the logged interval of which it is a part, or the whole: a measurement between two rows cuts it.
+    /// Start and end of the logged interval of which it is a part, or the whole: a measurement between two
+    /// rows cuts it.
     pub row_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
@@ -90,18 +93,22 @@ pub struct Measurement<'r> {
 /// A parameter of a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermParameter {
-    /// Its name, with the unit's suffix; the same as in the effect's simulation model where the two mean the same.
+    /// Its name, with the unit's suffix; the same as in the effect's simulation model where the two mean the
+    /// same.
     pub name: &'static str,
     /// Its unit, for people.
     pub unit: &'static str,
-    /// A size that would be large for a real robot: the standard deviation of what is plausible before any data.
+    /// A size that would be large for a real robot: the standard deviation of what is plausible before any
+    /// data.
     pub prior_sigma: f64,
 }
 
-/// A mean term, linear in its parameters: what an effect adds to the motion of an interval, or to what the instrument sees.
+/// A mean term, linear in its parameters: what an effect adds to the motion of an interval, or to what the
+/// instrument sees.
 ///
-/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets it. Intervals and measurements come in the order of time.
-/// Runs may go to copies of a term, at the same time.
+/// State along the run (a castor's angle, a backlash) is kept by the implementor; [`Self::restart`] forgets
+/// it. Intervals and measurements come in the order of time. Runs may go to copies of a term, at the same
+/// time.
 pub trait ModelTerm: CopyTerm + Send + Sync {
     /// The parameters in the order of the gradients.
     fn parameters(&self) -> &[TermParameter];
@@ -111,13 +118,15 @@ pub trait ModelTerm: CopyTerm + Send + Sync {
         let _ = run;
     }
 
-    /// Derivative of the interval's motion by each parameter, at zero size: along and across its middle's heading, and its turn (x, y, θ). `gradient` is as long as
+    /// Derivative of the interval's motion by each parameter, at zero size: along and across its middle's
+    /// heading, and its turn (x, y, θ). `gradient` is as long as
     /// [`Self::parameters`] and comes in as zeros.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let _ = (interval, gradient);
     }
 
-    /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each parameter, at zero size. `gradient` is as above.
+    /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each
+    /// parameter, at zero size. `gradient` is as above.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         let _ = (measurement, gradient);
     }

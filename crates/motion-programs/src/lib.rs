@@ -1,4 +1,5 @@
-//! Motion programs: what a protocol drives and when it measures, what that costs, and the trait of whatever can drive it.
+//! Motion programs: what a protocol drives and when it measures, what that costs, and the trait of whatever
+//! can drive it.
 
 mod cost;
 mod platform;

@@ -17,7 +17,8 @@ pub trait Platform {
     /// Precision of the outside instrument, where it is known.
     fn truth_noise(&self) -> TruthNoise;
 
-    /// Drives a program and writes what was measured into `run`, whose buffers are reused and whose old content is lost.
+    /// Drives a program and writes what was measured into `run`, whose buffers are reused and whose old
+    /// content is lost.
     ///
     /// # Errors
     /// The platform's own reasons; `run` is then not to be used.

@@ -1,7 +1,8 @@
 //! Motion programs: what a protocol drives and where it measures, in the robot's own nominal units.
 //!
-//! A program is commanded in what the robot believes: "0.5 m" is so many counts by its nominal wheels, "a quarter turn" so many by its
-//! nominal wheelbase. How far the robot really goes is what calibration is about.
+//! A program is commanded in what the robot believes: "0.5 m" is so many counts by its nominal wheels, "a
+//! quarter turn" so many by its nominal wheelbase. How far the robot really goes is what calibration is
+//! about.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -22,7 +23,8 @@ pub enum Motion {
         /// Signed turn, radians, counter-clockwise.
         turn_rad: f64,
     },
-    /// A circular arc of the centre. A robot whose wheel speeds lie on a lattice, as under an HCTL-1100, drives a radius that is a little off.
+    /// A circular arc of the centre. A robot whose wheel speeds lie on a lattice, as under an HCTL-1100,
+    /// drives a radius that is a little off.
     Arc {
         /// Radius of the centre's path, metres, positive.
         radius_m: f64,
@@ -69,15 +71,17 @@ pub enum Schedule {
         /// How many.
         runs: u32,
     },
-    /// UMBmark squares, alternately clockwise and counter-clockwise (Borenstein & Feng 1995: five each way).
+    /// UMBmark squares, alternately clockwise and counter-clockwise (Borenstein & Feng 1995: five in each
+    /// direction).
     Squares {
         /// Nominal side, metres.
         side_m: f64,
         /// How many in each direction.
         runs_each_way: u32,
     },
-    /// Circles of the bidirectional circular path test, alternately clockwise and counter-clockwise (Abbas 2006). The robot stands and is read every half
-    /// turn or sooner: a reading across a circle shows its diameter, one that closes it shows nothing.
+    /// Circles of the bidirectional circular path test, alternately clockwise and counter-clockwise (Abbas
+    /// 2006). The robot stands and is read every half turn or sooner: a reading across a circle shows its
+    /// diameter, one that closes it shows nothing.
     Circles {
         /// Nominal radius of the centre's path, metres.
         radius_m: f64,
@@ -87,7 +91,8 @@ pub enum Schedule {
         /// How many in each direction.
         runs_each_way: u32,
     },
-    /// The paper's validation path: nine straight legs joined by eight quarter turns on the spot, read at even steps.
+    /// The paper's validation path: nine straight legs joined by eight quarter turns on the spot, read at
+    /// even steps.
     ValidationPath {
         /// Length of the whole path, metres (the paper: about 40).
         length_m: f64,
@@ -183,8 +188,8 @@ fn circle(run: u32, radius_m: f64, turns: f64, clockwise: bool) -> MotionProgram
     program(protocol.name(), run, protocol, settings, motions)
 }
 
-/// A corridor loop: two rounds of a rectangle would close; this walks nine legs, four turns left and four right, as the paper's figure 7
-/// does not say which.
+/// A corridor loop: two rounds of a rectangle would close; this walks nine legs, four turns left and four
+/// right, as the paper's figure 7 does not say which.
 fn validation_path(run: u32, length_m: f64, measure_every_m: f64) -> MotionProgram {
     let steps = (length_m / measure_every_m).round().max(1.0) as usize;
     let mut motions = Vec::with_capacity(2 * steps + VALIDATION_LEGS);

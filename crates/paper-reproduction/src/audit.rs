@@ -1,4 +1,5 @@
-//! Where the paper contradicts itself: each contradiction derived here, not quoted, with its size in the units that make it one.
+//! Where the paper contradicts itself: each contradiction derived here, not quoted, with its size in the
+//! units that make it one.
 
 use calib::Method;
 use calib::methods::umbmark::{Form, Umbmark};
@@ -123,7 +124,8 @@ fn umbmark_ratio(table_2: &Table2) -> Finding {
     let relative_var =
         |shape: super::shape::SampleShape| shape.variance / shape.count as f64 / (shape.mean * shape.mean);
     let error = (relative_var(TABLE_1.left) + relative_var(TABLE_1.right)).sqrt();
-    // UMBmark's own scatter, from the simulation of table 2: the ratio moves by twice a sensitivity's error, the mean being kept.
+    // UMBmark's own scatter, from the simulation of table 2: the ratio moves by twice a sensitivity's error,
+    // the mean being kept.
     let own = table_2.cell("umbmark", "C_L").map_or(0.0, |cell| 2.0 * cell.sigma);
     Finding {
         id: "wheel_ratio_of_umbmark",

@@ -1,8 +1,10 @@
-//! What could reconcile the paper's numbers: model extensions fitted to all of them, and the one measurement that would tell them apart.
+//! What could reconcile the paper's numbers: model extensions fitted to all of them, and the one measurement
+//! that would discriminate them.
 //!
-//! The five numbers are C_L, C_R and B by the direct method, and UMBmark's wheel ratio and wheelbase. Each extension has the drive's three parameters and at
-//! most one size of its own; all are fitted by weighted least squares to noise-free simulations of both protocols, in which the extension acts as a
-//! physical effect. Nothing here is in the catalogue of effects: these are guesses about one robot's printed numbers.
+//! The five numbers are C_L, C_R and B by the direct method, and UMBmark's wheel ratio and wheelbase. Each
+//! extension has the drive's three parameters and at most one size of its own; all are fitted by weighted
+//! least squares to noise-free simulations of both protocols, in which the extension acts as a physical
+//! effect. Nothing here is in the catalogue of effects: these are guesses about one robot's printed numbers.
 
 use calib::methods::direct::Direct;
 use calib::methods::umbmark::Umbmark;
@@ -25,7 +27,7 @@ const NUMBERS: usize = 5;
 /// Drive parameters and one size.
 const MAX_PARAMETERS: usize = 4;
 
-/// Two extensions whose misfits differ by less cannot be told apart: a likelihood ratio of 20.
+/// Two extensions whose misfits differ by less cannot be discriminated: a likelihood ratio of 20.
 const DISCRIMINATION_LEVEL: f64 = 6.0;
 
 /// A guess at what the model lacks.
@@ -164,7 +166,8 @@ pub struct Causes {
     pub sigma: [f64; NUMBERS],
     /// Each extension, fitted.
     pub fitted: Vec<Fitted>,
-    /// Extensions whose misfit is within a likelihood ratio of 20 of the best: the published numbers cannot tell these apart.
+    /// Extensions whose misfit is within a likelihood ratio of 20 of the best: the published numbers cannot
+    /// discriminate these.
     #[serde(rename = "not_told_apart")]
     pub not_discriminated: Vec<Extension>,
     /// Further measurements on the robot, the one that tells most first.
@@ -186,7 +189,8 @@ pub enum CauseError {
     Calibration(#[from] CalibError),
 }
 
-/// A turn on the spot of less travel a wheel is a corner: a quarter turn takes 285 mm, a whole one 1140 mm, at 80 counts a millimetre.
+/// A turn on the spot of less travel a wheel is a corner: a quarter turn takes 285 mm, a whole one 1140 mm,
+/// at 80 counts a millimetre.
 const CORNER_BELOW_COUNTS: f64 = 80.0 * 570.0;
 
 /// The extension at work. Sizes are small against the travels they change.
@@ -307,14 +311,16 @@ fn published(table_2: &Table2) -> ([f64; NUMBERS], [f64; NUMBERS]) {
             of_mean(TABLE_1.left),
             of_mean(TABLE_1.right),
             simulated("direct", "B").hypot(rounding(TABLE_2_DIRECT.base.half_digit)),
-            // The ratio moves by twice a sensitivity's error, the mean being kept; both sensitivities are rounded.
+            // The ratio moves by twice a sensitivity's error, the mean being kept; both sensitivities are
+            // rounded.
             (2.0 * simulated("umbmark", "C_L")).hypot(2_f64.sqrt() * rounding(umbmark.left.half_digit)),
             simulated("umbmark", "B").hypot(rounding(TABLE_2_UMBMARK.base.half_digit)),
         ],
     )
 }
 
-/// Singular values below this share of the largest are rounding of the numeric derivatives (a simulated metre carries 1e-16, a step 1e-5).
+/// Singular values below this share of the largest are rounding of the numeric derivatives (a simulated metre
+/// carries 1e-16, a step 1e-5).
 const WITHOUT_INFLUENCE: f64 = 1e-6;
 
 /// Gauss–Newton steps of the fits; the predictions are nearly linear and five are ample.
@@ -328,7 +334,8 @@ fn fit(
 ) -> Result<Fitted, CauseError> {
     let words = extension.words();
     let parameters = if extension.has_size() { MAX_PARAMETERS } else { MAX_PARAMETERS - 1 };
-    // Steps of the numeric derivatives, small against the sizes that matter and large against rounding; in these units the problem is well scaled.
+    // Steps of the numeric derivatives, small against the sizes that matter and large against rounding; in
+    // these units the problem is well scaled.
     let step = [1e-5, 1e-5, 1e-2, 1e-5];
     let mut at = SVector::from([TABLE_1.left.mean, TABLE_1.right.mean, TABLE_2_DIRECT.base.value, 0.0]);
     let residual = |predicted: &SVector<f64, NUMBERS>| {
@@ -368,7 +375,7 @@ fn fit(
     })
 }
 
-/// Fits every extension and looks for the measurement that tells them apart.
+/// Fits every extension and looks for the measurement that discriminates them.
 ///
 /// # Errors
 /// [`CauseError`] when a simulation or a calibration of one fails.
@@ -419,7 +426,8 @@ struct Candidate {
     measure: fn(&Scenario, &Fitted) -> Result<f64, CauseError>,
 }
 
-/// Measurements that could be made on the floor grid. Their errors are those of reading two marks at both ends.
+/// Measurements that could be made on the floor grid. Their errors are those of reading two marks at both
+/// ends.
 fn candidates(base: &Scenario, reading_sigma_m: f64) -> Vec<Candidate> {
     let width_m = base.robot.points.iter().map(|mark| mark.y_m).fold(0.0, |width: f64, y_m| width + y_m.abs());
     let turn_sigma_rad = 2.0 * reading_sigma_m / width_m;

@@ -1,7 +1,8 @@
 //! What the paper's figures 4, 6 and 7 show, from simulation: numbers only, drawn elsewhere.
 //!
-//! Figure 4: the contacts of a robot that spins on unequal wheels keep one locus while its centre goes round. Figure 6: the sensitivities of one
-//! experiment. Figure 7: the 40 m path with eight quarter turns, read every 0.5 m, under both calibrations, and the claim that the error stays below 10 %.
+//! Figure 4: the contacts of a robot that spins on unequal wheels keep one locus while its centre goes round.
+//! Figure 6: the sensitivities of one experiment. Figure 7: the 40 m path with eight quarter turns, read
+//! every 0.5 m, under both calibrations, and the claim that the error stays below 10 %.
 
 use calib::Method;
 use calib::methods::direct::Direct;
@@ -56,9 +57,11 @@ pub struct PathErrors {
     pub low_m: Vec<f64>,
     /// 97.5 percentile of the position error at each reading, metres.
     pub high_m: Vec<f64>,
-    /// Share of the experiments whose error stays below 10 % of the distance at every reading from the first metre on.
+    /// Share of the experiments whose error stays below 10 % of the distance at every reading from the first
+    /// metre on.
     pub below_ten_percent: f64,
-    /// 95 % interval of that share (Wilson 1927), which does not shrink to nothing when all experiments agree.
+    /// 95 % interval of that share (Wilson 1927), which does not shrink to nothing when all experiments
+    /// agree.
     pub below_ten_percent_interval: [f64; 2],
 }
 
@@ -110,10 +113,11 @@ struct Walk {
 /// Points in the plane, metres.
 type Path = Vec<[f64; 2]>;
 
-/// The path as it was read, and as each set of parameters reckons it.
+/// The path as it was read, and as dead reckoning with each set of parameters has it.
 type Paths = (Path, [Path; PARAMETERS.len()]);
 
-/// Parameters that the path is reckoned with: each method's own estimates in the same experiment, and what the paper prints in table 2.
+/// Parameters that dead reckoning uses: each method's own estimates in the same experiment, and what the
+/// paper prints in table 2.
 const PARAMETERS: [&str; 4] = ["direct", "umbmark", "direct, published", "umbmark, published"];
 
 /// The drive that a column of table 2 means to a robot that believes in 1 mm/pulse.
@@ -127,7 +131,8 @@ fn published_drive(column: &Column, nominal: &DriveGeometry) -> Result<DriveGeom
 /// Trials that one task drives.
 const TRIALS_PER_TASK: u64 = 25;
 
-/// Distance from which the relative error is judged: at the first readings a millimetre of reading error is a large share of nothing.
+/// Distance from which the relative error is judged: at the first readings a millimetre of reading error is a
+/// large share of nothing.
 const JUDGED_FROM_M: f64 = 1.0;
 
 /// Length of the path and distance between readings.

@@ -1,7 +1,7 @@
 //! The paper reproduced: its tables from simulation, beside the published values.
 //!
-//! This is the first case of measured data against a simulation. The data are the paper's own printed numbers; its raw data are not available, and what
-//! the printed numbers cannot tell is said.
+//! This is the first case of measured data against a simulation. The data are the paper's own printed
+//! numbers; its raw data are not available, and what the printed numbers cannot tell is said.
 
 pub mod audit;
 pub mod cause;
@@ -75,8 +75,8 @@ pub const fn total_trials(trials: u64) -> u64 {
     (Hypothesis::ALL.len() as u64 + 2) * trials
 }
 
-/// Repeats the paper's experiments `trials` times each and holds them against what it prints; `seed` takes the place of the shipped scenario's, `progress`
-/// is told of experiments done.
+/// Repeats the paper's experiments `trials` times each and holds them against what it prints; `seed` takes
+/// the place of the shipped scenario's, `progress` is told of experiments done.
 ///
 /// # Errors
 /// [`PaperError`] when the experiments cannot be simulated.

@@ -10,7 +10,8 @@ use super::table_1::{Hypothesis, Row, Table1};
 /// A share of the experiments that is all of them but for a few.
 const ALMOST_ALWAYS: f64 = 0.999;
 
-/// A difference in log likelihood under which hypotheses cannot be told apart: a likelihood ratio of about 20, as discovery by alias groups uses.
+/// A difference in log likelihood under which hypotheses cannot be discriminated: a likelihood ratio of about
+/// 20, as discovery by alias groups uses.
 const DISCRIMINATION_LEVEL: f64 = 3.0;
 
 impl Reproduction {

@@ -1,6 +1,7 @@
 //! What the paper prints: tables 1 and 2. The raw data behind them are not available.
 //!
-//! Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial mediante la corrección de errores sistemáticos".
+//! Navarro, Benet, Ríos, Bueno, "Mejoras en la localización odométrica de un robot diferencial mediante la
+//! corrección de errores sistemáticos".
 
 use kinematics::Wheels;
 

@@ -44,8 +44,8 @@ pub const ROWS: [StatisticRow; 9] = [
 impl SampleShape {
     /// The shape of a sample of at least four values; `None` for fewer, or when all are equal.
     ///
-    /// Skewness and kurtosis are the bias-corrected G₁ and G₂ (Joanes & Gill 1998) that statistics packages print, divided by the standard errors
-    /// √(6/n) and √(24/n) of a large normal sample.
+    /// Skewness and kurtosis are the bias-corrected G₁ and G₂ (Joanes & Gill 1998) that statistics packages
+    /// print, divided by the standard errors √(6/n) and √(24/n) of a large normal sample.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();

@@ -1,9 +1,10 @@
 //! Table 1 from simulation, under three hypotheses about where its scatter comes from.
 //!
-//! The straight-run experiment is repeated many times; every statistic of the table gets its simulated distribution and the published value its place in it.
-//! Each hypothesis has one free size, set so that its mean variance is the published one (the mean of both wheels). What is left to tell the hypotheses
-//! apart is the *shape* of the samples, by a synthetic likelihood (Wood 2010): the simulated mean and covariance of the shape statistics make a normal
-//! density, which is read at the published values.
+//! The straight-run experiment is repeated many times; every statistic of the table gets its simulated
+//! distribution and the published value its place in it. Each hypothesis has one free size, set so that its
+//! mean variance is the published one (the mean of both wheels). What is left to tell the hypotheses apart is
+//! the *shape* of the samples, by a synthetic likelihood (Wood 2010): the simulated mean and covariance of
+//! the shape statistics make a normal density, which is read at the published values.
 
 use calib::methods::direct::{Direct, RunValue};
 use dataset::{Protocol, ProtocolSettings};
@@ -79,10 +80,12 @@ pub struct Table1 {
     pub below_best: f64,
 }
 
-/// Length of a straight run as it is commanded: 500 mm on the floor are about 484 nominal millimetres to this robot.
+/// Length of a straight run as it is commanded: 500 mm on the floor are about 484 nominal millimetres to this
+/// robot.
 const COMMANDED_M: f64 = 0.5 / 1.0328;
 
-/// Commanded lengths step through a millimetre by the golden section, so that runs do not all end at the same fraction of a pulse.
+/// Commanded lengths step through a millimetre by the golden section, so that runs do not all end at the same
+/// fraction of a pulse.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Trials from which a hypothesis' size is found, at each of two sizes.
@@ -213,7 +216,8 @@ pub fn sample(
     Experiment::new(&scenario(base, hypothesis, reading_sigma_m, 0.0))?.sensitivities(TRIALS_TO_FIT)
 }
 
-/// The sizes at which a hypothesis has the published variance, the mean of both wheels; variances add, so two simulations say where.
+/// The sizes at which a hypothesis has the published variance, the mean of both wheels; variances add, so two
+/// simulations say where.
 fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), SimulationError> {
     let published = 0.5 * (TABLE_1.left.variance + TABLE_1.right.variance);
     let mean_c = 0.5 * (TABLE_1.left.mean + TABLE_1.right.mean);
@@ -225,7 +229,8 @@ fn fitted_sizes(base: &Scenario, hypothesis: Hypothesis) -> Result<(f64, f64), S
     if hypothesis == Hypothesis::Wheels {
         return Ok((0.0, published.sqrt() / mean_c));
     }
-    // Reading errors: from rounding alone to a millimetre of reading error the variance grows by a known multiple of σ².
+    // Reading errors: from rounding alone to a millimetre of reading error the variance grows by a known
+    // multiple of σ².
     let (none, some) = (variance(0.0, 0.0)?, variance(1e-3, 0.0)?);
     let left_to_explain = (published - none).max(0.0);
     let share = if hypothesis == Hypothesis::Both { 0.5 } else { 1.0 };
@@ -256,8 +261,8 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[low] + position.fract() * (sorted[high] - sorted[low])
 }
 
-/// What of a shape can tell hypotheses apart once location and scale are fitted: the spread of both wheels, the extremes in standard deviations, and the
-/// standardized moments.
+/// What of a shape can discriminate hypotheses once location and scale are fitted: the spread of both wheels,
+/// the extremes in standard deviations, and the standardized moments.
 fn features(shape: &Wheels<SampleShape>) -> Vec<f64> {
     Side::BOTH
         .iter()

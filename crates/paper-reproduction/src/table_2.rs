@@ -1,7 +1,9 @@
-//! Table 2 from simulation: what both methods find on the robot that the direct column describes, beside the published values.
+//! Table 2 from simulation: what both methods find on the robot that the direct column describes, beside the
+//! published values.
 //!
-//! The simulated robot has table 1's sensitivities and a wheelbase of 363 mm that scatters by 1 mm from motion to motion; it is measured as the
-//! measuring hypothesis of table 1 says. The published UMBmark column is what this model does *not* predict.
+//! The simulated robot has table 1's sensitivities and a wheelbase of 363 mm that scatters by 1 mm from
+//! motion to motion; it is measured as the measuring hypothesis of table 1 says. The published UMBmark column
+//! is what this model does *not* predict.
 
 use calib::methods::direct::Direct;
 use calib::methods::umbmark::Umbmark;
@@ -33,9 +35,11 @@ pub struct Cell {
     pub percentiles: [f64; 3],
     /// Simulated standard deviation of the estimate.
     pub sigma: f64,
-    /// Simulated standard deviation of the single runs' values, for the direct method: what the paper's σ may be.
+    /// Simulated standard deviation of the single runs' values, for the direct method: what the paper's σ may
+    /// be.
     pub single_sigma: Option<f64>,
-    /// Published minus simulated mean, in simulated standard deviations joined with the rounding of the print (half a digit over √3).
+    /// Published minus simulated mean, in simulated standard deviations joined with the rounding of the print
+    /// (half a digit over √3).
     pub away: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Writes one figure of each kind into the folder given as argument: `cargo run -p report --example gallery -- FOLDER`.
+//! Writes one figure of each kind into the folder given as argument: `cargo run -p report --example gallery
+//! -- FOLDER`.
 //!
 //! The numbers are made up by closed formulas, so that the pictures are always the same.
 
@@ -208,7 +209,8 @@ fn residuals() -> Figure {
         .panel(panel)
 }
 
-/// Everything that could collide: three columns, long texts, close references, tiny and huge numbers, points beyond a fixed range.
+/// Everything that could collide: three columns, long texts, close references, tiny and huge numbers, points
+/// beyond a fixed range.
 fn crowded() -> Figure {
     let waves = |number: usize, scale: f64| {
         (0..number).map(move |s| {

@@ -4,7 +4,8 @@
 pub(crate) const LARGEST: f64 = 1e100;
 /// Free space between the outermost value and the frame, as a part of what the values span.
 const PADDING: f64 = 0.05;
-/// Values that differ relatively by less are drawn as one: ticks between them would need more digits than a number has.
+/// Values that differ relatively by less are drawn as one: ticks between them would need more digits than a
+/// number has.
 const MIN_RELATIVE_SPAN: f64 = 1e-9;
 
 /// How values are spread along an axis.
@@ -70,8 +71,8 @@ impl Axis {
         self
     }
 
-    /// A value that [`Range::Auto`] shows besides the series'. Where it is the outermost one the axis ends with it: `.include(0.0)` makes an axis of
-    /// standard deviations begin at zero.
+    /// A value that [`Range::Auto`] shows besides the series'. Where it is the outermost one the axis ends
+    /// with it: `.include(0.0)` makes an axis of standard deviations begin at zero.
     pub fn include(mut self, value: f64) -> Self {
         self.included.push(value);
         self

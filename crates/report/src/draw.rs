@@ -106,7 +106,8 @@ fn panel_group(panel: &Panel, place: &PanelLayout, styles: &Styles, font: &Font)
     }
 }
 
-/// A view of the page that ends at the frame. (A clip path would need an id, and ids of two figures on one page clash.)
+/// A view of the page that ends at the frame. (A clip path would need an id, and ids of two figures on one
+/// page clash.)
 fn clip(rect: &Rect) -> SVG {
     let [x, y, w, h] = [rect.x, rect.y, rect.w, rect.h].map(number);
     let view = format!("{x} {y} {w} {h}");

@@ -1,4 +1,5 @@
-//! Why a figure cannot be drawn or written: each error names the figure, and the panel and series where there is one.
+//! Why a figure cannot be drawn or written: each error names the figure, and the panel and series where there
+//! is one.
 
 use std::path::PathBuf;
 

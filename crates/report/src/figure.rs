@@ -38,7 +38,8 @@ impl Figure {
         Self { title: title.to_owned(), caption: String::new(), columns: 1, panels: Vec::new() }
     }
 
-    /// The text below the panels: what makes the figure reproducible, say scenario, seed and number of trials.
+    /// The text below the panels: what makes the figure reproducible, say scenario, seed and number of
+    /// trials.
     pub fn caption(mut self, caption: &str) -> Self {
         caption.clone_into(&mut self.caption);
         self

@@ -36,7 +36,8 @@ impl Font {
         }
     }
 
-    /// The width of a text, the sum of its characters' advances (kerning makes it at most narrower by a pixel or two).
+    /// The width of a text, the sum of its characters' advances (kerning makes it at most narrower by a pixel
+    /// or two).
     pub(crate) fn width_px(&self, text: &str, size_px: f64, weight: Weight) -> f64 {
         let face = self.face(weight);
         let (map, metrics) =
@@ -78,7 +79,8 @@ impl Font {
 mod tests {
     use super::*;
 
-    /// Advances of DejaVu Sans 2.37 in 1/2048 em (its `hmtx` table): A 1401, i 569. A fallback width of one em would be 2 × 20.48 px.
+    /// Advances of DejaVu Sans 2.37 in 1/2048 em (its `hmtx` table): A 1401, i 569. A fallback width of one
+    /// em would be 2 × 20.48 px.
     #[test]
     fn golden_widths_of_the_embedded_font() {
         let font = Font::embedded();

@@ -1,5 +1,6 @@
-//! Where everything of a figure stands. Frames of one figure are equally wide, and a legend below a panel makes the figure higher, not the frame
-//! smaller; what a frame shows therefore does not depend on where its legend found room.
+//! Where everything of a figure stands. Frames of one figure are equally wide, and a legend below a panel
+//! makes the figure higher, not the frame smaller; what a frame shows therefore does not depend on where its
+//! legend found room.
 
 use crate::axis::Range;
 use crate::figure::{Figure, WIDTH_PX};
@@ -117,8 +118,8 @@ fn frame_width(margins: &[(f64, f64)], room: f64) -> f64 {
     ((room - gaps - taken) / margins.len() as f64).max(MIN_WIDTH_PX)
 }
 
-/// What the widest labels of each column need left and right of its frames. Wider margins mean narrower frames and other ticks; they only grow, so
-/// this ends.
+/// What the widest labels of each column need left and right of its frames. Wider margins mean narrower
+/// frames and other ticks; they only grow, so this ends.
 fn margins(figure: &Figure, font: &Font, columns: usize, room: f64) -> Vec<(f64, f64)> {
     let width = |text: &str, size_px| font.width_px(text, size_px, Weight::Regular);
     let mut margins = vec![(0.0_f64, 0.0_f64); columns];

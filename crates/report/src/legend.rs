@@ -40,7 +40,8 @@ pub(crate) struct Legend {
 }
 
 impl Legend {
-    /// The legend of a panel, or none if it shall have none. Inside the frame where no data are; else below, in rows of at most `room_px`.
+    /// The legend of a panel, or none if it shall have none. Inside the frame where no data are; else below,
+    /// in rows of at most `room_px`.
     pub(crate) fn of(panel: &Panel, frame: &Frame, font: &Font, room_px: f64) -> Option<Self> {
         let mut entries: Vec<Entry> = Vec::new();
         for (index, series) in panel.series.iter().enumerate().filter(|(_, series)| !series.is_reference()) {

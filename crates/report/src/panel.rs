@@ -4,7 +4,8 @@ use crate::axis::{Axis, Scale, Span};
 use crate::error::{Place, ReportError};
 use crate::series::{Along, Series};
 
-/// Two axes with series. Bands and bars are drawn first, then references and lines, then points; in each of these groups in the given order.
+/// Two axes with series. Bands and bars are drawn first, then references and lines, then points; in each of
+/// these groups in the given order.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
 pub struct Panel {
@@ -17,7 +18,8 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// A panel without series yet, with a legend. An empty title takes no space if all titles of the row are empty.
+    /// A panel without series yet, with a legend. An empty title takes no space if all titles of the row are
+    /// empty.
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
         Self { title: title.to_owned(), x, y, series: Vec::new(), equal_aspect: false, legend: true }
     }
@@ -28,7 +30,8 @@ impl Panel {
         self
     }
 
-    /// One unit of x as long as one of y: for paths in the plane. Automatic ranges give way; between fixed ones the frame does.
+    /// One unit of x as long as one of y: for paths in the plane. Automatic ranges give way; between fixed
+    /// ones the frame does.
     pub fn equal_aspect(mut self) -> Self {
         self.equal_aspect = true;
         self

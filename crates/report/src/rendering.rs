@@ -17,7 +17,8 @@ const MIN_PNG_SCALE: f64 = 0.1;
 const MAX_PNG_SCALE: f64 = 10.0;
 
 impl Figure {
-    /// The drawing as an SVG document, [`WIDTH_PX`](crate::WIDTH_PX) wide. Its texts are text: a browser shows them in DejaVu Sans or a font that is no wider.
+    /// The drawing as an SVG document, [`WIDTH_PX`](crate::WIDTH_PX) wide. Its texts are text: a browser
+    /// shows them in DejaVu Sans or a font that is no wider.
     ///
     /// # Errors
     /// [`ReportError::NoPanels`], [`ReportError::Columns`] and [`ReportError::NoGlyph`] of the figure; [`ReportError::NoSeries`],
@@ -33,7 +34,8 @@ impl Figure {
     /// The drawing as a PNG of `scale` pixels per SVG pixel, 0.1 to 10.
     ///
     /// # Errors
-    /// As [`Figure::to_svg`]; [`ReportError::PngScale`] for another scale, [`ReportError::Raster`] if the SVG cannot be rasterised.
+    /// As [`Figure::to_svg`]; [`ReportError::PngScale`] for another scale, [`ReportError::Raster`] if the SVG
+    /// cannot be rasterised.
     pub fn to_png(&self, scale: f64) -> Result<Vec<u8>, ReportError> {
         self.rasterise(&self.to_svg()?, scale)
     }
@@ -56,10 +58,12 @@ impl Figure {
         pixmap.encode_png().map_err(|error| failed(error.to_string()))
     }
 
-    /// Writes `stem.svg` and `stem.png` (1800 px wide) into `dir`, each in one piece, and returns their paths. The folder is made if it is not there.
+    /// Writes `stem.svg` and `stem.png` (1800 px wide) into `dir`, each in one piece, and returns their
+    /// paths. The folder is made if it is not there.
     ///
     /// # Errors
-    /// As [`Figure::to_png`]; [`ReportError::Write`] with the file and the system's reason, a file that was there before is then unharmed.
+    /// As [`Figure::to_png`]; [`ReportError::Write`] with the file and the system's reason, a file that was
+    /// there before is then unharmed.
     pub fn write(&self, dir: &Path, stem: &str) -> Result<[PathBuf; 2], ReportError> {
         let svg = self.to_svg()?;
         let png = self.rasterise(&svg, PNG_SCALE)?;

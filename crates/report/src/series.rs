@@ -52,7 +52,8 @@ pub enum Marks {
     Points {
         /// The points (x, y).
         points: Vec<(f64, f64)>,
-        /// Half the height of each point's error bar, not negative. On a logarithmic axis a bar that reaches zero ends at the frame.
+        /// Half the height of each point's error bar, not negative. On a logarithmic axis a bar that reaches
+        /// zero ends at the frame.
         y_error: Option<Vec<f64>>,
     },
     /// The area between two curves.
@@ -83,8 +84,8 @@ pub enum Marks {
     },
 }
 
-/// Marks with a name. Series of one name share colour, line style and marker throughout a figure, and in a panel one entry of the legend: so a band and
-/// the line within it are named once.
+/// Marks with a name. Series of one name share colour, line style and marker throughout a figure, and in a
+/// panel one entry of the legend: so a band and the line within it are named once.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
 pub struct Series {

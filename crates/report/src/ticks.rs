@@ -1,4 +1,5 @@
-//! Ticks: round values (1, 2 or 5 times a power of ten) whose labels do not touch, written without rounding error.
+//! Ticks: round values (1, 2 or 5 times a power of ten) whose labels do not touch, written without rounding
+//! error.
 
 use crate::axis::{Scale, Span};
 
@@ -15,7 +16,8 @@ const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 /// More ticks fit on no axis.
 const MAX_TICKS: i64 = 200;
 
-/// The densest ticks of which neighbouring labels `fit`: it is asked with two labels and the distance between them as a part of the axis.
+/// The densest ticks of which neighbouring labels `fit`: it is asked with two labels and the distance between
+/// them as a part of the axis.
 pub(crate) fn ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Vec<Tick> {
     if span.scale == Scale::Log
         && let Some(found) = log_ticks(span, fit)
@@ -83,7 +85,8 @@ fn multiples(span: &Span, digit: i64, exponent: i32) -> Option<Vec<Tick>> {
     Some(numbers.iter().map(|&n| Tick { value: value(n), label: Some(label(n)) }).collect())
 }
 
-/// Ticks at powers of ten, and between them while there is room; none if the span has fewer than two such labels.
+/// Ticks at powers of ten, and between them while there is room; none if the span has fewer than two such
+/// labels.
 fn log_ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Option<Vec<Tick>> {
     let (first, last) = (span.low.log10().floor() as i32, span.high.log10().ceil() as i32);
     let plain = (first..last).all(|exponent| PLAIN.contains(&exponent));

@@ -1,5 +1,5 @@
-//! What a figure's SVG and PNG contain, and what is refused. Rejected when tried: an inverted y axis, one bar left out, NaN let
-//! through, a rasteriser without the font.
+//! What a figure's SVG and PNG contain, and what is refused. Rejected when tried: an inverted y axis, one bar
+//! left out, NaN let through, a rasteriser without the font.
 
 use report::{Axis, Colour, Figure, Marks, Panel, Place, Range, ReportError, Scale, Series};
 use resvg::tiny_skia::Pixmap;
@@ -81,7 +81,8 @@ fn a_known_point_lands_at_its_pixel() {
     let panels = with_class(&document, "panel");
     let point =
         panels[1].descendants().find(|node| node.attribute("class") == Some("point")).expect("there is a point");
-    // The fifth name of the figure has a triangle on its tip: its path begins there, 1.35 × 3.8 px below the point.
+    // The fifth name of the figure has a triangle on its tip: its path begins there, 1.35 × 3.8 px below the
+    // point.
     let d = point.attribute("d").expect("a path");
     let corner: Vec<f64> = d[1..].split(['L', ' ']).filter_map(|number| number.parse().ok()).take(2).collect();
     assert!((corner[0] - (x + 0.5 * w)).abs() < 0.02, "{d} in {frame:?}");
@@ -169,7 +170,8 @@ fn the_png_has_the_svg_s_size_the_colours_of_all_series_and_visible_text() {
         let wanted = [channel(1), channel(3), channel(5), 255];
         picture.data().chunks(4).filter(|pixel| *pixel == wanted).count()
     };
-    // The four names get the first four colours; the edges of the band are translucent, so its legend and area are not looked for here.
+    // The four names get the first four colours; the edges of the band are translucent, so its legend and
+    // area are not looked for here.
     for colour in &Colour::IN_TURN[1..4] {
         assert!(number_of(colour.hex()) > 100, "{colour:?}");
     }

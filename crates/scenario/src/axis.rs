@@ -1,7 +1,9 @@
-//! An axis of a sweep: the keys that it sets, and the levels that it takes: listed for a grid, or a range for Sobol points.
+//! An axis of a sweep: the keys that it sets, and the levels that it takes: listed for a grid, or a range for
+//! Sobol points.
 //!
-//! Owen-scrambled Sobol points (Sobol' 1967; Owen 1995; Burley 2020) fill the ranges evenly in all their projections: of 2^k points every half of every axis
-//! holds exactly half, where random points would leave gaps and a grid of so many axes would need 2^k levels. The scenario's seed scrambles them.
+//! Owen-scrambled Sobol points (Sobol' 1967; Owen 1995; Burley 2020) fill the ranges evenly in all their
+//! projections: of 2^k points every half of every axis holds exactly half, where random points would leave
+//! gaps and a grid of so many axes would need 2^k levels. The scenario's seed scrambles them.
 
 use std::fmt;
 
@@ -105,7 +107,8 @@ impl Range {
         }
     }
 
-    /// The level at a share `u` in [0, 1) of the range. A whole number owns the half on either side of it, so that the ends are as likely as the others.
+    /// The level at a share `u` in [0, 1) of the range. A whole number owns the half on either side of it, so
+    /// that the ends are as likely as the others.
     pub(crate) fn level(&self, u: f64, whole: bool) -> f64 {
         let half = if whole { 0.5 } else { 0.0 };
         let (from, to) = (self.from - half, self.to + half);
@@ -135,7 +138,8 @@ pub(crate) fn keys(axis: &str) -> impl Iterator<Item = &str> {
     axis.split(',').map(str::trim)
 }
 
-/// The number at a dotted key, with the key spelled in positions: the same place always has the same spelling.
+/// The number at a dotted key, with the key spelled in positions: the same place always has the same
+/// spelling.
 fn number_at<'t>(table: &'t mut Table, key: &str) -> Result<(&'t mut Value, String), String> {
     let known = |table: &Table| table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
     let mut words = key.split('.');
@@ -217,7 +221,8 @@ mod tests {
     const WHOLE: Range = Range { from: 2.0, to: 5.0, scale: Scale::Linear };
 
     fn close(found: f64, expected: f64) {
-        // Six digits are kept: half of the last one, 5e-6 of the value at most. A linear scale in place of the log one is off by a factor 5 in the middle.
+        // Six digits are kept: half of the last one, 5e-6 of the value at most. A linear scale in place of
+        // the log one is off by a factor 5 in the middle.
         assert!((found - expected).abs() <= 5e-6 * expected.abs(), "{found}, not {expected}");
     }
 
@@ -237,7 +242,8 @@ mod tests {
             [(WHOLE, [2.0, 3.0, 4.0, 5.0]), (Range { from: -4.0, to: -1.0, ..WHOLE }, [-4.0, -3.0, -2.0, -1.0])]
         {
             for (quarter, level) in (0..4).zip(expected) {
-                // Just inside of the ends of every quarter; plain rounding of from + u (to − from) would give the ends half of the others' share.
+                // Just inside of the ends of every quarter; plain rounding of from + u (to − from) would give
+                // the ends half of the others' share.
                 for u in [0.25 * f64::from(quarter) + 1e-9, 0.25 * f64::from(quarter + 1) - 1e-9] {
                     assert_eq!(range.level(u, true), level);
                 }

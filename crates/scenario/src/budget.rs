@@ -1,8 +1,11 @@
-//! A budget: the floor and the time, or the distance, that a calibration may take, and protocols fitted to it.
+//! A budget: the floor and the time, or the distance, that a calibration may take, and protocols fitted to
+//! it.
 //!
-//! A straight run is shrunk to the longer side of the room less the robot's clearance, a square or the diameter of a circle to the shorter one; nothing
-//! is stretched. Then all numbers of runs are scaled by the one largest factor at which everything stays within the budget, so that the stated numbers
-//! are proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of direction in the mean.
+//! A straight run is shrunk to the longer side of the room less the robot's clearance, a square or the
+//! diameter of a circle to the shorter one; nothing is stretched. Then all numbers of runs are scaled by the
+//! one largest factor at which everything stays within the budget, so that the stated numbers are
+//! proportions. Runs stay in pairs, one in each direction: half of an odd number would leave a bias of
+//! direction in the mean.
 
 use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
@@ -218,7 +221,8 @@ mod tests {
         assert!(matches!(fitted[1], Schedule::Squares { side_m: 0.4, .. }), "{fitted:?}");
     }
 
-    /// Stated pairs and fitted ones: is there one factor, is everything afforded, and would the next larger factor cost too much?
+    /// Stated pairs and fitted ones: is there one factor, is everything afforded, and would the next larger
+    /// factor cost too much?
     fn check_factor(budget: Budget, stated: &[Schedule]) {
         let fitted = fit(budget, stated).expect("there is room and time");
         let pairs = |schedules: &[Schedule]| schedules.iter().map(|s| s.runs() as f64 / 2.0).collect::<Vec<_>>();
@@ -231,7 +235,8 @@ mod tests {
             assert!(*pairs == 1.0 || factor <= next * (1.0 + 1e-12), "{stated:?}: {fitted:?} are other proportions");
         }
         let affordable = |cost: Cost| {
-            // The sum over single runs and the sum over pairs round differently: 1e-16 for each of some hundred runs.
+            // The sum over single runs and the sum over pairs round differently: 1e-16 for each of some
+            // hundred runs.
             let at_most = |value: f64, limit: Option<f64>| limit.is_none_or(|limit| value <= limit * (1.0 + 1e-13));
             at_most(cost.minutes, budget.minutes) && at_most(cost.metres, budget.metres)
         };

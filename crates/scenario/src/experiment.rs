@@ -1,4 +1,5 @@
-//! An experiment: the robot, what is random, what sees it, what it drives, and the ranges of all these values.
+//! An experiment: the robot, what is random, what sees it, what it drives, and the ranges of all these
+//! values.
 
 use effects::Effect;
 use kinematics::{DriveGeometry, GeometryError};
@@ -66,7 +67,8 @@ pub enum Engine {
 pub struct Noise {
     /// Random walk of each wheel's travel over the ground, m/√m (`k`; Chong & Kleeman 1997).
     pub wheel_sigma_m_per_sqrt_m: f64,
-    /// Relative scatter of each wheel's sensitivity, drawn once a motion (ε_c of the paper's eq. 4 and 5, over C).
+    /// Relative scatter of each wheel's sensitivity, drawn once a motion (ε_c of the paper's eq. 4 and 5,
+    /// over C).
     pub sensitivity_sigma: f64,
 }
 
@@ -118,7 +120,8 @@ pub enum Instrument {
     },
     /// A tachometer on the ground beside each wheel, as of a roller or a fifth wheel (`wheel_reference.csv`).
     Tachometer {
-        /// Samples per second. A sample is the mean speed since the one before, as from pulses counted over a gate time.
+        /// Samples per second. A sample is the mean speed since the one before, as from pulses counted over a
+        /// gate time.
         rate_hz: f64,
         /// Standard deviation of each sample, m/s.
         sigma_m_s: f64,

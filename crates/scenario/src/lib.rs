@@ -1,6 +1,8 @@
-//! The words of an experiment as data: robot, noise, effects with sizes, instruments, protocols, budget and sweep. TOML in and out, no behaviour.
+//! The words of an experiment as data: robot, noise, effects with sizes, instruments, protocols, budget and
+//! sweep. TOML in and out, no behaviour.
 //!
-//! A scenario is all that a simulated number depends on besides seed and trial. Unknown keys are errors, and no physical quantity has a default.
+//! A scenario is all that a simulated number depends on besides seed and trial. Unknown keys are errors, and
+//! no physical quantity has a default.
 
 mod axis;
 mod budget;

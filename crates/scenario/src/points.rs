@@ -25,8 +25,8 @@ pub struct Point {
 }
 
 impl Sweep {
-    /// All points: every case with every point of the axes, which are the full grid of their lists, the last axis varying fastest, or Sobol points in
-    /// their ranges. One point where nothing is varied.
+    /// All points: every case with every point of the axes, which are the full grid of their lists, the last
+    /// axis varying fastest, or Sobol points in their ranges. One point where nothing is varied.
     ///
     /// # Errors
     /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's scenario invalid.
@@ -324,14 +324,16 @@ mod tests {
         assert_eq!(points.len(), 64);
         let shares = shares(&points);
         for axis in 0..3 {
-            // 64 cells of one axis (16 whole numbers for the last) hold one point each (four each). Random points leave no cell empty once in 3e26.
+            // 64 cells of one axis (16 whole numbers for the last) hold one point each (four each). Random
+            // points leave no cell empty once in 3e26.
             let cells = if axis == 2 { 16 } else { 64 };
             for cell in 0..cells {
                 let within = |share: &&[f64; 3]| (share[axis] * f64::from(cells)).floor() == f64::from(cell);
                 let held = shares.iter().filter(within).count();
                 assert_eq!(held, 64 / cells as usize, "axis {axis}, cell {cell}");
             }
-            // Every quarter of every pair of axes holds a quarter of the points: rejects axes that share a dimension, whose points lie on a diagonal.
+            // Every quarter of every pair of axes holds a quarter of the points: rejects axes that share a
+            // dimension, whose points lie on a diagonal.
             for other in 0..axis {
                 let held = shares.iter().filter(|share| share[axis] < 0.5 && share[other] < 0.5).count();
                 assert_eq!(held, 16, "axes {other} and {axis}");

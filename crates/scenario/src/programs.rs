@@ -9,14 +9,15 @@ use crate::experiment::Scenario;
 impl Scenario {
     /// Everything that is driven, in order: the scenario's own protocols, fitted when there is a budget.
     ///
-    /// A scenario that was read fits, or reading it failed. One that was put together since, such as a point of a sweep, may not, and drives nothing
-    /// then; [`Self::programs_for`] says why.
+    /// A scenario that was read fits, or reading it failed. One that was put together since, such as a point
+    /// of a sweep, may not, and drives nothing then; [`Self::programs_for`] says why.
     #[must_use]
     pub fn programs(&self) -> Vec<MotionProgram> {
         self.fitted(&self.protocols).unwrap_or_default()
     }
 
-    /// What a calibration method drives, fitted when there is a budget: its protocols of `[sweep.protocols]`, or the scenario's own.
+    /// What a calibration method drives, fitted when there is a budget: its protocols of `[sweep.protocols]`,
+    /// or the scenario's own.
     ///
     /// # Errors
     /// [`NoFit`] says why the method cannot be used within the budget.
@@ -25,7 +26,8 @@ impl Scenario {
         self.fitted(own.unwrap_or(&self.protocols))
     }
 
-    /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the driving alone.
+    /// What programs cost this robot. Without a budget nothing is known of the handling, and the time is the
+    /// driving alone.
     #[must_use]
     pub fn cost_of(&self, programs: &[MotionProgram]) -> Cost {
         cost(programs, &self.drive_limits())

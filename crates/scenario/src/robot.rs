@@ -1,4 +1,5 @@
-//! The robot's words: nominal geometry, encoders, motors, controllers and the marks on its sides. Values only.
+//! The robot's words: nominal geometry, encoders, motors, controllers and the marks on its sides. Values
+//! only.
 
 use dataset::{MarkedPoint, NominalRobot};
 use kinematics::{Point, Wheels};
@@ -66,7 +67,8 @@ pub struct Encoder {
     pub lines_per_rev: f64,
     /// Motor turns for one wheel turn.
     pub gear_ratio: f64,
-    /// Largest departure of a quadrature state's width from its nominal quarter period, as a share of it (0 = perfect).
+    /// Largest departure of a quadrature state's width from its nominal quarter period, as a share of it (0 =
+    /// perfect).
     pub state_width_error: f64,
 }
 
@@ -109,7 +111,8 @@ pub struct Controller {
     pub zero: u8,
     /// Digital filter pole B, register R21.
     pub pole: u8,
-    /// How much later than the left chip the right one samples, seconds, less than the sample time: they share no synchronisation.
+    /// How much later than the left chip the right one samples, seconds, less than the sample time: they
+    /// share no synchronisation.
     pub right_phase_s: f64,
 }
 

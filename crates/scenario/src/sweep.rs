@@ -15,8 +15,9 @@ pub struct Sweep {
     pub trials: u64,
     /// Calibration methods that each trial is given to.
     pub methods: Vec<String>,
-    /// Dotted keys of the scenario, each with its levels; several keys apart by commas take the same level together. A list is indexed by number
-    /// (`protocol.0.runs`) or by its element's kind or id (`effect.wheelbase.ratio`).
+    /// Dotted keys of the scenario, each with its levels; several keys apart by commas take the same level
+    /// together. A list is indexed by number (`protocol.0.runs`) or by its element's kind or id
+    /// (`effect.wheelbase.ratio`).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub axes: BTreeMap<String, Levels>,
     /// Sobol points in the axes' ranges instead of a grid of their lists.
@@ -28,7 +29,8 @@ pub struct Sweep {
     /// What a method drives instead of the scenario's own protocols, by the method's name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub protocols: BTreeMap<String, Vec<Schedule>>,
-    /// What is driven on paper after a calibration, to turn errors of parameters into drift. No budget bounds it.
+    /// What is driven on paper after a calibration, to turn errors of parameters into drift. No budget bounds
+    /// it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Schedule>,
 }
@@ -52,7 +54,8 @@ pub struct Case {
     pub set: BTreeMap<String, f64>,
 }
 
-/// Numbers by their dotted keys. A key without quotes is a table in TOML, and the refusal says how it is meant.
+/// Numbers by their dotted keys. A key without quotes is a table in TOML, and the refusal says how it is
+/// meant.
 fn quoted_keys<'de, D: Deserializer<'de>>(set: D) -> Result<BTreeMap<String, f64>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "every value must be a number, and every dotted key stand in quotes")]

@@ -1,5 +1,6 @@
-//! What turns the shafts: the closed form at constant speed, or motors under their controllers in small steps. One interface, so that everything
-//! from the shaft to the floor and the log is the same code in both engines.
+//! What turns the shafts: the closed form at constant speed, or motors under their controllers in small
+//! steps. One interface, so that everything from the shaft to the floor and the log is the same code in both
+//! engines.
 
 use effects::{Command, Step};
 use kinematics::Wheels;
@@ -162,8 +163,9 @@ impl ConstantSpeed {
 
 /// How the closed form cuts motions into pieces of constant speed.
 ///
-/// A motion is one piece at one speed, unless an effect depends on speed: then the trapezoid's ramps are two pieces each, at the speeds of the two-point
-/// Gauss rule, which integrates any cubic of the speed over a ramp exactly (so v², what slip costs), and the cruise is the fifth piece.
+/// A motion is one piece at one speed, unless an effect depends on speed: then the trapezoid's ramps are two
+/// pieces each, at the speeds of the two-point Gauss rule, which integrates any cubic of the speed over a
+/// ramp exactly (so v², what slip costs), and the cruise is the fifth piece.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Profile {
     counts_per_rad: f64,
@@ -176,7 +178,8 @@ const MAX_SEGMENTS: usize = 5;
 /// Nodes of the two-point Gauss–Legendre rule on [0, 1]: ½ ∓ 1/(2√3).
 const GAUSS_NODES: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Rounds of the fixed point that finds the shaft's rate from the counted one; each gains the lost share's order, 1e-2 to 1e-3.
+/// Rounds of the fixed point that finds the shaft's rate from the counted one; each gains the lost share's
+/// order, 1e-2 to 1e-3.
 const SEEN_ROUNDS: u32 = 12;
 
 impl Profile {
@@ -189,8 +192,9 @@ impl Profile {
         }
     }
 
-    /// The pieces of a motion. `seen` is the share of a shaft's turn that its counter sees at a given rate: a controller drives *counts* to the target,
-    /// so that a counter that misses some makes the wheel go farther.
+    /// The pieces of a motion. `seen` is the share of a shaft's turn that its counter sees at a given rate: a
+    /// controller drives *counts* to the target, so that a counter that misses some makes the wheel go
+    /// farther.
     pub(crate) fn segments(&self, command: &Command, mut seen: impl FnMut(Wheels<f64>) -> Wheels<f64>) -> RateSegments {
         let travel = command.travel_counts;
         let speed = command.speed_counts_s.left.max(command.speed_counts_s.right);
@@ -287,7 +291,8 @@ pub(crate) struct ServoPair {
     start_counts: Wheels<i64>,
 }
 
-/// Longest wait for a wheel to settle on its target after its profile: friction may hold it a few counts away for good.
+/// Longest wait for a wheel to settle on its target after its profile: friction may hold it a few counts away
+/// for good.
 const LONGEST_SETTLING_S: f64 = 1.0;
 
 impl ServoPair {
@@ -320,7 +325,8 @@ impl ServoPair {
                     // Targets are whole counts.
                     counts: counts.round() as i64,
                     speed_counts_s,
-                    // Both wheels ramp for the same time, so that an arc keeps its radius while it starts and stops.
+                    // Both wheels ramp for the same time, so that an arc keeps its radius while it starts and
+                    // stops.
                     acceleration_counts_s2: self.acceleration_counts_s2 * speed_counts_s / fastest,
                 })?;
             }

@@ -1,8 +1,9 @@
 //! The robot's body on its way from the shafts to the floor, the same in both engines.
 //!
-//! A step is a stretch of constant wheel rates; it becomes one SE(2) arc with the wheels' random walk summed over it. In the closed form a step may be a
-//! whole motion, and then the noise *inside* the arc is added too: the Brownian bridge of [`kinematics::BridgeCovariance`], σ_θ²L²/12 across a straight of
-//! length L. Without it the spread of UMBmark's results comes out too small.
+//! A step is a stretch of constant wheel rates; it becomes one SE(2) arc with the wheels' random walk summed
+//! over it. In the closed form a step may be a whole motion, and then the noise *inside* the arc is added
+//! too: the Brownian bridge of [`kinematics::BridgeCovariance`], σ_θ²L²/12 across a straight of length L.
+//! Without it the spread of UMBmark's results comes out too small.
 
 use dataset::MarkedPoint;
 use effects::{PoseReading, Step, Stream};
@@ -157,7 +158,7 @@ impl Body {
         self.world_from_body = world_from_body.moved_by(x_m, y_m);
     }
 
-    /// What an instrument that looks at `t_s`, now, sees: when and where.
+    /// What an instrument measures at `t_s`, now: when and where.
     #[inline]
     pub(crate) fn reading(&self, effects: &mut ActiveEffects, t_s: f64) -> (f64, Frame) {
         if !effects.act_on_instruments() {

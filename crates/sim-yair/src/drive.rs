@@ -1,7 +1,8 @@
 //! A run in progress: from the shafts through effects, floor and counters to the records.
 //!
-//! Both engines share this way, command → motor → wheel → floor → encoder → clock → instrument, at each stage of which the effects act; the body's part of it
-//! is [`crate::body`]. Time passes from event to event: what an actuator, a log's clock or an instrument wants next.
+//! Both engines share this way, command → motor → wheel → floor → encoder → clock → instrument, at each stage
+//! of which the effects act; the body's part of it is [`crate::body`]. Time passes from event to event: what
+//! an actuator, a log's clock or an instrument wants next.
 
 use dataset::{Run, WheelLog};
 use effects::{Command, Readout, SampleClock};
@@ -14,7 +15,8 @@ use crate::instrument::Observer;
 use crate::planned_motion::PlannedMotion;
 use crate::servo::ServoError;
 
-/// Two instants closer than this are one: a nanosecond, far under any sample time and far over the rounding of a long run's clock.
+/// Two instants closer than this are one: a nanosecond, far under any sample time and far over the rounding
+/// of a long run's clock.
 pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
 
 /// A run in progress.
@@ -27,7 +29,7 @@ pub(crate) struct Drive<'a> {
     body: Body,
     streams: &'a mut DriveStreams,
     log: Option<LogClock>,
-    /// When the next instrument looks by itself.
+    /// When the next instrument measures by itself.
     next_measurement_s: f64,
     /// The instant of the last row, by the true clock.
     last_row_s: f64,
@@ -199,7 +201,8 @@ impl<'a> Drive<'a> {
         for k in 0..self.observers.len() {
             let measurement_s = self.observers[k].next_measurement_s();
             if measurement_s <= self.body.t_s + SAME_INSTANT_S {
-                // Stamped with its own schedule: the clock of a long run has summed the rounding of its steps.
+                // Stamped with its own schedule: the clock of a long run has summed the rounding of its
+                // steps.
                 let (t_s, world_from_body) = self.body.reading(self.effects, measurement_s);
                 self.observers[k].measurement(t_s, world_from_body, self.body.ground_m, self.run);
             }
@@ -222,7 +225,8 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// The row of a standstill: both counters rest, so that it does not matter when each is read, but only what the clock shows.
+    /// The row of a standstill: both counters rest, so that it does not matter when each is read, but only
+    /// what the clock shows.
     #[inline]
     fn write_standing_row(&mut self) {
         let t_s = self.body.t_s;

@@ -1,13 +1,17 @@
-//! One HP HCTL-1100 motion controller: registers, profile generators and lead filter, once a sample time t = 16 (R0F + 1)/f_clk.
+//! One HP HCTL-1100 motion controller: registers, profile generators and lead filter, once a sample time t =
+//! 16 (R0F + 1)/f_clk.
 //!
-//! Position loop, X = command − actual position (equation 2 of the datasheet; D(z) = K (z − A/256) / 4 (z + B/256)):
-//! MC(n) = K/4 X(n) − [A/256 K/4 X(n−1) + B/256 MC(n−1)]. Proportional velocity: MC = K/4 (command − actual velocity), no memory.
-//! Trapezoidal and integral velocity modes move the command position of that loop. All numbers are the chip's: 24-bit two's complement
-//! positions (24.8 inside the generators), integer or 12.4 velocities in counts/sample, 8.8 accelerations in counts/sample².
+//! Position loop, X = command − actual position (equation 2 of the datasheet; D(z) = K (z − A/256) / 4 (z +
+//! B/256)): MC(n) = K/4 X(n) − [A/256 K/4 X(n−1) + B/256 MC(n−1)]. Proportional velocity: MC = K/4 (command −
+//! actual velocity), no memory. Trapezoidal and integral velocity modes move the command position of that
+//! loop. All numbers are the chip's: 24-bit two's complement positions (24.8 inside the generators), integer
+//! or 12.4 velocities in counts/sample, 8.8 accelerations in counts/sample².
 //!
-//! The datasheet does not say, so it is modelled: fractions of MC are cut toward zero; MC saturates at its 8 bits and this value is
-//! MC(n−1); the PWM is full on beyond ±100; the trapezoid is the fastest that its integers can end exactly on the final position.
-//! Source: HP (Agilent, Avago) HCTL-1100 datasheet: Digital Filter, Sample Timer, Motor Command registers and the four control modes.
+//! The datasheet does not say, so it is modelled: fractions of MC are cut toward zero; MC saturates at its 8
+//! bits and this value is MC(n−1); the PWM is full on beyond ±100; the trapezoid is the fastest that its
+//! integers can end exactly on the final position.
+//! Source: HP (Agilent, Avago) HCTL-1100 datasheet: Digital Filter, Sample Timer, Motor Command registers and
+//! the four control modes.
 
 use scenario::{ControlMode, Controller};
 
@@ -27,7 +31,8 @@ pub(crate) const FINE_VELOCITY_MAX_Q4: i16 = i16::MAX;
 pub(crate) const ACCELERATION_MAX_Q8: u16 = 0x7FFF;
 /// PWM motor command that is full on (datasheet, PWM motor command register R09H).
 const PWM_FULL: i16 = 100;
-/// Shortfall, in steps of a register, that unit conversions may leave below a whole step without losing it to truncation.
+/// Shortfall, in steps of a register, that unit conversions may leave below a whole step without losing it to
+/// truncation.
 const LATTICE_ROUNDING: f64 = 1e-6;
 
 /// What the chip sends to the amplifier: the 8-bit motor command.
@@ -133,8 +138,8 @@ impl Hctl1100 {
         self.command_q8 >> 8
     }
 
-    /// Whether a mode other than position control runs. In trapezoidal mode this is flag F0: it falls with the last command position
-    /// that the generator sends, not when the motor stands.
+    /// Whether a mode other than position control runs. In trapezoidal mode this is flag F0: it falls with
+    /// the last command position that the generator sends, not when the motor stands.
     #[must_use]
     pub(crate) const fn profile_flag(&self) -> bool {
         !matches!(self.algorithm, Algorithm::Position)
@@ -146,7 +151,8 @@ impl Hctl1100 {
         self.algorithm = Algorithm::Position;
     }
 
-    /// Trapezoidal profile from the present command position to a final one, by the shorter way round the 24 bits.
+    /// Trapezoidal profile from the present command position to a final one, by the shorter way round the 24
+    /// bits.
     pub(crate) fn trapezoid(&mut self, final_position: i32, max_velocity: u8, acceleration_q8: u16) {
         let distance = wrap_24(i64::from(final_position) - i64::from(self.command_position()));
         self.command_q8 = self.command_position() << 8;
@@ -162,7 +168,8 @@ impl Hctl1100 {
         };
     }
 
-    /// Integral velocity: approach a velocity in counts/sample at an acceleration, from the velocity that this mode has now.
+    /// Integral velocity: approach a velocity in counts/sample at an acceleration, from the velocity that
+    /// this mode has now.
     pub(crate) fn integral_velocity(&mut self, command: i8, acceleration_q8: u16) {
         let velocity_q8 =
             if let Algorithm::IntegralVelocity { velocity_q8, .. } = self.algorithm { velocity_q8 } else { 0 };
@@ -178,12 +185,14 @@ impl Hctl1100 {
         self.algorithm = Algorithm::ProportionalVelocity { command_q4 };
     }
 
-    /// One sample: takes the increments decoded since the last one and computes the motor command that stands until the next.
+    /// One sample: takes the increments decoded since the last one and computes the motor command that stands
+    /// until the next.
     pub(crate) fn sample(&mut self, counted: i64) -> MotorCommand {
         self.actual_position = wrap_24(i64::from(self.actual_position) + counted);
         self.generate();
         let motor_q10 = if let Algorithm::ProportionalVelocity { command_q4 } = self.algorithm {
-            // Actual velocity has no fraction (R34, R35). K/4 · 1/16 is 1/64, so 16 times more for tenths of 1024.
+            // Actual velocity has no fraction (R34, R35). K/4 · 1/16 is 1/64, so 16 times more for tenths of
+            // 1024.
             self.gain * (i64::from(command_q4) - 16 * counted) * 16
         } else {
             let error = i64::from(wrap_24(i64::from(self.command_position()) - i64::from(self.actual_position)));
@@ -266,8 +275,8 @@ impl Hctl1100 {
     }
 }
 
-/// Smallest sample timer for a mode (datasheet, table 4): 64 µs at 2 MHz for the simple modes, which its text confirms; twice that for those
-/// with a profile generator.
+/// Smallest sample timer for a mode (datasheet, table 4): 64 µs at 2 MHz for the simple modes, which its text
+/// confirms; twice that for those with a profile generator.
 const fn sample_timer_minimum(mode: ControlMode) -> u8 {
     match mode {
         ControlMode::ProportionalVelocity => 0x07,
@@ -277,7 +286,8 @@ const fn sample_timer_minimum(mode: ControlMode) -> u8 {
 
 /// The largest step that still lets a profile with that deceleration end exactly on its final position.
 ///
-/// A step v followed by v−a, v−2a … covers (m+1) v − a m(m+1)/2 with m further steps. The last steps share what integers leave over.
+/// A step v followed by v−a, v−2a … covers (m+1) v − a m(m+1)/2 with m further steps. The last steps share
+/// what integers leave over.
 fn fastest_stoppable(remaining_q8: i64, acceleration_q8: i64) -> i64 {
     let (remaining, a) = (remaining_q8, acceleration_q8);
     let mut m = ((1.0 + 8.0 * remaining as f64 / a as f64).sqrt() / 2.0 - 0.5) as i64;
@@ -416,7 +426,8 @@ mod tests {
                 let _ = chip.sample(0);
                 let step = (chip.command_q8 - last_q8) * counts.signum();
                 assert!(step > 0 && step <= i32::from(max_velocity) << 8, "{counts}: step {step}");
-                // One part in 256 more when decelerating: the integers' remainder is spread over the last steps.
+                // One part in 256 more when decelerating: the integers' remainder is spread over the last
+                // steps.
                 let change = step - last_step;
                 assert!(
                     change <= i32::from(acceleration_q8) && change >= -i32::from(acceleration_q8) - 1,

@@ -37,7 +37,7 @@ impl Observer {
         self.ground_m = Wheels::both(0.0);
     }
 
-    /// When the instrument next looks by itself, seconds; the floor grid never does.
+    /// When the instrument next measures by itself, seconds; the floor grid never does.
     pub(crate) fn next_measurement_s(&self) -> f64 {
         match self.instrument {
             Instrument::FloorGrid { .. } => f64::INFINITY,
@@ -47,12 +47,13 @@ impl Observer {
         }
     }
 
-    /// Does the instrument look at the robot when nobody asks it to?
+    /// Does the instrument measure the robot unasked?
     pub(crate) const fn free_running(&self) -> bool {
         matches!(self.instrument, Instrument::MotionCapture { .. } | Instrument::Tachometer { .. })
     }
 
-    /// A measurement at the moving robot at [`Self::next_measurement_s`], whose contacts have gone so far over the ground.
+    /// A measurement at the moving robot at [`Self::next_measurement_s`], whose contacts have gone so far
+    /// over the ground.
     pub(crate) fn measurement(&mut self, t_s: f64, world_from_body: Frame, ground_m: Wheels<f64>, run: &mut Run) {
         if let Instrument::Tachometer { rate_hz, sigma_m_s } = self.instrument {
             let mut speed = |now_m, before_m| (now_m - before_m) * rate_hz + sigma_m_s * self.stream.normal();

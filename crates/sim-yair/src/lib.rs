@@ -1,8 +1,11 @@
-//! YAIR simulated: motors under two HCTL-1100 controllers, wheels, floor, encoders and the instruments that watch from outside.
+//! YAIR simulated: motors under two HCTL-1100 controllers, wheels, floor, encoders and the instruments that
+//! watch from outside.
 //!
-//! A [`scenario::Scenario`] goes in, a [`dataset::Dataset`] and the [`HiddenTruth`] come out. [`SimulatedRobot`] is the robot itself, a [`motion_programs::Platform`]
-//! that calibrators drive without knowing what it is. Two engines share everything from the shaft to the record: stepping (≤ 1 ms; motors, controllers,
-//! transients) and the closed form (each motion one arc, noise summed), and statistical tests hold them equal.
+//! A [`scenario::Scenario`] goes in, a [`dataset::Dataset`] and the [`HiddenTruth`] come out.
+//! [`SimulatedRobot`] is the robot itself, a [`motion_programs::Platform`] that calibrators drive without
+//! knowing what it is. Two engines share everything from the shaft to the record: stepping (≤ 1 ms; motors,
+//! controllers, transients) and the closed form (each motion one arc, noise summed), and statistical tests
+//! hold them equal.
 
 mod active;
 mod actuator;

@@ -1,11 +1,14 @@
 //! A DC motor with gear under voltage control, with friction that really holds.
 //!
-//! J dω/dt = K i − b ω − τ_c sign(ω), i = (V − K ω)/R. With λ = (K²/R + b)/J, drive a = K V/(R J) and c = τ_c/J the speed while it keeps
-//! its sign s is ω(t) = ω∞ + (ω0 − ω∞) e^{−λt}, ω∞ = (a − s c)/λ, and the angle is its integral: both are used exactly, so results do not
-//! depend on the step. At standstill the motor stays while |a| ≤ c (breakaway torque = Coulomb torque); a step across zero is split there.
+//! J dω/dt = K i − b ω − τ_c sign(ω), i = (V − K ω)/R. With λ = (K²/R + b)/J, drive a = K V/(R J) and c =
+//! τ_c/J the speed while it keeps its sign s is ω(t) = ω∞ + (ω0 − ω∞) e^{−λt}, ω∞ = (a − s c)/λ, and the
+//! angle is its integral: both are used exactly, so results do not depend on the step. At standstill the
+//! motor stays while |a| ≤ c (breakaway torque = Coulomb torque); a step across zero is split there.
 //!
-//! Assumptions: no inductance (its time constant is far under a sample), no cogging, no torque ripple; all values at the motor's axis.
-//! Reference: the Coulomb-viscous model in Armstrong-Hélouvry, Dupont & Canudas de Wit 1994 (Automatica 30), §2.1.
+//! Assumptions: no inductance (its time constant is far under a sample), no cogging, no torque ripple; all
+//! values at the motor's axis.
+//! Reference: the Coulomb-viscous model in Armstrong-Hélouvry, Dupont & Canudas de Wit 1994 (Automatica 30),
+//! §2.1.
 
 use scenario::Motor;
 
@@ -128,8 +131,8 @@ mod tests {
 
     #[test]
     fn results_do_not_depend_on_the_step_even_across_a_reversal() {
-        // 12 V forward for 50 ms, then 6 V backward for 300 ms, which passes zero speed. 1e-9: rounding grows with 3000 steps × 1e-16
-        // and the logarithm at the crossing; an Euler step of 1 ms is 1e-2 off.
+        // 12 V forward for 50 ms, then 6 V backward for 300 ms, which passes zero speed. 1e-9: rounding grows
+        // with 3000 steps × 1e-16 and the logarithm at the crossing; an Euler step of 1 ms is 1e-2 off.
         let totals = [350, 3500].map(|steps| {
             let mut motor = motor();
             let out = turn_in_steps(&mut motor, 12.0, 0.05, steps / 7);

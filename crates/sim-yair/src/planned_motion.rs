@@ -42,7 +42,8 @@ impl PlannedMotion {
     }
 }
 
-/// What the wheels are told for a motion: whole counts by the nominal geometry, both wheels done at the same time.
+/// What the wheels are told for a motion: whole counts by the nominal geometry, both wheels done at the same
+/// time.
 fn command(robot: &Robot, nominal_geometry: &DriveGeometry, increment: Increment) -> Command {
     let travel_m = nominal_geometry.travel_m(increment);
     let counts_per_rad = robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;

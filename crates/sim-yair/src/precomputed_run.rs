@@ -1,7 +1,9 @@
-//! The closed form where all of a run but its draws is foreseen: when it moves, rests and is read follows from the plan, so that no clock has to be asked.
+//! The closed form where all of a run but its draws is foreseen: when it moves, rests and is read follows
+//! from the plan, so that no clock has to be asked.
 //!
-//! That is so where no effect has a say in commands and counters, nothing is logged between motions and no instrument looks by itself: the paper's
-//! experiments. What the body and its counters do is the same code as in [`crate::drive`], and a test holds both ways to the same records.
+//! That is so where no effect has a say in commands and counters, nothing is logged between motions and no
+//! instrument measures by itself: the paper's experiments. What the body and its counters do is the same code
+//! as in [`crate::drive`], and a test holds both ways to the same records.
 
 use dataset::{Run, WheelLog};
 use effects::Readout;
@@ -119,7 +121,8 @@ mod tests {
     use super::*;
     use crate::SimulatedRobot;
 
-    /// Both ways through programs with everything in them, with the paper's effects and with sensitivities that scatter from motion to motion.
+    /// Both ways through programs with everything in them, with the paper's effects and with sensitivities
+    /// that scatter from motion to motion.
     #[test]
     fn a_course_gives_the_records_of_a_run_that_asks_its_clock() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/paper.toml");

@@ -1,4 +1,5 @@
-//! Programs made ready to drive: what a motion tells the wheels is the same at every trial, so a campaign works it out once.
+//! Programs made ready to drive: what a motion tells the wheels is the same at every trial, so a campaign
+//! works it out once.
 
 use motion_programs::MotionProgram;
 

@@ -1,11 +1,13 @@
 //! Between encoder and counter: the decoder's noise filter, and the counter that keeps whole counts only.
 //!
-//! The HCTL-1100 takes a new quadrature state once it has stood three clock periods. States are nominally 1/rate long; disc and
-//! sensors spread their widths by ±e (uniform), so of the states at count rate ρ the share P(w < 3/f) = (3ρ/f − 1 + e)/2e is too short.
+//! The HCTL-1100 takes a new quadrature state once it has stood three clock periods. States are nominally
+//! 1/rate long; disc and sensors spread their widths by ±e (uniform), so of the states at count rate ρ the
+//! share P(w < 3/f) = (3ρ/f − 1 + e)/2e is too short.
 //!
-//! Assumptions: a state that is not seen costs one count (a real decoder may also take two missed edges for none or for a reversal);
-//! the share is applied as a mean, not drawn. Source: HP HCTL-1100 datasheet, encoder input ("3-bit" state delay filter); the same
-//! filter is drawn in the HCTL-2032 datasheet, figure 12 ("three consecutive rising clock edges").
+//! Assumptions: a state that is not seen costs one count (a real decoder may also take two missed edges for
+//! none or for a reversal); the share is applied as a mean, not drawn.
+//! Source: HP HCTL-1100 datasheet, encoder input ("3-bit" state delay filter); the same filter is drawn in
+//! the HCTL-2032 datasheet, figure 12 ("three consecutive rising clock edges").
 
 use scenario::{Encoder, QUADRATURE_DECODING};
 
@@ -41,7 +43,8 @@ impl StateFilter {
         Ok(Self { shortest_state_s: STATE_CLOCKS / clock_hz, width_error })
     }
 
-    /// Share of the counts that is lost at a steady count rate: 0 while the narrowest state stands long enough, 1 once the widest does not.
+    /// Share of the counts that is lost at a steady count rate: 0 while the narrowest state stands long
+    /// enough, 1 once the widest does not.
     #[must_use]
     pub(crate) fn lost_share(&self, counts_per_s: f64) -> f64 {
         let needed_width = counts_per_s.abs() * self.shortest_state_s; // as a share of the nominal width

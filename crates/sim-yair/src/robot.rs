@@ -46,7 +46,8 @@ const SENSITIVITY: StreamName = StreamName::new("sensitivity");
 
 /// YAIR, or another differential drive, as a scenario describes it, on one trial of its randomness.
 ///
-/// It implements [`Platform`]: calibrators drive it and see what it measures, and nothing else. Its hidden truth is asked for by other methods.
+/// It implements [`Platform`]: calibrators drive it and see what it measures, and nothing else. Its hidden
+/// truth is asked for by other methods.
 pub struct SimulatedRobot {
     robot: scenario::Robot,
     nominal: NominalRobot,
@@ -102,7 +103,8 @@ impl SimulatedRobot {
             {
                 return Err(SimulationError::NeedsStepping { id, why });
             }
-            // Named by id and by how often the id has come before: adding an effect disturbs no other's draws.
+            // Named by id and by how often the id has come before: adding an effect disturbs no other's
+            // draws.
             let before = ids.iter().filter(|other| **other == id).count();
             effects.push((StreamName::new(id).nth(before as u64), effect));
             ids.push(id);
@@ -152,7 +154,8 @@ impl SimulatedRobot {
         Ok(robot)
     }
 
-    /// The same robot at another point of a sweep's design: other draws, for points that are compared to be independent.
+    /// The same robot at another point of a sweep's design: other draws, for points that are compared to be
+    /// independent.
     #[must_use]
     pub fn at_point(mut self, point: u32) -> Self {
         self.address.point = point;
@@ -176,7 +179,8 @@ impl SimulatedRobot {
         self.last_ends
     }
 
-    /// Makes a program ready: what its motions tell this robot's wheels is worked out once, and [`Self::drive_prepared_into`] does not do it again.
+    /// Makes a program ready: what its motions tell this robot's wheels is worked out once, and
+    /// [`Self::drive_prepared_into`] does not do it again.
     #[must_use]
     pub fn prepare(&self, program: MotionProgram) -> PreparedProgram {
         let planned_segments = self.setup.closed_form && self.effects.leave_commands_and_counters_alone();

@@ -1,14 +1,18 @@
-//! One wheel's servo: HCTL-1100, amplifier, motor, gear, encoder, decoder, and the host that commands the chip.
+//! One wheel's servo: HCTL-1100, amplifier, motor, gear, encoder, decoder, and the host that commands the
+//! chip.
 //!
-//! An engine alternates `turn` (the motor moves), `count` (the encoder sees an angle, perhaps not the one turned) and `sample_if_due`.
-//! In trapezoidal mode the chip does the whole move. In the velocity modes the robot's interface card (the host) must stop the wheel; it is
-//! modelled as a loop at controller samples that commands v = min(v_cruise, √(2 a·remaining)), so it starts to brake when what remains equals
-//! the braking distance, and hands over to position control of the target within one count of it. In integral velocity `remaining` is read
-//! from the command position, so that the profile ends even where the wheel lags, and the chip makes the ramps; in proportional velocity it is read from the actual position, the host makes
-//! the ramps, and a wheel whose friction the gain K/4 does not overcome is handed over where it stalls: braking, to its target; at its
-//! cruising speed, to where it stands. So every mode ends by holding a target.
+//! An engine alternates `turn` (the motor moves), `count` (the encoder sees an angle, perhaps not the one
+//! turned) and `sample_if_due`. In trapezoidal mode the chip does the whole move. In the velocity modes the
+//! robot's interface card (the host) must stop the wheel; it is modelled as a loop at controller samples that
+//! commands v = min(v_cruise, √(2 a·remaining)), so it starts to brake when what remains equals the braking
+//! distance, and hands over to position control of the target within one count of it. In integral velocity
+//! `remaining` is read from the command position, so that the profile ends even where the wheel lags, and the
+//! chip makes the ramps; in proportional velocity it is read from the actual position, the host makes the
+//! ramps, and a wheel whose friction the gain K/4 does not overcome is handed over where it stalls: braking,
+//! to its target; at its cruising speed, to where it stands. So every mode ends by holding a target.
 //!
-//! Moves are relative to the last target, not to where the wheel stands: errors of single moves do not add up.
+//! Moves are relative to the last target, not to where the wheel stands: errors of single moves do not add
+//! up.
 //! Source: HP HCTL-1100 datasheet, control modes; the host is ours (the paper does not describe YAIR's).
 
 use scenario::{ControlMode, Controller, Encoder, Motor};
@@ -23,11 +27,13 @@ pub use crate::servo_error::ServoError;
 const SETTLED_SAMPLES: u32 = 5;
 /// Following error within which a holding wheel is quiet even if it twitches, counts.
 const SETTLED_COUNTS: i64 = 1;
-/// Commanded travel without a count after which a wheel has stalled, counts: slow commands get as many samples as they need.
+/// Commanded travel without a count after which a wheel has stalled, counts: slow commands get as many
+/// samples as they need.
 const STALLED_COUNTS: f64 = 8.0;
 /// What remains when the host hands over to position control, counts.
 const HANDOVER_COUNTS: i64 = 1;
-/// A sample is due when less than this is missing, seconds: far above the rounding of summed steps, far below a clock period.
+/// A sample is due when less than this is missing, seconds: far above the rounding of summed steps, far below
+/// a clock period.
 const DUE_S: f64 = 1e-10;
 
 /// What a wheel is asked to do: travel from its last target and hold there.
@@ -76,7 +82,8 @@ pub(crate) struct Servo {
 }
 
 impl Servo {
-    /// A wheel at rest that holds position 0. Its first sample is at `phase_s`, its counter starts `start_phase_counts` past an edge.
+    /// A wheel at rest that holds position 0. Its first sample is at `phase_s`, its counter starts
+    /// `start_phase_counts` past an edge.
     ///
     /// # Errors
     /// When a value of the configuration is impossible or the phase not within a sample time.
@@ -118,7 +125,8 @@ impl Servo {
     /// Starts what is asked.
     ///
     /// # Errors
-    /// For a travel while another runs, or one whose speed, acceleration or length the chip's registers cannot hold; nothing changes then.
+    /// For a travel while another runs, or one whose speed, acceleration or length the chip's registers
+    /// cannot hold; nothing changes then.
     pub(crate) fn command(&mut self, travel: Travel) -> Result<(), ServoError> {
         let Travel { counts, speed_counts_s, acceleration_counts_s2 } = travel;
         if !self.profile_done() {
@@ -163,13 +171,15 @@ impl Servo {
         self.motor.rate_rad_s() / self.gear_ratio
     }
 
-    /// Mean acceleration over the last `turn`, referred to the wheel, rad/s²: times its duration it sums to the rate exactly.
+    /// Mean acceleration over the last `turn`, referred to the wheel, rad/s²: times its duration it sums to
+    /// the rate exactly.
     #[must_use]
     pub(crate) const fn acceleration_rad_s2(&self) -> f64 {
         self.acceleration_rad_s2
     }
 
-    /// Moves the motor on by `dt_s`, at most to the next sample, and returns the angle turned, referred to the wheel, rad.
+    /// Moves the motor on by `dt_s`, at most to the next sample, and returns the angle turned, referred to
+    /// the wheel, rad.
     pub(crate) fn turn(&mut self, dt_s: f64) -> f64 {
         debug_assert!(
             dt_s <= self.to_sample_s + DUE_S,
@@ -191,7 +201,8 @@ impl Servo {
         self.counts += self.counter.advance(seen_counts);
     }
 
-    /// If the time has come, runs the host's loop and then the chip's sample, both on the counts of this instant.
+    /// If the time has come, runs the host's loop and then the chip's sample, both on the counts of this
+    /// instant.
     pub(crate) fn sample_if_due(&mut self) {
         if self.to_sample_s > DUE_S {
             return;
@@ -262,7 +273,8 @@ impl Servo {
         self.host.is_none() && !self.chip.profile_flag()
     }
 
-    /// Whether the profile has ended and the wheel has stood, or stayed within one count of its target, for several samples.
+    /// Whether the profile has ended and the wheel has stood, or stayed within one count of its target, for
+    /// several samples.
     #[must_use]
     pub(crate) const fn settled(&self) -> bool {
         self.profile_done() && self.quiet_samples >= SETTLED_SAMPLES
@@ -341,7 +353,8 @@ mod tests {
                     overshoot = overshoot.max(counts.signum() * (servo.counts() - target));
                     assert!(settling_s < 0.3, "{mode:?} {counts}: the target that YAIR's parameters were chosen for");
                 }
-                // Friction takes 1.25 % of the supply; K/4 (1 − A/256) X = 1.9 X percent, cut to whole ones, does not move it for |X| = 1.
+                // Friction takes 1.25 % of the supply; K/4 (1 − A/256) X = 1.9 X percent, cut to whole ones,
+                // does not move it for |X| = 1.
                 assert!((servo.counts() - target).abs() <= 2, "{mode:?} {counts}: {}", servo.counts() - target);
                 assert!(overshoot <= 3, "{mode:?} {counts}: overshoot {overshoot}"); // 2 seen; 5 with twice the inertia
                 // It stays there: friction, and no limit cycle that leaves the band.
@@ -392,7 +405,8 @@ mod tests {
         let expected = (v_per_count * 40.0 - MOTOR.coulomb_friction_nm * v_per_nm)
             / (v_per_count + v_per_rad_s / counts_per_sample_per_rad_s);
         let measured = cruising_counts_per_sample(ControlMode::ProportionalVelocity);
-        // The decoded velocity is whole counts, and one count short of 40 is 12 %: 0.1 for the pattern that they make.
+        // The decoded velocity is whole counts, and one count short of 40 is 12 %: 0.1 for the pattern that
+        // they make.
         assert!((measured - expected).abs() < 0.1, "{measured} counts/sample, expected {expected}");
         assert!(measured < 38.0);
     }

@@ -82,7 +82,8 @@ pub fn simulate(scenario: &Scenario, seed: u64, trial: u64) -> Result<Simulation
     simulate_programs(scenario, &scenario.programs(), Address { seed, point: 0, trial, run: 0 })
 }
 
-/// Drives programs with a scenario's robot, its draws at `first_run` and the runs that follow: one trial of a sweep, as the sweep had it.
+/// Drives programs with a scenario's robot, its draws at `first_run` and the runs that follow: one trial of a
+/// sweep, as the sweep had it.
 ///
 /// # Errors
 /// [`SimulationError`] when the scenario cannot be simulated.

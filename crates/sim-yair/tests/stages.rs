@@ -107,7 +107,8 @@ fn command_motor_wheel_and_floor_move_the_robot() {
     for engine in ENGINES {
         let (run, moved) = drive(&scenario(engine), Some(Box::new(HalfCommand)));
         assert!((counted_m(&run) - 0.5 * LENGTH_M).abs() < SETTLED_M && (moved.x_m - 0.5 * LENGTH_M).abs() < SETTLED_M);
-        // A motor that turns half as far: the controller drives counts to the target, the closed form does not look again.
+        // A motor that turns half as far: the controller drives counts to the target, the closed form does
+        // not look again.
         let (run, moved) = drive(&scenario(engine), Some(Box::new(LazyMotor)));
         assert!((counted_m(&run) - moved.x_m).abs() < SETTLED_M, "{engine:?}: encoder and wheel turn together");
         let (run, moved) = drive(&scenario(engine), Some(Box::new(SmallWheel)));
@@ -175,7 +176,8 @@ fn motion_capture_looks_at_its_rate_stamps_late_and_rides_its_lever() {
         assert!((run.truth[0].x_m - 0.1).abs() < 1e-12 && (run.truth[0].y_m + 0.2).abs() < 1e-12);
         let last = run.truth.last().expect("samples");
         let turn_rad = last.theta_rad().expect("headings") - 0.5;
-        // The robot stands through the pause at the end; the lever turns by what a count more or less on one wheel turns it.
+        // The robot stands through the pause at the end; the lever turns by what a count more or less on one
+        // wheel turns it.
         assert!(
             (last.x_m - 0.1 - moved.x_m).abs() < SETTLED_M && turn_rad.abs() < 2.0 * SETTLED_M / 0.363,
             "{engine:?}"

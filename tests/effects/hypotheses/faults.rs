@@ -5,7 +5,8 @@ use effects::{CATALOGUE, Hypothesis};
 
 use super::watched::{Row, drive, perfect, rows};
 
-/// A gross fault by its sizes, and how far its best rewriting may be from the faultless log, radians of a wheel, with the reason.
+/// A gross fault by its sizes, and how far its best rewriting may be from the faultless log, radians of a
+/// wheel, with the reason.
 type Gross = (&'static str, &'static [(&'static str, f64)], f64);
 
 const GROSS: &[Gross] = &[
@@ -26,7 +27,8 @@ const GROSS: &[Gross] = &[
     ("time_unit", &[("factor", 1e6)], 0.0),
 ];
 
-/// Largest difference between the wheels of two records at the rows that both have, from the first row on, radians; infinite where a row of `found` is none.
+/// Largest difference between the wheels of two records at the rows that both have, from the first row on,
+/// radians; infinite where a row of `found` is none.
 fn apart(found: &Dataset, faultless: &Dataset) -> f64 {
     let mut worst = 0.0_f64;
     for (found_run, run) in found.runs.iter().zip(&faultless.runs) {
@@ -93,7 +95,8 @@ fn faultless_records_show_no_fault_that_leaves_a_mark_in_them() {
     for id in CATALOGUE {
         let Some(Hypothesis::Records(rewrite)) = effects::hypothesis(id) else { continue };
         let sentences: Vec<String> = rewrite(&faultless).into_iter().map(|correction| correction.sentence).collect();
-        // Which column is which, and which way it counts, only what was seen outside can say: these two are always tried.
+        // Which column is which, and which way it counts, only what was seen outside can say: these two are
+        // always tried.
         let always = ["swapped_wheels", "reversed_wheel"].contains(id);
         assert_eq!(sentences.is_empty(), !always, "{id}: {sentences:?}");
     }

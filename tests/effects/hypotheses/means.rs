@@ -14,7 +14,8 @@ struct Case {
     remains: f64,
 }
 
-/// What counts and rows hide: whole counts are 12.5 µm a wheel and 3e-5 rad, over a metre of arm; rows of 20 ms bend within.
+/// What counts and rows hide: whole counts are 12.5 µm a wheel and 3e-5 rad, over a metre of arm; rows of 20
+/// ms bend within.
 const HIDDEN: f64 = 2e-4;
 
 const fn case(id: &'static str, values: &'static [(&'static str, f64)], remains: f64) -> Case {
@@ -55,7 +56,8 @@ const CASES: &[Case] = &[
     fixed("backlash", ("width_m", 2e-3), &[("left_gap_m", 2e-3), ("right_gap_m", 2e-3)], 0.0),
     case("truth_lever_arm", &[("lever_x_m", 0.05), ("lever_y_m", -0.03)], 0.0),
     case("truth_yaw", &[("yaw_rad", 0.02)], 0.0),
-    // Of second order: 1/(1 + β|ω|) at 1.4 rad/s, 1/(1 − share), and the phase by an encoder that errs by nA = 0.11 itself.
+    // Of second order: 1/(1 + β|ω|) at 1.4 rad/s, 1/(1 − share), and the phase by an encoder that errs by nA
+    // = 0.11 itself.
     case("turn_rate_wheelbase", &[("beta_s", 0.02)], 0.03),
     fixed("missed_counts", ("hinge_speed_m_s", 0.1), &[("left_lost_share", 0.01), ("right_lost_share", 0.02)], 0.03),
     fixed(
@@ -64,14 +66,16 @@ const CASES: &[Case] = &[
         &[("left_sin_rad", 0.02), ("left_cos_rad", 0.01), ("right_sin_rad", -0.01), ("right_cos_rad", 0.02)],
         0.11,
     ),
-    // Within ramps of 0.5 s the mean speed of a row lags the speed at its end by 10 ms: 2 % a wheel, both wheels apart in turns.
+    // Within ramps of 0.5 s the mean speed of a row lags the speed at its end by 10 ms: 2 % a wheel, both
+    // wheels apart in turns.
     case("slip_acceleration", &[("kappa_s", 0.02)], 0.06),
     case("sampling_skew", &[("right_delay_s", 0.01)], 0.06),
     case("truth_latency", &[("delay_s", 0.02)], 0.06),
     case("clock_rate", &[("rate", 1e-3)], 0.06),
     // The row in which a turn changes the castor's lean: 5 mm of a decay of 60 mm.
     fixed("castor_kick", ("decay_m", 0.06), &[("kick_rad", 0.02)], 0.08),
-    // Fractions are drawn: 0.29 units of 20 µm a cycle and wheel, 5000 cycles, 0.363 m apart make 1.6e-3 rad a run. Three such.
+    // Fractions are drawn: 0.29 units of 20 µm a cycle and wheel, 5000 cycles, 0.363 m apart make 1.6e-3 rad
+    // a run. Three such.
     fixed("low_speed_truncation", ("cycle_s", 0.005), &[("loss_m_s", 2e-3)], 0.25),
     // A new row moves the line through 64 rows by four of its 64ths.
     fixed("interval_error", ("jitter_s", 4e-3), &[("share", 1.0)], 0.07),
@@ -159,7 +163,8 @@ fn plausible_sizes_of_every_shape_make_a_physical_effect_that_says_the_same_size
         }
     }
     assert!(effects::effect_from_estimates("motor_ripple", &[]).is_none());
-    // What a fit finds of nothing, on the wrong side of 0: one wheel's is none, both wheels' or a single size is no effect.
+    // What a fit finds of nothing, on the wrong side of 0: one wheel's is none, both wheels' or a single size
+    // is no effect.
     let gaps =
         |left, right| effects::effect_from_estimates("backlash", &[("left_gap_m", left), ("right_gap_m", right)]);
     assert_eq!(gaps(1e-3, -1e-5), gaps(1e-3, 0.0));

@@ -1,7 +1,8 @@
-//! What only scatters: the signs that an effect says it leaves in a fit are there, and not in a faultless record.
+//! What only scatters: the signs that an effect says it leaves in a fit are there, and not in a faultless
+//! record.
 //!
-//! The signs are measured on what was seen less what the counts predict from measurement to measurement, over some runs; each measure is a pure number that is small
-//! without the effect.
+//! The signs are measured on what was seen less what the counts predict from measurement to measurement, over
+//! some runs; each measure is a pure number that is small without the effect.
 
 use dataset::Dataset;
 use effects::{CATALOGUE, Effect, Sign};
@@ -128,7 +129,8 @@ const SIGNS: [Sign; 7] = [
     Sign::TailsAtLowSpeed,
 ];
 
-/// A slide lasts over several measurements and comes at some speeds only, so that it has something of other signs too.
+/// A slide lasts over several measurements and comes at some speeds only, so that it has something of other
+/// signs too.
 const SLIDES: [&str; 2] = ["traction_loss", "stick_slip"];
 
 #[test]

@@ -1,4 +1,5 @@
-//! Terms outside of the catalogue: every covariate and channel has the size that a scenario says, and recorded data show it so.
+//! Terms outside of the catalogue: every covariate and channel has the size that a scenario says, and
+//! recorded data show it so.
 
 use dataset::{Protocol, ProtocolSettings, Run};
 use effects::{Channel, Covariate, Effect, Hypothesis, SparseTerm};
@@ -21,7 +22,8 @@ fn with(mut scenario: Scenario, term: &SparseTerm) -> Scenario {
     scenario
 }
 
-/// Channel, covariates, coefficient, and the share of the whole that may remain; [`super::means`] says of the last whence it comes.
+/// Channel, covariates, coefficient, and the share of the whole that may remain; [`super::means`] says of the
+/// last whence it comes.
 const CASES: [(Channel, &[&str], f64, f64); 38] = [
     (Channel::Along, &["v", "|v|"], 0.1, 0.0),
     (Channel::Along, &["|omega|"], 0.005, 0.0),
@@ -117,7 +119,8 @@ fn driven(mut scenario: Scenario, motions: Vec<Motion>) -> Result<Pose, Simulati
     Ok(start.to(end))
 }
 
-/// dθ/ds = c sin θ along a way s has the solution tan(θ/2) = tan(θ₀/2) e^(cs), forward and backward alike for |v|.
+/// dθ/ds = c sin θ along a way s has the solution tan(θ/2) = tan(θ₀/2) e^(cs), forward and backward alike for
+/// |v|.
 #[test]
 fn a_yaw_that_goes_with_the_heading_bends_the_path_as_its_equation_says() {
     const C: f64 = 0.2;
@@ -126,7 +129,8 @@ fn a_yaw_that_goes_with_the_heading_bends_the_path_as_its_equation_says() {
         let motions = vec![Motion::Spin { turn_rad: 1.0 }, Motion::Straight { length_m }];
         let end = driven(scenario(), motions).expect("drives");
         let expected_rad = 2.0 * ((0.5_f64).tan() * C.exp()).atan();
-        // Whole counts are 12.5 µm at each wheel, 7e-5 rad over both, twice. With cos θ for sin θ it would be off by 0.08, with v for |v| backward by 0.3.
+        // Whole counts are 12.5 µm at each wheel, 7e-5 rad over both, twice. With cos θ for sin θ it would be
+        // off by 0.08, with v for |v| backward by 0.3.
         let off_rad = end.theta_rad - expected_rad;
         assert!(off_rad.abs() < 2e-4, "{length_m} m: {off_rad:.1e}");
     }
@@ -159,7 +163,8 @@ fn both_engines_mean_the_same_by_a_term_or_the_closed_form_refuses_it() {
         let of = |engine| ends(Scenario { engine, ..with(perfect(), &term(channel, covariates, coefficient)) });
         match of(Engine::ClosedForm) {
             Ok(end) => {
-                // The controllers end a little elsewhere than the closed form: what the term adds is what both mean.
+                // The controllers end a little elsewhere than the closed form: what the term adds is what
+                // both mean.
                 let off = difference(closed.to(end), stepped.to(of(stepping).expect("steps")));
                 // Whole counts, as in `tests/effects/laws.rs`.
                 assert!(off < 2e-4, "{channel:?} {covariates:?}: {off:e}");

@@ -1,4 +1,5 @@
-//! Worlds that do an effect in another functional form than its hypothesis has: the hypothesis must still take most of it away, with the right sign.
+//! Worlds that do an effect in another functional form than its hypothesis has: the hypothesis must still
+//! take most of it away, with the right sign.
 
 use dataset::Dataset;
 use effects::{Forward, Hooks, Hypothesis, Step, Stream};
@@ -90,7 +91,8 @@ impl Forward for SpringyPlay {
     }
 }
 
-/// A castor by its differential equation, ψ' = −sin ψ/trail per metre ahead: it trails at 0, stands on its head at π, and turns the robot as it flips.
+/// A castor by its differential equation, ψ' = −sin ψ/trail per metre ahead: it trails at 0, stands on its
+/// head at π, and turns the robot as it flips.
 #[derive(Default)]
 struct RollingCastor {
     psi_rad: f64,
@@ -105,7 +107,8 @@ impl Forward for RollingCastor {
         self.psi_rad = 0.0;
     }
 
-    /// A turn of the robot leaves the castor's direction in the room where it was, and rolling takes it behind.
+    /// A turn of the robot leaves the castor's direction in the room where it was, and rolling takes it
+    /// behind.
     fn floor(&mut self, step: &mut Step) {
         const TRAIL_M: f64 = 0.03;
         const BEHIND_M: f64 = 0.2;
@@ -120,7 +123,8 @@ impl Forward for RollingCastor {
     }
 }
 
-/// The least that a mean term of one size for all its parameters leaves of what was seen, as a share of the whole, with that size; over all shapes.
+/// The least that a mean term of one size for all its parameters leaves of what was seen, as a share of the
+/// whole, with that size; over all shapes.
 fn best(id: &str, dataset: &Dataset, unit: f64, watch: Watch) -> (f64, f64) {
     let Some(Hypothesis::Terms(variants)) = effects::hypothesis(id) else { panic!("{id} has mean terms") };
     let mut best = (f64::INFINITY, 0.0);
@@ -138,11 +142,13 @@ fn best(id: &str, dataset: &Dataset, unit: f64, watch: Watch) -> (f64, f64) {
     best
 }
 
-/// What may be left of an effect of another form. The forms are 20 to 40 % apart over the speeds and ways that are driven, about their common mean; a
-/// hypothesis that has nothing to do with the effect leaves more, which is asked of one.
+/// What may be left of an effect of another form. The forms are 20 to 40 % apart over the speeds and ways
+/// that are driven, about their common mean; a hypothesis that has nothing to do with the effect leaves more,
+/// which is asked of one.
 const LEFT: f64 = 0.4;
 
-/// And of a castor's differential equation: after a spin it swings through a quarter turn only, where the hypothesis has a whole flip or none.
+/// And of a castor's differential equation: after a spin it swings through a quarter turn only, where the
+/// hypothesis has a whole flip or none.
 const LEFT_OF_CASTOR: f64 = 0.65;
 
 #[test]

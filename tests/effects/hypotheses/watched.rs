@@ -1,4 +1,5 @@
-//! A robot without any imperfection but the one, watched exactly, and what counts and a mean term predict of it.
+//! A robot without any imperfection but the one, watched exactly, and what counts and a mean term predict of
+//! it.
 
 use dataset::{Dataset, Protocol, ProtocolSettings, Run, WheelLog};
 use effects::Forward;
@@ -8,7 +9,8 @@ use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
 
-/// The paper's robot without any imperfection or noise, stepped, under motion capture, logging as often as it is seen.
+/// The paper's robot without any imperfection or noise, stepped, under motion capture, logging as often as it
+/// is seen.
 pub(crate) fn perfect() -> Scenario {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml");
     let mut scenario = Scenario::read(&path).expect("the shipped scenario");
@@ -29,10 +31,12 @@ pub(crate) fn perfect() -> Scenario {
     scenario
 }
 
-/// Arcs of 1.5 wheelbases: the inner wheel runs at half of the outer one's speed, and both lie on the controller's lattice.
+/// Arcs of 1.5 wheelbases: the inner wheel runs at half of the outer one's speed, and both lie on the
+/// controller's lattice.
 const RADIUS_M: f64 = 1.5 * 0.363;
 
-/// Everything that excites something: both directions of both wheels, turns to both sides before reversals, and two yaw rates.
+/// Everything that excites something: both directions of both wheels, turns to both sides before reversals,
+/// and two yaw rates.
 pub(crate) fn motions() -> Vec<Motion> {
     let straight = |length_m| Motion::Straight { length_m };
     let arc = |turn_rad| Motion::Arc { radius_m: RADIUS_M, turn_rad };
@@ -104,14 +108,16 @@ pub(crate) fn sum(gradient: &[Pose], values: &[f64]) -> Pose {
 pub(crate) enum Watch {
     /// From each run's first measurement.
     FromTheStart,
-    /// From 2 s on: what a run's start leaves unknown, such as where in its gap a wheel was left, is over by then.
+    /// From 2 s on: what a run's start leaves unknown, such as where in its gap a wheel was left, is over by
+    /// then.
     OnceMoving,
-    /// From each measurement to the next; the root of the mean square counts. For a term that follows the log's beat: where it loses it, at standstills, what it
-    /// misses once would stay in the heading.
+    /// From each measurement to the next; the root of the mean square counts. For a term that follows the
+    /// log's beat: where it loses it, at standstills, what it misses once would stay in the heading.
     LookByLook,
 }
 
-/// Largest difference, metres or radians, between what was seen and what the counts and a term of these sizes predict.
+/// Largest difference, metres or radians, between what was seen and what the counts and a term of these sizes
+/// predict.
 pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64], watch: Watch) -> f64 {
     let from_s = if watch == Watch::OnceMoving { 2.0 } else { 0.0 };
     let geometry = dataset.robot.geometry().expect("valid");

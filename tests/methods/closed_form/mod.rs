@@ -1,5 +1,5 @@
-//! The five methods in closed form or of linear steps: each gives a known robot back to its order of approximation, says what it cannot see, and refuses
-//! what it cannot use.
+//! The five methods in closed form or of linear steps: each gives a known robot back to its order of
+//! approximation, says what it cannot see, and refuses what it cannot use.
 //!
 //! Statistical bounds are 4.5 standard errors, a false positive of 7e-6 for each of 60 comparisons.
 
@@ -206,14 +206,16 @@ fn each_gives_a_known_robot_back_without_noise() {
     }
 }
 
-/// Ramps and ripple of the stepped motors too: a sample is the mean of what the contact did, so that the sum is the travel whatever the speed.
+/// Ramps and ripple of the stepped motors too: a sample is the mean of what the contact did, so that the sum
+/// is the travel whatever the speed.
 #[test]
 fn a_tachometer_is_right_while_motors_accelerate() {
     let protocols = [Schedule::Straights { length_m: 2.0, runs: 2 }, Schedule::Spins { turn_rad: TAU, runs: 2 }];
     let mut scenario = with_tachometer(exact(ROBOTS[2], &protocols), 0.0);
     scenario.engine = Engine::Stepping { step_s: 1e-3 };
     let dataset = drive(&scenario);
-    // A spin is 1.2 m of wheel: a count of 91 000, and a fifth of one that the quadrature states are uneven by.
+    // A spin is 1.2 m of wheel: a count of 91 000, and a fifth of one that the quadrature states are uneven
+    // by.
     let error = off(&Tachometer, &dataset, expected(&Tachometer, ROBOTS[2]));
     assert!(error < 1.3e-5, "{error:e}");
     let swapped = &mut dataset.clone();
@@ -228,7 +230,8 @@ fn linear_needs_no_dense_log_and_takes_poses_of_any_number() {
     let all = |form| Linear { form, readings: Readings::All };
     for robot in ROBOTS {
         let scenario = exact(robot, &protocols);
-        // Ends at standstills are exact; on the way a count is cut, of some hundred thousand over half a circle.
+        // Ends at standstills are exact; on the way a count is cut, of some hundred thousand over half a
+        // circle.
         for (dataset, methods, tolerance) in [
             (drive(&scenario), [Linear::DEFAULT, GENERAL], 1e-9),
             (drive(&filmed(scenario.clone(), 0.0)), [all(Form::Physical), all(Form::General)], 1e-5),
@@ -283,13 +286,15 @@ fn what_a_method_cannot_see_it_says_and_keeps() {
             assert!((one / other - 1.0).abs() < 1e-9, "{}: {one} {other}", method.name());
         }
     }
-    // What they do see: a base that is off, and for jung_chung a scale without its base, as a base by 1/scale.
+    // What they do see: a base that is off, and for jung_chung a scale without its base, as a base by
+    // 1/scale.
     let squares = [Schedule::Squares { side_m: 4.0, runs_each_way: 1 }];
     let base_m =
         |robot| lengths(&JungChung.calibrate(&[drive(&exact(robot, &squares)).session()]).expect("applies"))[2];
     assert!((base_m((1.05, 1.0, 1.0)) * 1.05 / BASE_M - 1.0).abs() < 2e-6);
     assert!((base_m((1.0, 1.0, 1.05)) / 1.05 / BASE_M - 1.0).abs() < 2e-6);
-    // Poses on the way show `linear` the scale that a closed path's ends hide: a count of 3e5 a side, read on the move.
+    // Poses on the way show `linear` the scale that a closed path's ends hide: a count of 3e5 a side, read on
+    // the move.
     let robot = (1.05, 0.999, 1.02);
     let all = Linear { readings: Readings::All, ..Linear::DEFAULT };
     let dataset = drive(&filmed(exact(robot, &squares), 0.0));
@@ -342,9 +347,11 @@ fn what_a_method_cannot_use_it_refuses_and_says_what_to_drive() {
     assert!(refusal.contains("read the pose on the way"), "{refusal}");
 }
 
-/// Noise as the paper's (marks read to 0.5 mm and rounded to 1 mm, wheels of 0.5 mm/√m, a base that scatters by 1 mm, ticks of 1 mm) and a tachometer of
-/// 2 mm/s: values and variances are right on average. Of the variances, 4.5 standard errors of a sample variance over 1000 trials and of the mean of reported
-/// ones are 0.21: a deviation of the mean that is not divided by the runs, or a radius taken for a diameter, would be off by 4 and more.
+/// Noise as the paper's (marks read to 0.5 mm and rounded to 1 mm, wheels of 0.5 mm/√m, a base that scatters
+/// by 1 mm, ticks of 1 mm) and a tachometer of 2 mm/s: values and variances are right on average. Of the
+/// variances, 4.5 standard errors of a sample variance over 1000 trials and of the mean of reported ones are
+/// 0.21: a deviation of the mean that is not divided by the runs, or a radius taken for a diameter, would be
+/// off by 4 and more.
 #[test]
 fn values_and_their_variances_are_right_on_average() {
     const TRIALS: u32 = 1000;
@@ -352,7 +359,8 @@ fn values_and_their_variances_are_right_on_average() {
     let straights = |length_m, runs| Schedule::Straights { length_m, runs };
     let spins = |turn_rad, runs| Schedule::Spins { turn_rad, runs };
     let circles = |turns, runs_each_way| Schedule::Circles { radius_m: 1.0, turns, runs_each_way };
-    // With each method the degrees of freedom of its variances: the fewest runs of a kind, less what is estimated.
+    // With each method the degrees of freedom of its variances: the fewest runs of a kind, less what is
+    // estimated.
     let driven: [(&dyn Method, Vec<Schedule>, f64); 5] = [
         (&JungChung, vec![Schedule::Squares { side_m: 4.0, runs_each_way: 10 }], 18.0),
         (&Circular, vec![circles(None, 10)], 18.0),
@@ -396,8 +404,9 @@ fn values_and_their_variances_are_right_on_average() {
     }
 }
 
-/// The bias that the header of `linear` states: headings that err by σ at the start bring the lengths out at exp(−σ²/2) of themselves, whatever the number of
-/// runs. Rejects no bias, and one of σ² (2.8 % and 5.5 % against 0.1 %).
+/// The bias that the header of `linear` states: headings that err by σ at the start bring the lengths out at
+/// exp(−σ²/2) of themselves, whatever the number of runs. Rejects no bias, and one of σ² (2.8 % and 5.5 %
+/// against 0.1 %).
 #[test]
 fn linear_comes_out_short_by_half_the_variance_of_the_headings() {
     let sigma_rad: f64 = 0.24;
@@ -411,13 +420,15 @@ fn linear_comes_out_short_by_half_the_variance_of_the_headings() {
         relative.push(Linear::DEFAULT.calibrate(&[session]).expect("applies").geometry.wheel_separation_m() / base_m);
     }
     let (mean, error) = relative.bias().expect("many");
-    // Step 1's own error, σ√2/√60 of heading over each straight, turns the regressors by half of it on average: σ²/240 more.
+    // Step 1's own error, σ√2/√60 of heading over each straight, turns the regressors by half of it on
+    // average: σ²/240 more.
     let expected = (-0.5 * sigma_rad * sigma_rad).exp() * (1.0 - sigma_rad * sigma_rad / 240.0);
     assert!((mean - expected).abs() < Z_LIMIT * error + 1e-4, "{mean} ± {error}, not {expected}");
     assert!(Z_LIMIT * error < 5e-3 && expected < 0.975, "{error}");
 }
 
-/// Mean final headings of a dataset's squares (true minus nominal odometry, radians), clockwise and counter-clockwise, and the runs of a direction.
+/// Mean final headings of a dataset's squares (true minus nominal odometry, radians), clockwise and
+/// counter-clockwise, and the runs of a direction.
 fn final_headings(dataset: &Dataset) -> ([f64; 2], f64) {
     let geometry = dataset.robot.geometry().expect("nominal");
     let (mut sums, mut runs) = ([0.0; 2], 0.0);
@@ -434,8 +445,9 @@ fn final_headings(dataset: &Dataset) -> ([f64; 2], f64) {
     (sums.map(|sum| sum / runs), runs)
 }
 
-/// Jung & Chung's formulas as OptiOdom's program has them: the corner's angle with π b β/(4L) for unequal wheels, a side for the chord of its bend. The mean
-/// headings are divided by the runs of a direction a second time where `twice` is set, as that program does.
+/// Jung & Chung's formulas as OptiOdom's program has them: the corner's angle with π b β/(4L) for unequal
+/// wheels, a side for the chord of its bend. The mean headings are divided by the runs of a direction a
+/// second time where `twice` is set, as that program does.
 fn as_optiodom(dataset: &Dataset, twice: bool) -> [f64; 3] {
     let ([cw, ccw], runs) = final_headings(dataset);
     let [cw, ccw] = [cw, ccw].map(|mean| if twice { mean / runs } else { mean });
@@ -449,7 +461,8 @@ fn as_optiodom(dataset: &Dataset, twice: bool) -> [f64; 3] {
     [mean_m * (1.0 - q), mean_m * (1.0 + q), base_m]
 }
 
-/// Dividing the mean heading by the number of runs once more leaves a fifth of the correction with five runs a direction: on the paper's robot a base of
+/// Dividing the mean heading by the number of runs once more leaves a fifth of the correction with five runs
+/// a direction: on the paper's robot a base of
 /// 360.6 mm where 351.47 is right (its wheels are 3.28 % larger than believed). And a term for unequal wheels in the corner is wrong where they are unequal.
 #[test]
 fn jung_chung_divides_once_and_does_not_couple_the_corner() {

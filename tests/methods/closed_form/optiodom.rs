@@ -17,7 +17,8 @@ fn optiodom(session: &Path) -> Dataset {
     imported.remove(0).dataset
 }
 
-/// Sessions of one method in `published-results.csv` with what was published: the dataset on the row's nominal values; left and right diameter and base.
+/// Sessions of one method in `published-results.csv` with what was published: the dataset on the row's
+/// nominal values; left and right diameter and base.
 fn published(folder: &Path, method: &str) -> Vec<(String, Dataset, [f64; 3])> {
     let text = std::fs::read_to_string(folder.join("published-results.csv")).expect("the published table");
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
@@ -54,7 +55,8 @@ fn published_optiodom_ivanjko() {
             "{session}: {:?}, published {published:?}",
             lengths(&found)
         );
-        // What must not pass: the wheels swapped, one direction of the spins, and the chord of the whole run in place of its end.
+        // What must not pass: the wheels swapped, one direction of the spins, and the chord of the whole run
+        // in place of its end.
         let mut swapped = dataset.clone();
         swapped_counts(&mut swapped);
         assert!(
@@ -70,7 +72,8 @@ fn published_optiodom_ivanjko() {
     }
 }
 
-/// The published values of Jung & Chung's method come out to the last digit when the mean heading is divided by the runs twice, and only then.
+/// The published values of Jung & Chung's method come out to the last digit when the mean heading is divided
+/// by the runs twice, and only then.
 #[test]
 fn published_optiodom_jung_chung_is_divided_twice() {
     let Some(folder) = real_data("published_optiodom_jung_chung_is_divided_twice", "optiodom") else { return };
@@ -81,13 +84,15 @@ fn published_optiodom_jung_chung_is_divided_twice() {
         assert!(!agree(as_optiodom(&dataset, false), published), "{session}: divided once");
         let found = lengths(&JungChung.calibrate(&[dataset.session()]).expect("squares both ways"));
         let nominal_m = dataset.robot.wheel_separation_m;
-        // A second division by three or five leaves a third or a fifth of the correction, and the corner's term takes a little of it.
+        // A second division by three or five leaves a third or a fifth of the correction, and the corner's
+        // term takes a little of it.
         let share = (published[2] - nominal_m) / (found[2] - nominal_m);
         assert!((0.15..0.36).contains(&share), "{session}: {share}");
     }
 }
 
-/// docs/calibration.md, "On logged sessions": `| method | kind/session | B | D_R | D_L |` in millimetres, each with its sigma.
+/// docs/calibration.md, "On logged sessions": `| method | kind/session | B | D_R | D_L |` in millimetres,
+/// each with its sigma.
 #[test]
 fn optiodom_sessions_stand_in_the_document_as_found() {
     let Some(folder) = real_data("optiodom_sessions_stand_in_the_document_as_found", "optiodom") else { return };

@@ -1,5 +1,6 @@
-//! The bound by brute force: every raw reading of one run in one vector, its covariance from each source of noise by finite differences, the start pose
-//! eliminated at the end. What is driven and when it is seen is taken from a simulated run, nothing from the bound's own code.
+//! The bound by brute force: every raw reading of one run in one vector, its covariance from each source of
+//! noise by finite differences, the start pose eliminated at the end. What is driven and when it is seen is
+//! taken from a simulated run, nothing from the bound's own code.
 
 use dataset::{Run, WheelLog};
 use kinematics::{BridgeCovariance, DriveGeometry, Increment, Point, Pose, Side, Wheels};

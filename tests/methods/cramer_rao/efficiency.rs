@@ -1,7 +1,8 @@
 //! Who reaches the bound, who stays above it and by how much.
 //!
-//! The oracle starts at the truth and takes one step of weighted least squares with the filter's slopes and covariances: linear and unbiased, it must reach the
-//! bound, which says that the bound is not too low. A method that beats it would say that it is too high. Ratios are mean squared error over bound with the
+//! The oracle starts at the truth and takes one step of weighted least squares with the filter's slopes and
+//! covariances: linear and unbiased, it must reach the bound, which says that the bound is not too low. A
+//! method that beats it would say that it is too high. Ratios are mean squared error over bound with the
 //! Monte-Carlo error of the numerator; limits are z scores of 4.5, a false positive of 7e-6 each.
 
 use bench::{FisherInformation, Innovation, Moments};

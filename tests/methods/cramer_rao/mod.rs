@@ -1,7 +1,9 @@
-//! The Cramér–Rao bound against what does not share its code: textbook cases by hand, finite differences, a batch over raw readings, simulated robots, and
-//! estimators that must not beat it and one that must reach it.
+//! The Cramér–Rao bound against what does not share its code: textbook cases by hand, finite differences, a
+//! batch over raw readings, simulated robots, and estimators that must not beat it and one that must reach
+//! it.
 //!
-//! Statistical tests have fixed seeds; their limits are z scores with Monte-Carlo errors from the samples themselves, and each says its rate of false positives.
+//! Statistical tests have fixed seeds; their limits are z scores with Monte-Carlo errors from the samples
+//! themselves, and each says its rate of false positives.
 
 mod batch;
 mod efficiency;
@@ -24,7 +26,8 @@ fn paper() -> Scenario {
     Scenario::read(&path).expect("the shipped scenario")
 }
 
-/// The paper's robot as it believes itself to be, with marks over its wheels and nothing random but the readings.
+/// The paper's robot as it believes itself to be, with marks over its wheels and nothing random but the
+/// readings.
 fn ideal(reading_sigma_m: f64) -> Scenario {
     let mut scenario = paper();
     scenario.effects.clear();
@@ -78,8 +81,9 @@ fn straights_under_reading_errors_alone_give_c_to_the_textbook_variance() {
     let (sigma_m, length_m, runs) = (5e-4, 0.5, 82);
     let scenario = ideal(sigma_m);
     let found = information(&scenario, &[Schedule::Straights { length_m, runs }]);
-    // Each wheel's path is the distance of two readings of the mark above it: C varies by 2σ²/N² a run. That the middle's path across and the
-    // heading tell the same turn adds nothing: with equal errors at both ends the two are one measurement.
+    // Each wheel's path is the distance of two readings of the mark above it: C varies by 2σ²/N² a run. That
+    // the middle's path across and the heading tell the same turn adds nothing: with equal errors at both
+    // ends the two are one measurement.
     let ticks = length_m / (std::f64::consts::PI * 0.16) * scenario.robot.encoder.counts_per_wheel_turn();
     let textbook = 2.0 * sigma_m * sigma_m / (ticks * ticks) / f64::from(runs);
     for parameter in [Parameter::LeftPerTick, Parameter::RightPerTick] {
@@ -96,8 +100,9 @@ fn spins_beside_straights_give_the_separation_to_the_textbook_variance() {
     let straights = Schedule::Straights { length_m, runs: 82 };
     let spins = Schedule::Spins { turn_rad, runs: 30 };
     assert_eq!(information(&scenario, &[spins]).bound_var(Parameter::WheelSeparation), None, "C and B together turn");
-    // B = (C_R + C_L) N/θ: its relative error is that of the mean sensitivity, σ² over L² a straight (the middle of two marks, twice), and that
-    // of the turn: two axles of marks at ±b/2, 2·2σ²/b², a spin. The commanded turn is rounded to whole counts: 1e-5.
+    // B = (C_R + C_L) N/θ: its relative error is that of the mean sensitivity, σ² over L² a straight (the
+    // middle of two marks, twice), and that of the turn: two axles of marks at ±b/2, 2·2σ²/b², a spin. The
+    // commanded turn is rounded to whole counts: 1e-5.
     let relative = sigma_m * sigma_m / (length_m * length_m) / 82.0
         + 4.0 * sigma_m * sigma_m / (0.363 * 0.363) / (turn_rad * turn_rad) / 30.0;
     let var = information(&scenario, &[straights, spins]).bound_var(Parameter::WheelSeparation).expect("seen");
@@ -166,7 +171,8 @@ fn slopes_are_central_differences_and_would_not_pass_wrong() {
         for (column, difference) in columns.iter().enumerate() {
             let difference = difference / (2.0 * h);
             let off = (slope.column(column) - difference).abs().max();
-            // Truncation h²/6 times a third derivative: 16 m of wheel turn the square by 16/(d·B) = 275 rad/m, 4 m times its cube is 8e7 m/m³:
+            // Truncation h²/6 times a third derivative: 16 m of wheel turn the square by 16/(d·B) = 275
+            // rad/m, 4 m times its cube is 8e7 m/m³:
             // 1.4e-7. Rounding: 1e-15 of 16 m over 1e-7, 2e-7.
             let tolerance = 5e-7;
             assert!(off < tolerance, "{motions:?} {column}: {off}");
@@ -207,7 +213,8 @@ fn information_is_that_of_a_batch_over_all_raw_readings() {
         let found = FisherInformation::of(scenario, &[program(motions)]).expect("bounded");
         let batch = Batch::of(scenario, motions, Wrong::Nothing);
         let off = difference(found.matrix(), &batch.information());
-        // The batch's slopes are differences with a step of 1e-6: good to 1e-9 of a slope, times the condition of its covariance's blocks, 1e2.
+        // The batch's slopes are differences with a step of 1e-6: good to 1e-9 of a slope, times the
+        // condition of its covariance's blocks, 1e2.
         assert!(off < 1e-6, "{off}\n{}\n{}", found.matrix(), batch.information());
         for wrong in [Wrong::NoScatterWithin, Wrong::IndependentRounding] {
             let off = difference(found.matrix(), &Batch::of(scenario, motions, wrong).information());
@@ -230,7 +237,8 @@ fn changed(scenario: &Scenario, shares: [f64; 3]) -> Scenario {
 
 #[test]
 fn what_the_covariance_tells_of_the_geometry_is_little() {
-    // The second term of Kay's (3.31), ½ tr(S⁻¹ ∂ᵢS S⁻¹ ∂ⱼS), is left out of the bound: how much lower would the bound be?
+    // The second term of Kay's (3.31), ½ tr(S⁻¹ ∂ᵢS S⁻¹ ∂ⱼS), is left out of the bound: how much lower would
+    // the bound be?
     let scenario = paper();
     let geometry = scenario.true_geometry().expect("a drive");
     let diameter_m = geometry.wheel_diameter_m();

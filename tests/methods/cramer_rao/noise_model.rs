@@ -1,8 +1,9 @@
-//! The filter's noise is the simulator's: what dead reckoning from recorded counts misses of the end that was seen, over many simulated runs, has the
-//! innovation's covariance.
+//! The filter's noise is the simulator's: what dead reckoning from recorded counts misses of the end that was
+//! seen, over many simulated runs, has the innovation's covariance.
 //!
-//! Misses are whitened by the filter's covariance; then all six second moments are 1 or 0. Each is held by a z score with the sample's own error, at 5: a
-//! false alarm of 6e-7 each, 1e-4 over the file. Rejected by the same score: no scatter inside arcs, and roundings that are independent.
+//! Misses are whitened by the filter's covariance; then all six second moments are 1 or 0. Each is held by a
+//! z score with the sample's own error, at 5: a false positive of 6e-7 each, 1e-4 over the file. Rejected by
+//! the same score: no scatter inside arcs, and roundings that are independent.
 
 use bench::Innovation;
 use dataset::{Dataset, Run};
@@ -187,7 +188,8 @@ fn everything_together() {
     }
     for motions in programs() {
         let held = hold(&scenario, &motions);
-        // Beside readings of a millimetre the scatter inside a spin or a short straight is lost; a square's is not.
+        // Beside readings of a millimetre the scatter inside a spin or a short straight is lost; a square's
+        // is not.
         if motions.len() > 1 {
             reject(Wrong::NoScatterWithin, &scenario, &motions, &held);
             reject(Wrong::IndependentRounding, &scenario, &motions, &held);

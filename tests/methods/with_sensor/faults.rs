@@ -1,4 +1,5 @@
-//! What is wrong with methods as they were published or programmed, on robots without any noise: the numbers of docs/methods.md.
+//! What is wrong with methods as they were published or programmed, on robots without any noise: the numbers
+//! of docs/methods.md.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -47,9 +48,10 @@ fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
     POSITIONS.cost(std::slice::from_ref(session), &geometry(lengths_m)).expect("poses").value_m2
 }
 
-/// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by 0.5 % and are halved where a slope changes its
-/// sign. It ends when the mean cost of ten steps is within 0.1 % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a
-/// narrow valley: it bounces from side to side, the mean stays, and that is taken for the end.
+/// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by
+/// 0.5 % and are halved where a slope changes its sign. It ends when the mean cost of ten steps is within 0.1
+/// % of that of the ten before, after 30 steps at the soonest. Its least steps are too long for a narrow
+/// valley: it bounces from side to side, the mean stays, and that is taken for the end.
 fn rprop(session: &Session<'_>) -> Vector3<f64> {
     const MIN_M: f64 = 1e-5;
     let sessions = std::slice::from_ref(session);
@@ -101,7 +103,8 @@ fn optiodom(session: &std::path::Path) -> Dataset {
     importer("optiodom").expect("the importer").read(session).expect("a session").remove(0).dataset
 }
 
-/// Newton's steps on the cost by its exact gradient, whose derivative is taken by differences: the minimum of positions alone near the published values.
+/// Newton's steps on the cost by its exact gradient, whose derivative is taken by differences: the minimum of
+/// positions alone near the published values.
 fn minimum(session: &Session<'_>, from: Vector3<f64>) -> Vector3<f64> {
     let sessions = std::slice::from_ref(session);
     let slope = |lengths_m: &Vector3<f64>| POSITIONS.cost(sessions, &geometry(lengths_m)).expect("poses").gradient_m;
@@ -118,8 +121,9 @@ fn minimum(session: &Session<'_>, from: Vector3<f64>) -> Vector3<f64> {
     lengths_m
 }
 
-/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and how many micrometres the left diameter is short
-/// there. The descent above ends within 63 µm of the published values (rounding to a micrometre, and what we do not know of the program), and so does not go on
+/// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and
+/// how many micrometres the left diameter is short there. The descent above ends within 63 µm of the
+/// published values (rounding to a micrometre, and what we do not know of the program), and so does not go on
 /// to the minimum either.
 const ABOVE_THE_MINIMUM: [(&str, f64, f64); 6] = [
     ("250620202104", 1.21, 495.0),
@@ -196,14 +200,15 @@ fn end_errors(dataset: &Dataset) -> [(f64, f64); 2] {
     errors
 }
 
-/// UMBmark's E_d and E_b from the x errors of both ways round, squares of 4 m.
+/// UMBmark's E_d and E_b from the x errors of in both directions, squares of 4 m.
 fn by_umbmark(cw_m: f64, ccw_m: f64) -> (f64, f64) {
     let (alpha, beta) = ((cw_m + ccw_m) / -16.0, (cw_m - ccw_m) / -16.0);
     let q = 0.363 / 4.0 * (0.5 * beta).sin();
     ((1.0 + q) / (1.0 - q), FRAC_PI_2 / (FRAC_PI_2 - alpha))
 }
 
-/// (E_d, E_b) of a robot, what UMBmark finds of them, and what it finds where the squares begin along +y and its formula for x is used all the same.
+/// (E_d, E_b) of a robot, what UMBmark finds of them, and what it finds where the squares begin along +y and
+/// its formula for x is used all the same.
 const UMBMARK: [[(f64, f64); 3]; 4] = [
     [(1.002, 1.01), (1.0019, 1.0093), (0.9984, 0.9854)],
     [(1.01, 1.05), (1.0070, 1.0297), (0.9901, 0.9207)],
@@ -232,7 +237,8 @@ fn umbmark_is_of_first_order_and_its_axes_may_not_be_exchanged() {
     }
 }
 
-/// Regression through the origin of the reference's speed on the wheel's, sample by sample, over all runs: metres a tick of the left wheel.
+/// Regression through the origin of the reference's speed on the wheel's, sample by sample, over all runs:
+/// metres a tick of the left wheel.
 fn slope(dataset: &Dataset) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for run in &dataset.runs {
@@ -247,8 +253,8 @@ fn slope(dataset: &Dataset) -> f64 {
     product / square
 }
 
-/// Ticks of 1 mm at 0.25 m/s, 47 rows a second: 5.319 ticks a row come as fives and sixes, with a variance of 0.319 · 0.681 about their mean, which is 0.76 %
-/// of the square.
+/// Ticks of 1 mm at 0.25 m/s, 47 rows a second: 5.319 ticks a row come as fives and sixes, with a variance of
+/// 0.319 · 0.681 about their mean, which is 0.76 % of the square.
 #[test]
 fn a_slope_through_the_origin_is_drawn_towards_zero_by_the_rounding_of_the_counts() {
     let mut scenario = shipped("paper.toml");

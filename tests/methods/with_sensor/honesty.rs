@@ -1,4 +1,5 @@
-//! Do the methods with a sensor know how well they know? Statistical: fixed seeds, bounds from the number of trials.
+//! Do the methods with a sensor know how well they know? Statistical: fixed seeds, bounds from the number of
+//! trials.
 
 use bench::{Moments, Trial};
 use calib::methods::augmented_kalman::AugmentedKalman;
@@ -27,7 +28,8 @@ fn normalised(found: &Calibration, truth: &DriveGeometry, body_from_sensor: Pose
         .collect()
 }
 
-/// A path seen in displacements between instants about a second apart, each with errors of its own; a share of them lies far off.
+/// A path seen in displacements between instants about a second apart, each with errors of its own; a share
+/// of them lies far off.
 fn mahalanobis_distance(trial: &Dataset, number: u64, outliers: f64) -> Dataset {
     const NOISE: StreamName = StreamName::new("displacement");
     let mut seen = trial.clone();
@@ -67,8 +69,9 @@ fn mean_square(errors: &[Moments], trials: u32) -> Vec<f64> {
         .collect()
 }
 
-/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false positive of 4e-4 a case. Trimming normal errors costs an efficiency
-/// that Fisher's information does not know of: 4 % dropped in each of position and heading, up to 1.3 of the variance were it iterated for ever.
+/// 400 trials, six parameters: bounds at four standard errors of a mean square are a false positive of 4e-4 a
+/// case. Trimming normal errors costs an efficiency that Fisher's information does not know of: 4 % dropped
+/// in each of position and heading, up to 1.3 of the variance were it iterated for ever.
 #[test]
 fn censi_finds_drive_and_mounting_and_knows_how_well() {
     let trials = 400;
@@ -104,10 +107,10 @@ fn censi_finds_drive_and_mounting_and_knows_how_well() {
     assert!(trimmed_m < 2.0 * usual_m && spoilt_m > 5.0 * usual_m, "{usual_m} {trimmed_m} {spoilt_m}");
 }
 
-/// 200 trials of 24 runs, three parameters. The filter's model is the simulator's: mean squares within four standard errors (2e-4 a case), whether it is told
-/// the instrument's noise or finds it.
-/// `segments` leaves out one run at a time, whose scatter follows Student's t with some 20 degrees of freedom: ν/(ν−2), and leverage on top of it, up to 1.3.
-/// Rejected: sigmas understated to 0.6 of themselves.
+/// 200 trials of 24 runs, three parameters. The filter's model is the simulator's: mean squares within four
+/// standard errors (2e-4 a case), whether it is told the instrument's noise or finds it. `segments` leaves
+/// out one run at a time, whose scatter follows Student's t with some 20 degrees of freedom: ν/(ν−2), and
+/// leverage on top of it, up to 1.3. Rejected: sigmas understated to 0.6 of themselves.
 #[test]
 fn segments_and_the_filter_find_the_drive_and_know_how_well() {
     let trials = 200;

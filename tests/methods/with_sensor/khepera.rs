@@ -51,8 +51,8 @@ fn fit(found: &Calibration) -> CensiFit {
     }
 }
 
-/// They print six digits: half a unit of the last one is 6e-6 of a diameter, and less of the rest. Rejected: no trimming, the wheels for each other, and the
-/// pose of the robot in the sensor's frame.
+/// They print six digits: half a unit of the last one is 6e-6 of a diameter, and less of the rest. Rejected:
+/// no trimming, the wheels for each other, and the pose of the robot in the sensor's frame.
 #[test]
 fn published_khepera() {
     let Some(folder) = real_data("published_khepera", "khepera") else { return };

@@ -1,4 +1,5 @@
-//! `censi`, `segments` and `augmented_kalman`: the methods that take an outside instrument's poses on any path, from the simulator and on real logs.
+//! `censi`, `segments` and `augmented_kalman`: the methods that take an outside instrument's poses on any
+//! path, from the simulator and on real logs.
 
 mod faults;
 mod honesty;
@@ -28,7 +29,8 @@ fn shipped(name: &str) -> Scenario {
     Scenario::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name)).expect("a shipped scenario")
 }
 
-/// Motion capture of a robot whose wheels are 1 % large, unequal by 0.2 % and 1.5 % farther apart than it believes, and that is else as modelled.
+/// Motion capture of a robot whose wheels are 1 % large, unequal by 0.2 % and 1.5 % farther apart than it
+/// believes, and that is else as modelled.
 fn motion_capture(body_from_sensor: Pose) -> Scenario {
     let mut scenario = shipped("motion-capture.toml");
     scenario.engine = Engine::ClosedForm;
@@ -74,7 +76,8 @@ fn exact(protocols: Vec<Schedule>) -> sim_yair::Simulation {
     sim_yair::simulate(&scenario, 1, 0).expect("simulates")
 }
 
-/// Whole counts are commanded and the wheels stop where they began within a count: what is left are roundings through normal equations, as in `direct`: 1e-9.
+/// Whole counts are commanded and the wheels stop where they began within a count: what is left are roundings
+/// through normal equations, as in `direct`: 1e-9.
 #[test]
 fn without_noise_each_method_gives_the_robot_back() {
     for method in METHODS {
@@ -98,7 +101,8 @@ fn without_noise_each_method_gives_the_robot_back() {
     }
 }
 
-/// The same through marks that are measured in a frame that is not the drive's: the frame is what `censi` finds.
+/// The same through marks that are measured in a frame that is not the drive's: the frame is what `censi`
+/// finds.
 #[test]
 fn without_noise_censi_gives_the_mounting_back() {
     let mut simulation = exact(Censi::DEFAULT.protocol());

@@ -1,4 +1,5 @@
-//! The augmented filter as a robot would run it: one row of the log after the other, poses of the instrument as they come.
+//! The augmented filter as a robot would run it: one row of the log after the other, poses of the instrument
+//! as they come.
 
 use bench::Trial;
 use calib::methods::augmented_kalman::{AugmentedFilter, NoiseFilter};
@@ -26,7 +27,8 @@ fn stream(run: &RunView<'_>) -> Vec<Row> {
     rows
 }
 
-/// Drives through a session once and gives the filter with the sum of the normalised innovations and their number.
+/// Drives through a session once and gives the filter with the sum of the normalised innovations and their
+/// number.
 fn once(session: &Session<'_>, noise: NoiseFilter) -> (AugmentedFilter<i64>, f64, f64) {
     let nominal = session.robot.geometry().expect("a drive");
     let m_per_count = nominal.m_per_count(session.robot.ticks_per_rev.expect("ticks")).expect("positive");
@@ -64,8 +66,9 @@ fn errors_in_sigmas(filter: &AugmentedFilter<i64>, truth: &DriveGeometry) -> [f6
     std::array::from_fn(|i| (found[i] - truth[i]) / covariance[(i, i)].sqrt())
 }
 
-/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with three degrees of freedom a measurement: their sum lies
-/// within 4.5 standard deviations √(6 n) (7e-6). Rejects a filter that is told wheels of half the noise.
+/// One pass, once with the noise told and once to be found. With the noise told, the innovations are χ² with
+/// three degrees of freedom a measurement: their sum lies within 4.5 standard deviations √(6 n) (7e-6).
+/// Rejects a filter that is told wheels of half the noise.
 #[test]
 fn row_by_row_the_filter_finds_the_drive_and_its_innovations_are_as_large_as_it_says() {
     let (sigma_m, sigma_rad) = (3e-4, 5e-4);

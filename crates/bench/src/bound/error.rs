@@ -17,10 +17,10 @@ pub enum NoBound {
     /// The true geometry is not physical.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-    /// Nothing looks at the robot.
+    /// Nothing measures the robot.
     #[error("no instrument sees the robot")]
     NoInstrument,
-    /// A tachometer measures the wheels, and the bound takes looks at the pose alone.
+    /// A tachometer measures the wheels, and the bound takes measurements of the pose alone.
     #[error("a tachometer's wheel speeds are no pose measurement: leave the instrument out for a bound")]
     WheelSpeeds,
     /// The floor grid reads fewer than two distinct points.

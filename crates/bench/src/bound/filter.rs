@@ -1,10 +1,12 @@
 //! The Kalman filter of one run, with the slopes of its predictions in the geometry.
 //!
-//! State: the error of the pose reckoned from the recorded counts (true minus reckoned, axes of the start), and what moves it and lasts: the relative errors of
-//! both wheels' sensitivities and the separation's error, each drawn anew a motion and constant in it, and the rounding u of each wheel's counts at each phase of
-//! a tick at which it stands still. True travel is C(ΔN + u₁ − u₀) with u = frac(u₀ + F), u₀ uniform: Var u = 1/12 tick² and Cov(u_i, u_j) = 1/12 − f(1−f)/2,
-//! f = frac(F_j − F_i). So equal phases share their rounding, a motion of whole ticks has none, and every number of rows has its exact second moments.
-//! Slopes go through prediction and update as the state does: D ← ΦD + ∂f/∂β, D ← (I − KH)D.
+//! State: the error of the pose dead-reckoned from the recorded counts (true minus dead-reckoned, axes of the
+//! start), and what moves it and lasts: the relative errors of both wheels' sensitivities and the
+//! separation's error, each drawn anew a motion and constant in it, and the rounding u of each wheel's counts
+//! at each phase of a tick at which it stands still. True travel is C(ΔN + u₁ − u₀) with u = frac(u₀ + F), u₀
+//! uniform: Var u = 1/12 tick² and Cov(u_i, u_j) = 1/12 − f(1−f)/2, f = frac(F_j − F_i). So equal phases
+//! share their rounding, a motion of whole ticks has none, and every number of rows has its exact second
+//! moments. Slopes go through prediction and update as the state does: D ← ΦD + ∂f/∂β, D ← (I − KH)D.
 
 use kinematics::{Increment, OdometryCovariance, Pose, Side, Wheels, sinc, sinc_derivative};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
@@ -23,7 +25,8 @@ const SEPARATION: usize = 5;
 /// Roundings of the counts, ticks: the left wheel's phases, then the right one's.
 const ROUNDING: usize = 6;
 
-/// An innovation has no error where its variance, in shares of the largest that each axis has had, is below this: a thousand roundings of a double.
+/// An innovation has no error where its variance, in shares of the largest that each axis has had, is below
+/// this: a thousand roundings of a double.
 const NO_ERROR_SHARE: f64 = 1e-13;
 
 /// A run on its way.
@@ -147,7 +150,7 @@ impl<'a> Filter<'a> {
         let by_pose = self.covariance.columns(POSE, 3).into_owned();
         let gain = &by_pose * precision;
         self.covariance -= &gain * by_pose.transpose();
-        // Rounding would let the two halves drift apart over thousands of looks.
+        // Rounding would let the two halves drift apart over thousands of measurements.
         self.covariance = 0.5 * (&self.covariance + self.covariance.transpose());
         self.slope -= slope.transpose() * gain.transpose();
         Ok(())
@@ -169,13 +172,15 @@ impl<'a> Filter<'a> {
     }
 }
 
-/// Cov(u_i, u_j), ticks², of two roundings between which the wheel turns `counts`: 1/12 − f(1−f)/2 with f the fraction of a tick.
+/// Cov(u_i, u_j), ticks², of two roundings between which the wheel turns `counts`: 1/12 − f(1−f)/2 with f the
+/// fraction of a tick.
 fn rounding_covariance(counts: i64, counts_per_tick: u32) -> f64 {
     let fraction = counts.rem_euclid(i64::from(counts_per_tick)) as f64 / f64::from(counts_per_tick);
     1.0 / 12.0 - 0.5 * fraction * (1.0 - fraction)
 }
 
-/// Slopes of the pose after an exact arc: s·sinc(θ/2) along θ₀ + θ/2 with s = (s_R + s_L)/2 and θ = (s_R − s_L)/B.
+/// Slopes of the pose after an exact arc: s·sinc(θ/2) along θ₀ + θ/2 with s = (s_R + s_L)/2 and θ = (s_R −
+/// s_L)/B.
 struct ArcSlope {
     /// In the pose before it.
     carried: Matrix3<f64>,

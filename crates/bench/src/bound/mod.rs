@@ -1,13 +1,18 @@
 //! The Cramér–Rao bound of a protocol: how well its runs can tell the drive's geometry, whoever estimates.
 //!
-//! Model: a run is a state-space system, linear about its true path; a look's innovation has covariance S and slope H in the geometry, so I = Σ Hᵀ S⁻¹ H, and
-//! no unbiased estimator varies less than (I⁻¹)ⱼⱼ. Every run's start pose is unknown. What S itself tells of the geometry (Kay's second term) is left out:
-//! with it the bounds of the paper's protocol would be 1.4e-4 of themselves lower, those of its squares alone 0.5 %.
-//! Assumptions: errors are Gaussian with the simulator's second moments. Where they are uniform (rounded counts, the grid's rounding) the bound is that of the
-//! best *linear* estimator (Gauss–Markov), and others can beat it where rounding dominates: who knows the commanded counts needs no recorded ones.
-//! Not in it: whatever the robot has beyond geometry, wheel noise, contact patch and rounding (slip, play, latency, blunders), so that its harm shows as a
-//! ratio above one. Both engines have the same formulas; a stepped robot also settles after a motion and is seen a few times more.
-//! Reference: Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, eq. 3.31; Schweppe 1965 for the innovations' form.
+//! Model: a run is a state-space system, linear about its true path; a measurement's innovation has
+//! covariance S and slope H in the geometry, so I = Σ Hᵀ S⁻¹ H, and no unbiased estimator varies less than
+//! (I⁻¹)ⱼⱼ. Every run's start pose is unknown. What S itself tells of the geometry (Kay's second term) is
+//! left out: with it the bounds of the paper's protocol would be 1.4e-4 of themselves lower, those of its
+//! squares alone 0.5 %.
+//! Assumptions: errors are Gaussian with the simulator's second moments. Where they are uniform (rounded
+//! counts, the grid's rounding) the bound is that of the best *linear* estimator (Gauss–Markov), and others
+//! can beat it where rounding dominates: who knows the commanded counts needs no recorded ones. Not in it:
+//! whatever the robot has beyond geometry, wheel noise, contact patch and rounding (slip, play, latency,
+//! blunders), so that its harm shows as a ratio above one. Both engines have the same formulas; a stepped
+//! robot also settles after a motion and is seen a few times more.
+//! Reference: Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, eq. 3.31; Schweppe
+//! 1965 for the innovations' form.
 
 mod error;
 mod filter;
@@ -27,7 +32,7 @@ use model::Model;
 use timeline::Timeline;
 
 impl Innovation {
-    /// The innovations of one run, in order. Its first look finds where it starts and is none.
+    /// The innovations of one run, in order. Its first measurement finds where it starts and is none.
     ///
     /// # Errors
     /// [`NoBound`] with the reason.
@@ -36,19 +41,22 @@ impl Innovation {
     }
 }
 
-/// What the looks of a run add, one by one.
+/// What the measurements of a run add, one by one.
 fn innovations(model: &Model, motions: &[Motion]) -> Result<Vec<Innovation>, NoBound> {
     Filter::run(model, &Timeline::of(model, motions))
 }
 
-/// An eigenvalue below this share of the largest is rounding: a few hundred terms, each good to 1e-16 of the largest.
+/// An eigenvalue below this share of the largest is rounding: a few hundred terms, each good to 1e-16 of the
+/// largest.
 const ROUNDING_SHARE: f64 = 1e-12;
 
-/// A parameter with more than this share in directions that are not seen at all is not seen. Rounding turns eigenvectors by 1e-16 of the gap between
-/// their eigenvalues; a parameter that takes part in what is not seen, as all do in the common scale, has a tenth or more.
+/// A parameter with more than this share in directions that are not seen at all is not seen. Rounding turns
+/// eigenvectors by 1e-16 of the gap between their eigenvalues; a parameter that takes part in what is not
+/// seen, as all do in the common scale, has a tenth or more.
 const UNOBSERVABLE_SHARE: f64 = 1e-9;
 
-/// What is told without error has this many times the information of the best known direction: its own variance is then a millionth of any other.
+/// What is told without error has this many times the information of the best known direction: its own
+/// variance is then a millionth of any other.
 const EXACT_INFORMATION_FACTOR: f64 = 1e6;
 
 /// What a protocol's runs can tell of the drive's geometry.
@@ -68,7 +76,8 @@ impl FisherInformation {
     /// [`NoBound`] with the reason.
     pub fn of(scenario: &Scenario, programs: &[MotionProgram]) -> Result<Self, NoBound> {
         let model = Model::of(scenario)?;
-        // Where a run starts changes nothing, instruments being the same everywhere: what is driven alike tells alike.
+        // Where a run starts changes nothing, instruments being the same everywhere: what is driven alike
+        // tells alike.
         let mut kinds: Vec<(&MotionProgram, f64)> = Vec::new();
         for program in programs {
             match kinds.iter_mut().find(|(kind, _)| kind.motions == program.motions) {
@@ -95,7 +104,8 @@ impl FisherInformation {
         &self.matrix
     }
 
-    /// The information of who is also told the mean of both diameters, as UMBmark is: its bound says how well the rest can be told.
+    /// The information of who is also told the mean of both diameters, as UMBmark is: its bound says how well
+    /// the rest can be told.
     #[must_use]
     pub fn given_mean_diameter(&self) -> Self {
         let mean = Vector3::new(0.5, 0.5, 0.0);
@@ -103,8 +113,9 @@ impl FisherInformation {
         Self { matrix: self.matrix + told * mean * mean.transpose(), ..*self }
     }
 
-    /// The least variance of an unbiased estimator of `parameter`, in the square of its unit; `None` when these runs do not show it: their information is
-    /// singular in its direction, or leaves a standard deviation above the value itself, where a model linear about the truth says nothing.
+    /// The least variance of an unbiased estimator of `parameter`, in the square of its unit; `None` when
+    /// these runs do not show it: their information is singular in its direction, or leaves a standard
+    /// deviation above the value itself, where a model linear about the truth says nothing.
     #[must_use]
     pub fn bound_var(&self, parameter: Parameter) -> Option<f64> {
         let (row, unit) = match parameter {
@@ -115,7 +126,8 @@ impl FisherInformation {
             Parameter::RightPerTick => (1, self.per_tick),
             _ => return None,
         };
-        // In shares of the values, so that eigenvalues compare: one of λ is a direction known to 1/√λ of its value.
+        // In shares of the values, so that eigenvalues compare: one of λ is a direction known to 1/√λ of its
+        // value.
         let scale = Matrix3::from_diagonal(&self.geometry_m);
         let eigen = SymmetricEigen::new(scale * self.matrix * scale);
         let rounding = ROUNDING_SHARE * eigen.eigenvalues.max();
@@ -159,7 +171,8 @@ mod tests {
 
     #[test]
     fn who_is_told_the_mean_diameter_knows_the_difference_as_well_as_before() {
-        // Both diameters apart, to σ each: their difference to √2 σ, and with the mean each is known to half of that.
+        // Both diameters apart, to σ each: their difference to √2 σ, and with the mean each is known to half
+        // of that.
         let sigma_m = 1e-4_f64;
         let apart = information(Matrix3::from_diagonal_element(1.0 / (sigma_m * sigma_m)));
         let told = apart.given_mean_diameter();

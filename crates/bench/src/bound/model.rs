@@ -1,9 +1,11 @@
 //! A scenario's noise, as second moments.
 //!
-//! Whatever an instrument reads comes down to the body's pose with a covariance. A grid's marks give it by least squares, (Σ JᵀJ)⁻¹(σ² + Δ²/12) with J the slope
-//! of a mark's place in the pose; a marker on a known lever gives it through that lever. Both look alike from everywhere, so that the covariance
-//! is constant in the body's frame. Δ²/12 takes two readings' roundings as independent: their correlation is up to exp(−4π²σ²/Δ²), 1 % at σ = Δ/3. Readings
-//! without an error of their own share their rounding between marks and between ends: the bound would be beaten up to sixfold, so that there is none.
+//! Whatever an instrument reads comes down to the body's pose with a covariance. A grid's marks give it by
+//! least squares, (Σ JᵀJ)⁻¹(σ² + Δ²/12) with J the slope of a mark's place in the pose; a marker on a known
+//! lever gives it through that lever. Both look alike from everywhere, so that the covariance is constant in
+//! the body's frame. Δ²/12 takes two readings' roundings as independent: their correlation is up to
+//! exp(−4π²σ²/Δ²), 1 % at σ = Δ/3. Readings without an error of their own share their rounding between marks
+//! and between ends: the bound would be beaten up to sixfold, so that there is none.
 
 use dataset::MarkedPoint;
 use kinematics::{DriveGeometry, Increment, Point, Pose, WheelNoise, Wheels};
@@ -28,7 +30,7 @@ pub(super) struct Model {
     pub(super) separation_var_m2: f64,
     /// Controller counts in a recorded tick.
     pub(super) counts_per_tick: u32,
-    /// What looks.
+    /// The instruments.
     pub(super) instruments: Vec<PoseInstrument>,
     /// Whether speed is ramped up and down at the commanded acceleration, and not constant.
     pub(super) ramps: bool,
@@ -165,7 +167,8 @@ mod tests {
         let grid = Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 2e-3 };
         let measurement = PoseInstrument::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
         let seen = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
-        // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of them.
+        // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of
+        // them.
         let expected = Matrix3::from_diagonal(&Vector3::new(2e-6, 2e-6, 2.0 * 4e-6 / 0.16));
         assert!((seen - expected).abs().max() < 1e-18, "{seen}");
         assert_eq!(PoseInstrument::of(&grid, &[mark(0.1, 0.2), mark(0.1, 0.2)]), Err(NoBound::NoHeading));

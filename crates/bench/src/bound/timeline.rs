@@ -1,9 +1,10 @@
-//! What a program makes the robot do and who looks when.
+//! What a program makes the robot do and which instrument measures when.
 //!
-//! Each motion is whole counts by the nominal drive, both wheels in proportion, from standstill to standstill. Counts are known where rows of the record stand
-//! still: between them the travel of a wheel is in proportion to the commanded one, which is exact at constant speed and for the trapezoid. So a look inside a
-//! motion sees a share of the motion's travel, and rows inside motions (`[log]`) tell nothing that counts, but for rounded ones: a line through many
-//! rounded rows can beat the bound.
+//! Each motion is whole counts by the nominal drive, both wheels in proportion, from standstill to
+//! standstill. Counts are known where rows of the record stand still: between them the travel of a wheel is
+//! in proportion to the commanded one, which is exact at constant speed and for the trapezoid. So a
+//! measurement inside a motion sees a share of the motion's travel, and rows inside motions (`[log]`) tell
+//! nothing that counts, but for rounded ones: a line through many rounded rows can beat the bound.
 
 use kinematics::{Increment, Side, Wheels};
 use motion_programs::Motion;
@@ -23,7 +24,7 @@ pub(super) enum Event {
         /// Of the whole motion.
         share: f64,
     },
-    /// An instrument looks.
+    /// An instrument measures.
     Measurement {
         /// Which, in the model's order.
         measurement: usize,
@@ -137,7 +138,8 @@ impl Run<'_> {
         self.t_s += duration_s;
     }
 
-    /// Every look that an instrument takes by itself until `duration_s` from now, and the driving up to there.
+    /// Every measurement that an instrument takes by itself until `duration_s` from now, and the driving up
+    /// to there.
     fn measure_until(&mut self, duration_s: f64, time_scale: Option<&TimeScale>) {
         let mut driven = 0.0;
         let mut drive_to = |share: f64, events: &mut Vec<Event>| {
@@ -180,7 +182,8 @@ struct TimeScale {
 }
 
 impl TimeScale {
-    /// `longest` counts at most at `speed` counts/s, up and down at `acceleration` counts/s² where there are ramps.
+    /// `longest` counts at most at `speed` counts/s, up and down at `acceleration` counts/s² where there are
+    /// ramps.
     fn of(longest: f64, speed: f64, acceleration: Option<f64>) -> Self {
         match acceleration {
             None => Self { duration_s: longest / speed, ramp_s: 0.0 },

@@ -1,9 +1,10 @@
-//! The regression on accuracy: a sweep against a stored one, with a stated budget of false alarms.
+//! The regression on accuracy: a sweep against a stored one, with a stated budget of false positive.
 //!
-//! Every estimator's bias, variance, coverages and share of failures is compared with the baseline's by a two-sample test on a scale where the normal
-//! distribution holds far out: bias as it is, variance by its logarithm, shares by Freeman & Tukey's (1950) arcsine of the root. The budget is divided by
-//! the number of comparisons (Bonferroni), so that an honest change of draws, whatever the dependence between the numbers, raises a false alarm no more
-//! often than the budget says.
+//! Every estimator's bias, variance, coverages and share of failures is compared with the baseline's by a
+//! two-sample test on a scale where the normal distribution holds far out: bias as it is, variance by its
+//! logarithm, shares by Freeman & Tukey's (1950) arcsine of the root. The budget is divided by the number of
+//! comparisons (Bonferroni), so that an honest change of draws, whatever the dependence between the numbers,
+//! raises a false positive no more often than the budget says.
 
 use std::path::Path;
 
@@ -38,7 +39,7 @@ pub struct Comparison {
 /// A sweep beside its baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracyCheck {
-    /// Probability of a false alarm, over all comparisons.
+    /// Probability of a false positive, over all comparisons.
     pub false_alarm_budget: f64,
     /// |z| beyond which a number has moved.
     pub z_limit: f64,
@@ -175,7 +176,8 @@ mod tests {
 
     #[test]
     fn the_angle_of_a_share_scatters_alike_everywhere() {
-        // Binomial draws of n = 2000 at three shares: the variance of the angle times n + ½ is 1; of 4000 draws its standard error is √(2/4000) = 2.2 %.
+        // Binomial draws of n = 2000 at three shares: the variance of the angle times n + ½ is 1; of 4000
+        // draws its standard error is √(2/4000) = 2.2 %.
         let mut stream =
             effects::Address { seed: 9, point: 0, trial: 0, run: 0 }.stream(effects::StreamName::new("shares"));
         for share in [0.5, 0.95, 0.99] {

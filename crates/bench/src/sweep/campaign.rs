@@ -1,4 +1,5 @@
-//! Running a sweep: waves of chunks on all cores, the state written down every few seconds, the same result however often it was interrupted.
+//! Running a sweep: waves of chunks on all cores, the state written down every few seconds, the same result
+//! however often it was interrupted.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +19,8 @@ const BETWEEN_STATES: Duration = Duration::from_secs(2);
 /// Writing the state may take this share of the time at most; of large designs it is written more rarely.
 const STATE_SHARE: f64 = 0.05;
 
-/// A wave's length, for which the number of chunks is sought: long against its start and its end, where cores wait, and short for who waits for a kill.
+/// A wave's length, for which the number of chunks is sought: long against its start and its end, where cores
+/// wait, and short for who waits for a kill.
 const WAVE: Duration = Duration::from_millis(300);
 
 /// Most chunks of a wave: their results are held together.
@@ -78,11 +80,12 @@ impl SweepPlan {
         }
     }
 
-    /// Runs a campaign as asked. With a folder the state is there from the first seconds on, until [`super::write_results`] takes it away
-    /// once the results stand.
+    /// Runs a campaign as asked. With a folder the state is there from the first seconds on, until
+    /// [`super::write_results`] takes it away once the results stand.
     ///
     /// # Errors
-    /// As [`Self::run`]; also when the folder holds another campaign or an unfinished one that is not to be gone on with, and when it cannot be written.
+    /// As [`Self::run`]; also when the folder holds another campaign or an unfinished one that is not to be
+    /// gone on with, and when it cannot be written.
     pub fn campaign(&self, campaign: &Campaign<'_>) -> Result<Outcome, BenchError> {
         let mut state = State::new(self, campaign.shard, campaign.rows)?;
         let path = campaign.folder.map(|folder| folder.join(STATE_FILE));
@@ -157,7 +160,8 @@ impl SweepPlan {
         }
     }
 
-    /// The next chunks, at most `wave` of them; over several points, unless a precision has to be judged at each one's end.
+    /// The next chunks, at most `wave` of them; over several points, unless a precision has to be judged at
+    /// each one's end.
     fn next_chunks(&self, state: &State, wave: usize) -> Vec<ChunkIndex> {
         let mut chunks = Vec::with_capacity(wave);
         let mut place = state.next;

@@ -1,8 +1,9 @@
 //! Sums whose last bit does not depend on who adds what when.
 //!
-//! Floating-point addition is not associative, so the order is fixed by the numbers of the summands and by nothing else: summand k is leaf k of one
-//! binary tree, and only siblings are merged. Threads, waves, interruptions and shards each hold some of the tree's nodes; put together they give
-//! the same root. A range of n summands needs at most 2 log₂ n nodes.
+//! Floating-point addition is not associative, so the order is fixed by the numbers of the summands and by
+//! nothing else: summand k is leaf k of one binary tree, and only siblings are merged. Threads, waves,
+//! interruptions and shards each hold some of the tree's nodes; put together they give the same root. A range
+//! of n summands needs at most 2 log₂ n nodes.
 
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +49,8 @@ impl<T: Merge> DyadicSum<T> {
         self.append(Node { level: 0, sum });
     }
 
-    /// Adds the sum of the leaves that follow; false, and nothing done, when it does not begin where this one ends.
+    /// Adds the sum of the leaves that follow; false, and nothing done, when it does not begin where this one
+    /// ends.
     #[must_use]
     pub(crate) fn join(&mut self, following: Self) -> bool {
         let fits = following.first == self.next;

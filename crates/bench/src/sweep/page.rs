@@ -1,6 +1,7 @@
 //! One page a sweep: bias, spread, efficiency and coverage of every method against each axis.
 //!
-//! Against an axis of a grid the other axes stand at the middle of their levels, and the caption says where; of a sampled design every point is drawn.
+//! Against an axis of a grid the other axes stand at the middle of their levels, and the caption says where;
+//! of a sampled design every point is drawn.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +14,8 @@ use super::result::{EstimatorResult, PointResult, SweepResult};
 /// Values that differ by more than this factor share no linear axis.
 const LINEAR_FACTOR: f64 = 30.0;
 
-/// A number of a method at a point with its standard error, in the unit that is drawn. What is not of a parameter ignores it.
+/// A number of a method at a point with its standard error, in the unit that is drawn. What is not of a
+/// parameter ignores it.
 type Number = fn(&PointResult, method: &str, parameter: &str) -> Option<(f64, f64)>;
 
 /// What is drawn: its name, its unit, and the number.

@@ -1,4 +1,5 @@
-//! A sweep ready to run: the points of its design, who estimates at each of them from what, and one chunk of trials at a time.
+//! A sweep ready to run: the points of its design, who estimates at each of them from what, and one chunk of
+//! trials at a time.
 
 use calib::{Method, Parameter, method};
 use motion_programs::MotionProgram;
@@ -15,8 +16,8 @@ use crate::trial::Trial;
 /// Parameters that a sweep follows: the paper's C_L, C_R and B.
 pub const TRACKED: [Parameter; 3] = [Parameter::LeftPerTick, Parameter::RightPerTick, Parameter::WheelSeparation];
 
-/// Trials that are summed by one task, a leaf of the tree of sums. Fixed, so that the sums do not depend on who adds them; few, so that stepped trials
-/// of a second lose little when a campaign is killed.
+/// Trials that are summed by one task, a leaf of the tree of sums. Fixed, so that the sums do not depend on
+/// who adds them; few, so that stepped trials of a second lose little when a campaign is killed.
 pub(super) const TRIALS_PER_CHUNK: u64 = 16;
 
 /// Most trials at a point that is to become precise, unless the caller says otherwise.
@@ -32,8 +33,8 @@ pub struct SweepOptions {
     pub trials: Option<u64>,
     /// Seed of every draw.
     pub seed: Option<u64>,
-    /// Run each point until the largest Monte-Carlo error of its numbers is this: of bias and quantiles relative to the spread, of spread, RMSE and efficiency
-    /// relative to themselves, of coverages as it is.
+    /// Run each point until the largest Monte-Carlo error of its numbers is this: of bias and quantiles
+    /// relative to the spread, of spread, RMSE and efficiency relative to themselves, of coverages as it is.
     pub precision: Option<f64>,
 }
 
@@ -125,14 +126,16 @@ impl SweepPlan {
         self.methods.len() * TRACKED.len()
     }
 
-    /// Where a point is first looked at: with a precision, after the fewest trials that tell one; else at its end.
+    /// Where a point is first looked at: with a precision, after the fewest trials that tell one; else at its
+    /// end.
     pub(super) const fn first_decision(&self) -> u64 {
         let fewest = MIN_FOR_PRECISION / TRIALS_PER_CHUNK;
         if self.precision.is_some() && fewest < self.chunks() { fewest } else { self.chunks() }
     }
 
-    /// The chunk at which a point that has come to its look is looked at again; `None` when it is done. With a precision it is where the error, falling with the root
-    /// of the number of trials, will have reached it, but no more than four times as far. Looks depend on the trials alone and never on when
+    /// The chunk at which a point that has reached its decision is examined again; `None` when it is done.
+    /// With a precision it is where the error, falling with the root of the number of trials, will have
+    /// reached it, but no more than four times as far. Looks depend on the trials alone and never on when
     /// somebody looked: the number of trials is part of the result.
     pub(super) fn next_decision(&self, point: usize, sum: &PointSum) -> Option<u64> {
         let done = sum.chunks.next();

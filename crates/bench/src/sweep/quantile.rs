@@ -1,8 +1,10 @@
-//! Quantiles of many errors in constant memory: counts in fixed bins, so that adding them in any order gives the same.
+//! Quantiles of many errors in constant memory: counts in fixed bins, so that adding them in any order gives
+//! the same.
 //!
-//! Bins are [`FINEST`] wide up to 16384 of them on each side of zero and a 16384th of the error beyond, as in a floating-point number of 14 bits
-//! (the idea of `HdrHistogram`, Tene 2012): the bins of a sample are as many as its spread asks for. Within a bin the errors are taken to be spread evenly. Standard errors are half the
-//! distance of the quantiles at q ± √(q(1−q)/n) (Woodruff 1952).
+//! Bins are [`FINEST`] wide up to 16384 of them on each side of zero and a 16384th of the error beyond, as in
+//! a floating-point number of 14 bits (the idea of `HdrHistogram`, Tene 2012): the bins of a sample are as
+//! many as its spread asks for. Within a bin the errors are taken to be spread evenly. Standard errors are
+//! half the distance of the quantiles at q ± √(q(1−q)/n) (Woodruff 1952).
 
 use std::collections::BTreeMap;
 
@@ -10,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::moments::WithError;
 
-/// Width of the bins about zero, as a share of the true value: a hundredth of the smallest spread that calibration reaches (1e-5).
+/// Width of the bins about zero, as a share of the true value: a hundredth of the smallest spread that
+/// calibration reaches (1e-5).
 const FINEST: f64 = 1e-7;
 
 /// Bins of one width; beyond, every doubling has as many.
@@ -118,14 +121,15 @@ mod tests {
 
     #[test]
     fn quantiles_of_normals_fall_where_they_should() {
-        // Bias fifty times the spread, as UMBmark's: 5, 50 and 95 % at −1.6449, 0 and 1.6449 sigma; the bound is 4.5 of the stated errors, each of six
-        // comparisons a false alarm of 7e-6.
+        // Bias fifty times the spread, as UMBmark's: 5, 50 and 95 % at −1.6449, 0 and 1.6449 sigma; the bound
+        // is 4.5 of the stated errors, each of six comparisons a false positive of 7e-6.
         for (mean, sigma) in [(0.0, 1e-4), (-0.034, 6e-4)] {
             let histogram = normals(3, 20_000, mean, sigma);
             for (q, z) in [(0.05, -1.644_854), (0.5, 0.0), (0.95, 1.644_854)] {
                 let (value, error) = histogram.quantile(q).expect("many");
                 assert!(((value - mean) / sigma - z).abs() < 4.5 * error / sigma, "{q}: {value} ± {error}");
-                // √(q(1−q)/n)/φ(z); the stated error counts the 2√(nq(1−q)) errors nearby, 62 at 5 %: 4.5/√62 is its bound.
+                // √(q(1−q)/n)/φ(z); the stated error counts the 2√(nq(1−q)) errors nearby, 62 at 5 %: 4.5/√62
+                // is its bound.
                 let known = (q * (1.0 - q) / 20_000.0).sqrt() / (0.398_942 * (-0.5 * z * z).exp());
                 assert!((error / sigma / known - 1.0).abs() < 0.57, "{q}: {error}");
             }

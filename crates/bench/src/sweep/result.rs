@@ -113,8 +113,8 @@ pub struct EstimatorResult {
     pub not_applicable: Option<String>,
     /// False when the method cannot see the scale common to both wheels: its bias is then that scale's.
     pub common_scale_observable: bool,
-    /// Square root of the Cramér–Rao bound: no unbiased method's standard deviation is smaller on this protocol. Where the common scale is not observable it is
-    /// the bound for who is told the mean diameter.
+    /// Square root of the Cramér–Rao bound: no unbiased method's standard deviation is smaller on this
+    /// protocol. Where the common scale is not observable it is the bound for who is told the mean diameter.
     pub cramer_rao_sigma: Option<f64>,
     /// RMSE² over the Cramér–Rao bound.
     pub cramer_rao_ratio: Option<f64>,
@@ -134,7 +134,8 @@ impl EstimatorResult {
     }
 }
 
-/// How far odometry drifts on the validation path when it believes a method's calibration. Systematic effects act on it as on the protocols, chance does not.
+/// How far odometry drifts on the validation path when it believes a method's calibration. Systematic effects
+/// act on it as on the protocols, random ones do not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriftResult {
     /// The method.

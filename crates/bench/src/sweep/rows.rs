@@ -1,9 +1,10 @@
 //! Every trial's estimates as a Parquet file, for who wants distributions instead of moments.
 //!
-//! A Parquet file is readable only when it is whole, so trials are first appended to a spool of fixed records, which an interrupted campaign cuts back to what its
-//! state knows of. At the end the spool becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the number of
-//! its point, counted from 1, and its levels.
-//! The `parquet` crate (Apache Arrow's own) writes it, without its compressors: estimates are noise, and noise does not compress.
+//! A Parquet file is readable only when it is whole, so trials are first appended to a spool of fixed
+//! records, which an interrupted campaign cuts back to what its state knows of. At the end the spool becomes
+//! `trials.parquet`: a row a trial, method and parameter, in that order, with the number of its point,
+//! counted from 1, and its levels. The `parquet` crate (Apache Arrow's own) writes it, without its
+//! compressors: estimates are noise, and noise does not compress.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};

@@ -1,7 +1,9 @@
-//! How far a campaign has come, as a file: what a killed one goes on from, and what a shard hands to the merge.
+//! How far a campaign has come, as a file: what a killed one goes on from, and what a shard hands to the
+//! merge.
 //!
-//! The file is written in one piece beside the results and holds every number to its last bit, so that going on ends where an undisturbed
-//! campaign would have. Points that are done stand in it as results; points of which this shard has a part only, as sums.
+//! The file is written in one piece beside the results and holds every number to its last bit, so that going
+//! on ends where an undisturbed campaign would have. Points that are done stand in it as results; points of
+//! which this shard has a part only, as sums.
 
 use std::path::Path;
 
@@ -172,7 +174,8 @@ impl State {
         Ok(state)
     }
 
-    /// Writes the state in one piece: aside under one name, which the next writing takes again when a kill left it behind, and then into its place.
+    /// Writes the state in one piece: aside under one name, which the next writing takes again when a kill
+    /// left it behind, and then into its place.
     pub(super) fn write(&self, path: &Path) -> Result<(), BenchError> {
         let failed = |why: String| BenchError::Write { path: path.display().to_string(), why };
         let bytes = serde_json::to_vec(self).map_err(|error| failed(error.to_string()))?;

@@ -1,4 +1,5 @@
-//! Results on disk: `sweep.json` as the command prints it, `sweep.csv` with a row for each point, method and parameter, the picture, and the trials' rows.
+//! Results on disk: `sweep.json` as the command prints it, `sweep.csv` with a row for each point, method and
+//! parameter, the picture, and the trials' rows.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,8 @@ fn failed(path: &Path, why: &impl ToString) -> BenchError {
     BenchError::Write { path: path.display().to_string(), why: why.to_string() }
 }
 
-/// Writes the results of a whole campaign into its folder, each file in one piece, and takes its state away once they stand.
+/// Writes the results of a whole campaign into its folder, each file in one piece, and takes its state away
+/// once they stand.
 ///
 /// # Errors
 /// [`BenchError::Write`] with the file and the reason; a file that was there before is then unharmed, and the campaign can be gone on with.

@@ -1,4 +1,5 @@
-//! What a sweep keeps of its trials: for each method and parameter the moments of the error, its quantiles and how often the intervals held the truth.
+//! What a sweep keeps of its trials: for each method and parameter the moments of the error, its quantiles
+//! and how often the intervals held the truth.
 
 use calib::{Calibration, Parameter};
 use serde::{Deserialize, Serialize};
@@ -145,8 +146,8 @@ impl PointSum {
     }
 }
 
-/// The largest Monte-Carlo error among a tally's numbers: bias and quantiles over the spread, spread, RMSE and efficiency over themselves, coverage and share of
-/// failures as they are.
+/// The largest Monte-Carlo error among a tally's numbers: bias and quantiles over the spread, spread, RMSE
+/// and efficiency over themselves, coverage and share of failures as they are.
 pub(super) fn largest_error(tally: &Tally, histogram: &Histogram, truth: f64) -> f64 {
     let mut errors = Vec::new();
     if let (Some((variance, variance_error)), Some((_, bias_error)), Some((rmse, rmse_error))) =

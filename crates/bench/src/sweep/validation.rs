@@ -1,7 +1,9 @@
-//! From a calibration to drift: the scenario's validation path, driven by the robot as it is but for chance, and reckoned with the calibration.
+//! From a calibration to drift: the scenario's validation path, driven by the robot as it is, without random
+//! effects, and dead-reckoned with the calibration.
 //!
-//! Systematic effects act on the path as they acted on the protocols, so that a calibration is judged by what odometry is for; noise, scatter, faults of the records
-//! and the instrument's errors are left out, since they are not the calibration's.
+//! Systematic effects act on the path as they acted on the protocols, so that a calibration is judged by what
+//! odometry is for; noise, scatter, faults of the records and the instrument's errors are left out, since
+//! they are not the calibration's.
 
 use dataset::Dataset;
 use effects::{Address, Hypothesis};
@@ -60,7 +62,7 @@ impl Validation {
         100.0 * errors.map(|((end, _), truth)| end.position().distance_m(truth.position())).sum::<f64>() / self.length_m
     }
 
-    /// Each run's end, from the origin, and its way, metres.
+    /// Each run's end, from the origin, and its length, metres.
     fn dead_reckon(&self, geometry: &DriveGeometry) -> impl Iterator<Item = (Pose, f64)> {
         let session = self.dataset.session();
         let ends: Vec<(Pose, f64)> = session
@@ -92,7 +94,7 @@ mod tests {
             Validation::new(scenario).expect("valid").expect("there is a path")
         };
         let truth = scenario.true_geometry().expect("valid");
-        // Wheels and wheelbase larger by 1 %: the same turns, 1 % more way.
+        // Wheels and wheelbase larger by 1 %: the same turns, 1 % more distance.
         let scaled = DriveGeometry::new(truth.wheel_diameter_m().map(|d| 1.01 * d), 1.01 * truth.wheel_separation_m())
             .expect("valid");
         let straight = with(&mut scenario, Schedule::Straights { length_m: 2.0, runs: 1 });

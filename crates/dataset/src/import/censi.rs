@@ -1,9 +1,10 @@
-//! Logs of a Khepera III with a laser: the data of Censi, Franchi, Marchionni, Oriolo, "Simultaneous calibration of odometry and sensor
-//! parameters for mobile robots" (IEEE Transactions on Robotics 29, 2013).
+//! Logs of a Khepera III with a laser: the data of Censi, Franchi, Marchionni, Oriolo, "Simultaneous
+//! calibration of odometry and sensor parameters for mobile robots" (IEEE Transactions on Robotics 29, 2013).
 //!
-//! A `.tuple` file holds concatenated JSON objects: `T` interval s, `phi_l`, `phi_r` mean wheel speeds rad/s, `sm` displacement of the
-//! laser in its own frame (x m, y m, heading rad) by scan matching. There are no time stamps and there are gaps between the intervals,
-//! so time here is the sum of the intervals and the run is not continuous.
+//! A `.tuple` file holds concatenated JSON objects: `T` interval s, `phi_l`, `phi_r` mean wheel speeds rad/s,
+//! `sm` displacement of the laser in its own frame (x m, y m, heading rad) by scan matching. There are no
+//! time stamps and there are gaps between the intervals, so time here is the sum of the intervals and the run
+//! is not continuous.
 
 use std::cell::Cell;
 use std::f64::consts::TAU;
@@ -25,17 +26,19 @@ use crate::table::{LINE_LIMIT_BYTES, open_file};
 const EXPECTED: &str =
     "a .tuple file: objects like {\"T\": 0.79, \"phi_l\": 0.1, \"phi_r\": 0.1, \"sm\": [0.0, 0.0, 0.0]}";
 
-/// Counts for one turn of a Khepera III wheel. It makes every phi·T of the published logs a whole number of counts.
+/// Counts for one turn of a Khepera III wheel. It makes every phi·T of the published logs a whole number of
+/// counts.
 const TICKS_PER_REV: f64 = 2764.8;
 
-/// What the robot believes: the axle that the published estimates give, `axle / E_b` = 0.0880134 / 0.977926 = 0.0890519 / 0.989465 m, …
+/// What the robot believes: the axle that the published estimates give, `axle / E_b` = 0.0880134 / 0.977926 =
+/// 0.0890519 / 0.989465 m, …
 const WHEEL_SEPARATION_M: f64 = 0.09;
 
 /// … and the manufacturer's wheel; the published estimates are 0.0412 to 0.0419 m.
 const WHEEL_DIAMETER_M: f64 = 0.041;
 
-/// How far phi·T may be from a whole number of counts. The numbers are printed with seven digits: an error of 1e-6 of some hundred
-/// counts at most. The largest in the published logs is 2.2e-5 of a count.
+/// How far phi·T may be from a whole number of counts. The numbers are printed with seven digits: an error of
+/// 1e-6 of some hundred counts at most. The largest in the published logs is 2.2e-5 of a count.
 const COUNT_TOLERANCE: f64 = 0.01;
 
 #[derive(Debug, Deserialize)]

@@ -1,7 +1,7 @@
 //! Other people's logs: one file a format, and this table of contents.
 //!
-//! An importer gives [`Dataset`](crate::Dataset)s and changes nothing that was measured: units and signs are brought into the format's, counts are
-//! summed, and that is all.
+//! An importer gives [`Dataset`](crate::Dataset)s and changes nothing that was measured: units and signs are
+//! brought into the format's, counts are summed, and that is all.
 
 mod censi;
 mod optiodom;

@@ -1,8 +1,9 @@
 //! Sessions of the `OptiOdom` study: a differential-drive robot under `OptiTrack`, 20 Hz.
 //!
-//! Sousa, Petry, Costa et al., "`OptiOdom`: a Generic Approach for Odometry Calibration of Wheeled Mobile Robots", J Intell Robot Syst
-//! 105, 39 (2022). A session is a folder with `SESSION_metadata.csv` and `SESSION_run-NN.csv`. Run files have no header: time s,
-//! x m, y m, heading rad (unwrapped), **right** counts of this cycle, **left** counts of this cycle.
+//! Sousa, Petry, Costa et al., "`OptiOdom`: a Generic Approach for Odometry Calibration of Wheeled Mobile
+//! Robots", J Intell Robot Syst 105, 39 (2022). A session is a folder with `SESSION_metadata.csv` and
+//! `SESSION_run-NN.csv`. Run files have no header: time s, x m, y m, heading rad (unwrapped), **right**
+//! counts of this cycle, **left** counts of this cycle.
 //!
 //! What a run drove is not written anywhere but in folder names; it is read off the wheels (see [`label`]).
 
@@ -255,8 +256,8 @@ impl Motion {
 /// | `circle_*` | at least a quarter turn, most of the turning with both wheels forward | `radius_m`: distance over turn, the mean radius of the run, to the millimetre |
 /// | `free` | none of these | |
 ///
-/// The runs of the study's `circular` folder are spirals: half turns of a radius that shrinks from 0.375 m. Their mean is what one
-/// number can say.
+/// The runs of the study's `circular` folder are spirals: half turns of a radius that shrinks from 0.375 m.
+/// Their mean is what one number can say.
 fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
     const MOVES_M: f64 = 0.1;
     const EIGHTH_RAD: f64 = TAU / 8.0;

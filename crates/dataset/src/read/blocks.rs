@@ -1,4 +1,5 @@
-//! A dataset by blocks of rows, in any order: what goes once through data that are larger than the memory, and beforehand through a part of them.
+//! A dataset by blocks of rows, in any order: what goes once through data that are larger than the memory,
+//! and beforehand through a part of them.
 
 use std::ops::Range;
 use std::path::Path;
@@ -20,10 +21,12 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Rows of the odometry in a block; the last of a run has fewer, and a run that something else than `truth.csv` saw is one block.
+    /// Rows of the odometry in a block; the last of a run has fewer, and a run that something else than
+    /// `truth.csv` saw is one block.
     pub const ROWS: usize = MARKED_ROWS;
 
-    /// Opens the dataset in the folder `dir`; `None` where the tables mix the rows of several runs, which can only be read as a whole.
+    /// Opens the dataset in the folder `dir`; `None` where the tables mix the rows of several runs, which can
+    /// only be read as a whole.
     ///
     /// # Errors
     /// [`DatasetError`] of a fault in the manifest, a header, a run's id, or the time at the start of a block.
@@ -73,8 +76,9 @@ impl Blocks {
         self.grouped.blocks(run)
     }
 
-    /// Some blocks of a run as a dataset of one run: their rows, the row behind them, which starts the block that follows, and what was seen meanwhile. What was
-    /// seen before the first row or after the last comes with the first and the last block. Counts start where the counter stood.
+    /// Some blocks of a run as a dataset of one run: their rows, the row behind them, which starts the block
+    /// that follows, and what was seen meanwhile. What was seen before the first row or after the last comes
+    /// with the first and the last block. Counts start where the counter stood.
     ///
     /// # Errors
     /// [`DatasetError`] of the first fault in these rows; parts that touch find all faults between them.

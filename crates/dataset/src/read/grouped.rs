@@ -23,8 +23,8 @@ pub(super) struct Grouped {
 }
 
 impl Grouped {
-    /// Goes through the tables for where the rows are, with marks inside the runs if they are to be cut: the header, what was noticed, and the tables unless they
-    /// mix the rows of several runs.
+    /// Goes through the tables for where the rows are, with marks inside the runs if they are to be cut: the
+    /// header, what was noticed, and the tables unless they mix the rows of several runs.
     pub(super) fn survey(opened: Opened, marked: bool) -> Result<(Dataset, Vec<Warning>, Option<Self>), DatasetError> {
         let Opened { mut dataset, manifest_file, run_lines, mut odometry, truths, index, warnings } = opened;
         let odometry_rows = odometry.survey(&index, marked)?;
@@ -58,7 +58,8 @@ impl Grouped {
         self.truths.iter().map(|(_, rows)| rows.rows[number]).sum()
     }
 
-    /// In how many blocks of [`MARKED_ROWS`] rows the odometry of a run stands: one where what saw it cannot be cut.
+    /// In how many blocks of [`MARKED_ROWS`] rows the odometry of a run stands: one where what saw it cannot
+    /// be cut.
     pub(super) fn blocks(&self, number: usize) -> usize {
         let whole = self.truths.iter().any(|(_, rows)| rows.rows[number] > 0 && rows.marks.is_empty());
         if whole { 1 } else { self.rows(number).saturating_sub(1).div_ceil(MARKED_ROWS).max(1) }
@@ -78,7 +79,8 @@ impl Grouped {
         Err(without_truth(self.manifest_file.clone(), self.run_lines[number], &run, &tables))
     }
 
-    /// Some blocks of a run, and the row after them: parts that touch share a row, and no interval is lost between them.
+    /// Some blocks of a run, and the row after them: parts that touch share a row, and no interval is lost
+    /// between them.
     pub(super) fn read_blocks(
         &mut self,
         number: usize,

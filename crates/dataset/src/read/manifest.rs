@@ -20,12 +20,14 @@ pub(crate) const MANIFEST: &str = "dataset.toml";
 /// The format that is read and written here.
 pub(crate) const FORMAT: i64 = 1;
 
-/// Longest `dataset.toml`: tens of thousands of runs. The TOML parser may need a hundred times as much memory for text that is not TOML.
+/// Longest `dataset.toml`: tens of thousands of runs. The TOML parser may need a hundred times as much memory
+/// for text that is not TOML.
 pub(crate) const MANIFEST_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
 
 const EXPECTED: &str = "a dataset's format, [robot] and one [[run]] for every run";
 
-/// Keys of a run that belong to its protocol or its clock; with another unit they are mistakes, not covariates.
+/// Keys of a run that belong to its protocol or its clock; with another unit they are mistakes, not
+/// covariates.
 const RUN_QUANTITIES: [(&str, &str); 5] =
     [("side", "side_m"), ("radius", "radius_m"), ("length", "length_m"), ("turn", "turn_rad"), ("start", "start_s")];
 

@@ -40,8 +40,8 @@ pub struct Loaded {
 
 /// Reads the dataset in the folder `dir`.
 ///
-/// Memory: the columns, reserved exactly (24 bytes a row of ticks, 32 a truth pose), and half a megabyte. Nothing else grows with the
-/// tables. [`RunByRun`] holds one run at a time.
+/// Memory: the columns, reserved exactly (24 bytes a row of ticks, 32 a truth pose), and half a megabyte.
+/// Nothing else grows with the tables. [`RunByRun`] holds one run at a time.
 ///
 /// # Errors
 /// [`DatasetError`] with file, line and column of the first fault; see there.

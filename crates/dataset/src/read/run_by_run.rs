@@ -1,7 +1,7 @@
 //! A dataset one run at a time, for what goes through all runs once: memory is that of the largest run.
 //!
-//! The tables are gone through once for where each run's rows are; then each run's rows are read where they stand. Tables whose rows of several runs are mixed
-//! cannot be read so, and are read as a whole.
+//! The tables are gone through once for where each run's rows are; then each run's rows are read where they
+//! stand. Tables whose rows of several runs are mixed cannot be read so, and are read as a whole.
 
 use std::path::Path;
 
@@ -12,7 +12,8 @@ use crate::error::DatasetError;
 use crate::record::{Dataset, Run};
 use crate::warning::Warning;
 
-/// Reads a dataset one run at a time: an iterator over datasets of one run each, in the order of `dataset.toml`, with what was noticed of the run.
+/// Reads a dataset one run at a time: an iterator over datasets of one run each, in the order of
+/// `dataset.toml`, with what was noticed of the run.
 ///
 /// A fault is found when its run is reached; what was handed out before it is sound.
 #[derive(Debug)]

@@ -59,7 +59,8 @@ trait TruthColumns: std::fmt::Debug {
     fn reserve(&self, run: &mut Run, rows: usize);
     fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
 
-    /// The instants' column, where a row speaks of one instant and stands for itself: only then can a run be cut between two of them.
+    /// The instants' column, where a row speaks of one instant and stands for itself: only then can a run be
+    /// cut between two of them.
     fn instant(&self) -> Option<usize> {
         None
     }
@@ -122,8 +123,8 @@ impl TruthTable {
         self.table.for_each_row_of(number, survey, |row| columns.push(row, run, points))
     }
 
-    /// Fills one run's records of this kind from one instant to a later one, both among them. The order is checked from the mark before to the mark behind, so that
-    /// parts that touch check all of it.
+    /// Fills one run's records of this kind from one instant to a later one, both among them. The order is
+    /// checked from the mark before to the mark behind, so that parts that touch check all of it.
     pub(super) fn read_between(
         &mut self,
         number: usize,

@@ -1,7 +1,9 @@
-//! The fields of one line of a table: commas, and quotes as in RFC 4180, except that a quoted field ends on its line.
+//! The fields of one line of a table: commas, and quotes as in RFC 4180, except that a quoted field ends on
+//! its line.
 //!
-//! The exception is why this is not the csv crate: to it, one stray quote makes a field of the rest of the file, however long that
-//! is, and rows can then neither be counted by their line ends nor be held to a length.
+//! The exception is why this is not the csv crate: to it, one stray quote makes a field of the rest of the
+//! file, however long that is, and rows can then neither be counted by their line ends nor be held to a
+//! length.
 
 use std::ops::Range;
 
@@ -70,7 +72,8 @@ impl Fields {
         }
     }
 
-    /// Takes a field whose opening quote was passed and the spaces behind it; what is left starts with a comma or is empty.
+    /// Takes a field whose opening quote was passed and the spaces behind it; what is left starts with a
+    /// comma or is empty.
     fn take_quoted<'a>(&mut self, mut rest: &'a [u8]) -> Result<&'a [u8], BadQuote> {
         loop {
             let length = memchr::memchr(b'"', rest).ok_or(BadQuote)?;

@@ -1,4 +1,5 @@
-//! A text file line by line in bounded memory: what stands between every reader here and a gigabyte of garbage.
+//! A text file line by line in bounded memory: what stands between every reader here and a gigabyte of
+//! garbage.
 //!
 //! One buffer of fixed size; a line that does not fit is an error and is not collected first.
 
@@ -8,10 +9,12 @@ use std::path::{Path, PathBuf};
 
 use crate::error::DatasetError;
 
-/// Longest line that any table may have. Ten numbers of 400 digits and an id fit; a binary file rarely gets this far.
+/// Longest line that any table may have. Ten numbers of 400 digits and an id fit; a binary file rarely gets
+/// this far.
 pub(crate) const LINE_LIMIT_BYTES: usize = 64 * 1024;
 
-/// Large enough that system calls and the moving of cut lines cost nothing beside parsing, small beside any table.
+/// Large enough that system calls and the moving of cut lines cost nothing beside parsing, small beside any
+/// table.
 const BUFFER_BYTES: usize = 4 * LINE_LIMIT_BYTES;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";

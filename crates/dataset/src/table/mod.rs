@@ -1,7 +1,7 @@
 //! A table of a dataset: a header by whose names columns are found, and rows that belong to runs.
 //!
-//! A table is read twice: first only its run ids, to learn how many rows each run has, so that columns are reserved exactly and
-//! memory never holds them twice; then its numbers.
+//! A table is read twice: first only its run ids, to learn how many rows each run has, so that columns are
+//! reserved exactly and memory never holds them twice; then its numbers.
 
 mod fields;
 mod lines;
@@ -76,7 +76,8 @@ pub(crate) struct Mark {
     pub(crate) t_s: f64,
 }
 
-/// Rows from one mark to the next: what is read in vain when a cut falls between two is small beside a part, and marks are small beside the rows.
+/// Rows from one mark to the next: what is read in vain when a cut falls between two is small beside a part,
+/// and marks are small beside the rows.
 pub(crate) const MARKED_ROWS: usize = 1024;
 
 /// Where a table is and what its columns are called.

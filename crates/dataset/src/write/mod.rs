@@ -1,7 +1,7 @@
 //! Writing a dataset: all of it or nothing, in the shortest numbers that read back to the same bits.
 //!
-//! The files are made in a temporary sibling of the target, and that folder is renamed into place: whoever looks sees the old
-//! state or the new one.
+//! The files are made in a temporary sibling of the target, and that folder is renamed into place: whoever
+//! looks sees the old state or the new one.
 
 mod check;
 mod manifest;
@@ -34,13 +34,14 @@ pub enum Existing {
 
 /// Writes a dataset into the folder `dir`, which is made together with its parents.
 ///
-/// What was written reads back equal to the last bit. Two things have one form on disk and come back in it: a standard deviation of 0
-/// is unknown, and a run whose samples all have unknown sigmas has no [`Run::truth_sigma`].
+/// What was written reads back equal to the last bit. Two things have one form on disk and come back in it: a
+/// standard deviation of 0 is unknown, and a run whose samples all have unknown sigmas has no
+/// [`Run::truth_sigma`].
 ///
 /// # Errors
 /// [`DatasetError::AlreadyExists`] as `existing` says; [`DatasetError::RunNotWritable`] and [`DatasetError::NotWritable`] when the
-/// dataset could not be read back (a NaN, unequal columns, a run without truth …); [`DatasetError::Io`]. In each case `dir` is as
-/// it was.
+/// dataset could not be read back (a NaN, unequal columns, a run without truth …); [`DatasetError::Io`]. In
+/// each case `dir` is as it was.
 pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), DatasetError> {
     // Before anything is made.
     check::check(dataset)?;
@@ -50,7 +51,8 @@ pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), Da
     writer.finish()
 }
 
-/// Writes a dataset a run at a time, into a temporary sibling until all is there. Dropped before [`Self::finish`] it leaves nothing.
+/// Writes a dataset a run at a time, into a temporary sibling until all is there. Dropped before
+/// [`Self::finish`] it leaves nothing.
 #[derive(Debug)]
 pub struct Writer {
     /// Without runs.
@@ -68,7 +70,8 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins a dataset in the folder `dir`. The runs of `header` are not written; none of those that are may have an
+    /// Begins a dataset in the folder `dir`. The runs of `header` are not written; none of those that are may
+    /// have an
     /// [`ExtraChannel`](crate::ExtraChannel) or a [`Run::truth_sigma`].
     ///
     /// # Errors
@@ -91,7 +94,8 @@ impl Writer {
             _ => Path::new("."),
         };
         fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
-        // The folder that tempfile makes is private to the user; the dataset inside gets the usual permissions.
+        // The folder that tempfile makes is private to the user; the dataset inside gets the usual
+        // permissions.
         let workshop = tempfile::Builder::new()
             .prefix(".writing-")
             .tempdir_in(parent)

@@ -11,7 +11,8 @@ use crate::table::quoted_where_needed;
 /// A table that is being written.
 pub(super) type Out = BufWriter<File>;
 
-/// A number as `{}` prints it, in a third of the time: of two texts equally near, which numbers above 10¹² may have, it is the even one. Nothing for `None`.
+/// A number as `{}` prints it, in a third of the time: of two texts equally near, which numbers above 10¹²
+/// may have, it is the even one. Nothing for `None`.
 fn number(out: &mut impl Write, number: impl Into<Option<f64>>) -> io::Result<()> {
     let Some(number) = number.into() else { return Ok(()) };
     if !PLAIN.contains(&number.abs()) {

@@ -1,4 +1,5 @@
-//! Every fault of a dataset gives one message, on one line, that names file, line, column and what was expected.
+//! Every fault of a dataset gives one message, on one line, that names file, line, column and what was
+//! expected.
 
 use std::fs;
 use std::path::Path;

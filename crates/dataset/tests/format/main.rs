@@ -1,4 +1,5 @@
-//! The dataset format: written and read without loss, bad input refused by line and column, blocks of runs, and real robots' logs.
+//! The dataset format: written and read without loss, bad input refused by line and column, blocks of runs,
+//! and real robots' logs.
 
 mod bad_input;
 mod blocks;

@@ -1,4 +1,5 @@
-//! Importing what others measured. The logs are not part of this project: see the importers for where they are.
+//! Importing what others measured. The logs are not part of this project: see the importers for where they
+//! are.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -93,7 +94,8 @@ fn optiodom_sessions_come_in_order_and_survive_the_disk() {
 #[test]
 fn khepera_speeds_are_whole_counts() {
     let Some(folder) = real_data("khepera_speeds_are_whole_counts", "khepera") else { return };
-    // One row at time 0 and one an object; the totals were summed by a script that shares nothing with the importer.
+    // One row at time 0 and one an object; the totals were summed by a script that shares nothing with the
+    // importer.
     for (file, rows, left, right) in [("l90.tuple", 3296, -1399, 8959), ("lstraight.tuple", 4397, 4137, -2431)] {
         let imported = &import("censi", &folder.join(file))[0];
         assert_eq!(format!("{}.tuple", imported.name), file);

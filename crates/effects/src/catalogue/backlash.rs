@@ -1,8 +1,11 @@
 //! `backlash`: play between the encoder's axis and the wheel.
 //!
-//! Model: the play operator: the wheel rests until the shaft has crossed the gap, then follows at its edge. Signature: each reversal of a wheel loses
-//! the whole gap of travel. Observability: reversals of one wheel; a corner turned on the spot reverses one wheel. Alias: `castor_kick`.
-//! Reference: the play operator, Krasnosel'skii & Pokrovskii 1983; 0.4 to 2.6 mm at wheels of 50 mm radius, derived from teeth.
+//! Model: the play operator: the wheel rests until the shaft has crossed the gap, then follows at its edge.
+//! Signature: each reversal of a wheel loses the whole gap of travel.
+//! Observability: reversals of one wheel; a corner turned on the spot reverses one wheel.
+//! Alias: `castor_kick`.
+//! Reference: the play operator, Krasnosel'skii & Pokrovskii 1983; 0.4 to 2.6 mm at wheels of 50 mm radius,
+//! derived from teeth.
 
 use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -108,8 +111,8 @@ impl Forward for State {
     }
 }
 
-/// A gap of the width tried, in its widths: what the wheel does not follow, for each unit of the true gap. Reversals that do not cross it, such as the last
-/// counts before a standstill, cost what they take up.
+/// A gap of the width tried, in its widths: what the wheel does not follow, for each unit of the true gap.
+/// Reversals that do not cross it, such as the last counts before a standstill, cost what they take up.
 #[derive(Clone)]
 struct Term {
     width_m: f64,
@@ -142,8 +145,8 @@ impl ModelTerm for Term {
     }
 }
 
-/// The other form: play with a spring in it, whose lead reaches its limit over the width of the gap instead of
-/// at once.
+/// The other form: play with a spring in it, whose lead reaches its limit over the width of the gap instead
+/// of at once.
 struct SpringyPlay {
     half_gap_m: Wheels<f64>,
     lead_m: Wheels<f64>,

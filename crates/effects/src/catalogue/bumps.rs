@@ -1,8 +1,12 @@
 //! `bumps`: cables, sills and crumbs that one wheel drives over.
 //!
-//! Model: each wheel meets bumps as a Poisson process along its way; over a bump of height h a wheel of radius r rolls about its edge and loses
-//! 2(r acos(1−h/r) − √(2rh−h²)) of way. Signature: isolated spikes of e_dθ, kurtosis. Observability: many measurements. Alias: `traction_loss`.
-//! Reference: Borenstein & Feng 1995, whose test floor has ten cables of 9 to 10 mm; the loss is geometry of a rigid wheel.
+//! Model: each wheel meets bumps as a Poisson process along its path; over a bump of height h a wheel of
+//! radius r rolls about its edge and loses 2(r acos(1−h/r) − √(2rh−h²)) of distance.
+//! Signature: isolated spikes of e_dθ, kurtosis.
+//! Observability: many measurements.
+//! Alias: `traction_loss`.
+//! Reference: Borenstein & Feng 1995, whose test floor has ten cables of 9 to 10 mm; the loss is geometry of
+//! a rigid wheel.
 
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
@@ -23,7 +27,7 @@ const LOSS_SCALES_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bumps {
-    /// How many each wheel meets per metre of its way, on average.
+    /// How many each wheel meets per metre of its travel, on average.
     pub per_m: f64,
     /// Height of a bump (h), metres.
     pub height_m: f64,
@@ -71,13 +75,14 @@ struct State {
     ahead_m: Wheels<f64>,
 }
 
-/// Way that a wheel loses over a bump, metres; one as high as the wheel's axis is a wall, and counts as that high.
+/// Way that a wheel loses over a bump, metres; one as high as the wheel's axis is a wall, and counts as that
+/// high.
 fn lost_m(radius_m: f64, height_m: f64) -> f64 {
     let height_m = height_m.min(radius_m);
     2.0 * (radius_m * (1.0 - height_m / radius_m).acos() - (height_m * (2.0 * radius_m - height_m)).sqrt())
 }
 
-/// The way to the next event of a Poisson process.
+/// The distance to the next event of a Poisson process.
 fn gap_m(stream: &mut Stream, per_m: f64) -> f64 {
     -(1.0 - stream.uniform()).ln() / per_m
 }
@@ -141,7 +146,8 @@ mod tests {
             let lost = lost_m(0.08, 0.005);
             met = Wheels::from_sides(|side| met[side] + (step.travel_m[side] - before_m[side]) / lost);
         }
-        // A Poisson number of 10 000: five standard deviations are 500. A loss in the wrong direction would count negative.
+        // A Poisson number of 10 000: five standard deviations are 500. A loss in the wrong direction would
+        // count negative.
         for side in Side::BOTH {
             assert!((met[side] - 2.0 * distance_m).abs() < 5.0 * (2.0 * distance_m).sqrt(), "{met:?}");
         }

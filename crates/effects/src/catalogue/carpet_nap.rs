@@ -1,8 +1,11 @@
 //! `carpet_nap`: the pile of a carpet leans one way and takes the wheels with it.
 //!
-//! Model: a drift in the room in proportion to the way |Δs|, and a turn towards the nap's direction θ₀, ∝ sin(θ − θ₀) |Δs|.
-//! Signature: constant direction in the room, at any speed. Observability: the same way at several headings; two speeds against `floor_slope`.
-//! Alias: `floor_slope` that goes with the way, exactly. Reference: users' reports, mm/m to cm/m; a rule of thumb.
+//! Model: a drift in the room in proportion to the distance |Δs|, and a turn towards the nap's direction θ₀,
+//! ∝ sin(θ − θ₀) |Δs|.
+//! Signature: constant direction in the room, at any speed.
+//! Observability: the same path at several headings; two speeds against `floor_slope`.
+//! Alias: `floor_slope` that goes with the distance, exactly.
+//! Reference: users' reports, mm/m to cm/m; a rule of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sin_cos, sinc};
@@ -17,13 +20,13 @@ use crate::hypothesis::{Hypothesis, Variant, in_room, value_of};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CarpetNap {
-    /// Drift along the room's x per metre of way.
+    /// Drift along the room's x per metre of distance.
     pub drift_x: f64,
-    /// Drift along the room's y per metre of way.
+    /// Drift along the room's y per metre of distance.
     pub drift_y: f64,
-    /// Turn per metre of way in proportion to sin θ, rad/m.
+    /// Turn per metre of distance in proportion to sin θ, rad/m.
     pub yaw_sin_rad_m: f64,
-    /// Turn per metre of way in proportion to cos θ, rad/m.
+    /// Turn per metre of distance in proportion to cos θ, rad/m.
     pub yaw_cos_rad_m: f64,
 }
 

@@ -1,8 +1,10 @@
 //! `castor_drag`: a rolling castor resists, and in a bend its drag turns the robot back.
 //!
-//! Model: the drag of a castor L behind the axle points against its own way, at an angle δ to the robot's, sin δ = Lω/√(v² + L²ω²); the drive wheels creep
-//! under its moment: e_dθ = −q sin δ per metre of tread. Signature: a turn deficit that depends on the radius. Observability: bends of different radii
-//! beside spins. Alias: `wheelbase` (q L in wide bends, q b/2 in spins), `turn_rate_wheelbase`.
+//! Model: the drag of a castor L behind the axle points against its own motion, at an angle δ to the robot's,
+//! sin δ = Lω/√(v² + L²ω²); the drive wheels creep under its moment: e_dθ = −q sin δ per metre of tread.
+//! Signature: a turn deficit that depends on the radius.
+//! Observability: bends of different radii beside spins.
+//! Alias: `wheelbase` (q L in wide bends, q b/2 in spins), `turn_rate_wheelbase`.
 //! Reference: rolling resistance with creep in proportion to force; a rule of thumb without figures.
 
 use model_term::{Interval, ModelTerm, TermParameter};

@@ -1,9 +1,13 @@
 //! `castor_kick`: after a reversal the castor flips over and pushes the tail aside.
 //!
-//! Model: e_dθ = ±K e^{−s/s₀} per s₀ of way s since the reversal, K in all. The castor leans towards the inside of the last turn and flips over on that
-//! side: the kick has that turn's sense; a castor that never leaned falls to either side. Signature: heading transients after reversals.
-//! Observability: reversals after turns to both sides. Alias: `backlash`, whose loss also comes with reversals. Needs a log finer than s₀.
-//! Reference: the castor's differential equation linearised, ψ' = −sin ψ/trail; 2 to 4 trail lengths, 0.1 to 2° a reversal, a rule of thumb.
+//! Model: e_dθ = ±K e^{−s/s₀} per s₀ of distance s since the reversal, K in all. The castor leans towards the
+//! inside of the last turn and flips over on that side: the kick has that turn's sense; a castor that never
+//! leaned falls to either side.
+//! Signature: heading transients after reversals.
+//! Observability: reversals after turns to both sides.
+//! Alias: `backlash`, whose loss also comes with reversals. Needs a log finer than s₀.
+//! Reference: the castor's differential equation linearised, ψ' = −sin ψ/trail; 2 to 4 trail lengths, 0.1 to
+//! 2° a reversal, a rule of thumb.
 
 use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -30,7 +34,7 @@ const DECAY_M: [f64; 4] = [0.03, 0.06, 0.12, 0.24];
 pub struct CastorKick {
     /// Turn that a reversal makes in all, with the sense of the last turn (K), radians.
     pub kick_rad: f64,
-    /// Way over which it fades by 1/e (s₀), metres.
+    /// Distance over which it fades by 1/e (s₀), metres.
     pub decay_m: f64,
 }
 
@@ -79,7 +83,7 @@ struct FlipState {
 impl FlipState {
     const NONE: Self = Self { leans: Hysteresis::beyond(TURN_RAD), reversals: Reversals::NONE };
 
-    /// The share of a kick that a way and a turn bring, with the sense of the last turn.
+    /// The share of a kick that a distance and a turn bring, with the sense of the last turn.
     fn after(&mut self, distance_m: f64, turn_rad: f64, decay_m: f64) -> f64 {
         let to_m = self.reversals.after(distance_m);
         let left = |distance_m: f64| (-distance_m / decay_m).exp();
@@ -141,8 +145,8 @@ impl ModelTerm for Term {
     }
 }
 
-/// The other form, a castor by its differential equation: it trails at 0, stands on its head at π, and turns the
-/// robot as it flips.
+/// The other form, a castor by its differential equation: it trails at 0, stands on its head at π, and turns
+/// the robot as it flips.
 struct RollingCastor {
     /// Turn of the robot over the castor's.
     gain: f64,

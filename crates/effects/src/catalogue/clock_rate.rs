@@ -1,8 +1,11 @@
 //! `clock_rate`: the robot's clock runs fast.
 //!
-//! Model: stamp = (1 + ρ) t from the run's start. Signature: none in a pose by counts, but a time offset that grows: ρ t (v, 0, ω) between what is seen and
-//! what is counted; where speeds are logged instead, a scale. Observability: a robot that moves late in long runs. Alias: `wheel_scale` where speeds are
-//! logged; `truth_latency` over short runs. Reference: resonators and timers, 0.01 to 3 %, as users report.
+//! Model: stamp = (1 + ρ) t from the run's start.
+//! Signature: none in a pose by counts, but a time offset that grows: ρ t (v, 0, ω) between what is seen and
+//! what is counted; where speeds are logged instead, a scale.
+//! Observability: a robot that moves late in long runs.
+//! Alias: `wheel_scale` where speeds are logged; `truth_latency` over short runs.
+//! Reference: resonators and timers, 0.01 to 3 %, as users report.
 
 use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
@@ -74,7 +77,8 @@ impl ModelTerm for Term {
         &[TermParameter { name: "rate", unit: "1", prior_sigma: 0.03 }]
     }
 
-    /// What the counts say of the instant t by the robot's clock was true ρ t before it: the robot is seen farther on.
+    /// What the counts say of the instant t by the robot's clock was true ρ t before it: the robot is seen
+    /// farther on.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         gradient[0] = Pose::new(measurement.t_s * measurement.twist.v_m_s, 0.0, measurement.t_s * measurement.twist.omega_rad_s);
     }

@@ -1,8 +1,11 @@
-//! `contact_patch_wheelbase`: the wheels touch the floor with a patch, so the distance between the contacts varies.
+//! `contact_patch_wheelbase`: the wheels touch the floor with a patch, so the distance between the contacts
+//! varies.
 //!
-//! Model: B = B̄ + ε, with ε ~ N(0, σ_b²) drawn once a motion, and within a motion a slow part: a Gauss–Markov process along the wheels' travel,
-//! corr = exp(−Δs/ℓ). Signature: scatter of the heading in proportion to the turned angle, σ_θ = |Δθ| σ_b/B.
-//! Observability: repeated turns. Alias: wheel noise, whose heading variance grows with travel and not with the square of the turn.
+//! Model: B = B̄ + ε, with ε ~ N(0, σ_b²) drawn once a motion, and within a motion a slow part: a
+//! Gauss–Markov process along the wheels' travel, corr = exp(−Δs/ℓ).
+//! Signature: scatter of the heading in proportion to the turned angle, σ_θ = |Δθ| σ_b/B.
+//! Observability: repeated turns.
+//! Alias: wheel noise, whose heading variance grows with travel and not with the square of the turn.
 //! Reference: Navarro et al., eq. (10) and (11).
 
 use serde::{Deserialize, Serialize};
@@ -23,7 +26,8 @@ pub struct ContactPatchWheelbase {
     /// Standard deviation of the slow variation within a motion, metres.
     #[serde(default)]
     pub slow_sigma_m: f64,
-    /// Wheel travel over which the slow variation forgets itself, metres; needed when `slow_sigma_m` is not 0.
+    /// Wheel travel over which the slow variation forgets itself, metres; needed when `slow_sigma_m` is not
+    /// 0.
     #[serde(default)]
     pub slow_length_m: f64,
 }

@@ -1,7 +1,11 @@
 //! `counter_wrap`: the log keeps only the low bits of the counter.
 //!
-//! Model: two's complement of `bits` bits. Signature: single jumps of 2^bits. A gross fault, tried before any fit: the records without it have the jumps
-//! taken out. Observability: the record itself. Alias: none. Reference: the HCTL-1100's position register has 24 bits; microcontroller timers have 8, 16 or 32.
+//! Model: two's complement of `bits` bits.
+//! Signature: single jumps of 2^bits. A gross fault, tried before any fit: the records without it have the
+//! jumps taken out.
+//! Observability: the record itself.
+//! Alias: none.
+//! Reference: the HCTL-1100's position register has 24 bits; microcontroller timers have 8, 16 or 32.
 
 use dataset::{Dataset, WheelLog, suspected_wrap};
 use serde::{Deserialize, Serialize};

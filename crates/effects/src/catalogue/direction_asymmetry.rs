@@ -1,7 +1,9 @@
 //! `direction_asymmetry`: a wheel goes farther per count forward than backward.
 //!
-//! Model: k± = k (1 ± ½ε) for each wheel. Signature: e_dx = ½ε|v_w|, a drift whichever way the wheel turns. Observability: both directions; nothing on
-//! forward-only data, where it is a scale. Alias: `backlash` where reversals are as frequent as metres.
+//! Model: k± = k (1 ± ½ε) for each wheel.
+//! Signature: e_dx = ½ε|v_w|, a drift whichever way the wheel turns.
+//! Observability: both directions; nothing on forward-only data, where it is a scale.
+//! Alias: `backlash` where reversals are as frequent as metres.
 //! Reference: treads with a grain, a slope under the test floor; 0.1 to 0.5 %, a rule of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};

@@ -1,8 +1,12 @@
 //! `dropped_samples`: rows are missing, and with them what the wheels did meanwhile.
 //!
-//! Model: a row is lost with some probability; where the log adds up increments, the counts since the row before are lost with it. Signature: gaps in time
-//! over which a moving robot seems to crawl. A gross fault, tried before any fit: the records without it have the counts of each gap carried on from the
-//! rows around it. Observability: gaps while the robot moves. Alias: `missed_counts`. Reference: serial links without acknowledgement, full queues.
+//! Model: a row is lost with some probability; where the log adds up increments, the counts since the row
+//! before are lost with it.
+//! Signature: gaps in time over which a moving robot seems to crawl. A gross fault, tried before any fit: the
+//! records without it have the counts of each gap carried on from the rows around it.
+//! Observability: gaps while the robot moves.
+//! Alias: `missed_counts`.
+//! Reference: serial links without acknowledgement, full queues.
 
 use dataset::{Dataset, Odometry, WheelLog};
 use kinematics::{Side, Wheels};
@@ -82,9 +86,11 @@ impl Forward for State {
     }
 }
 
-/// An interval longer than the usual one by this factor is nearer to two of them: it may be a gap, or a pause of the log, and the counts tell.
+/// An interval longer than the usual one by this factor is nearer to two of them: it may be a gap, or a pause
+/// of the log, and the counts tell.
 const GAP_RATIO: f64 = 1.5;
-/// With a smaller share of the counts that the speed around it asks for, a gap has lost some: one row in two leaves a half.
+/// With a smaller share of the counts that the speed around it asks for, a gap has lost some: one row in two
+/// leaves a half.
 const MIN_KEPT_SHARE: f64 = 0.8;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
@@ -101,7 +107,8 @@ struct Missing {
 
 /// Carries the counts of every gap on, and says what was missing.
 ///
-/// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the acceleration is constant; the row after it shows less.
+/// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the
+/// acceleration is constant; the row after it shows less.
 fn fill(odometry: &mut Odometry) -> Missing {
     let mut missing = Missing::default();
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return missing };
@@ -117,7 +124,8 @@ fn fill(odometry: &mut Odometry) -> Missing {
         if is_gap(k) {
             let around = [(0..k).rev().find(is_row), (k + 1..lengths_s.len()).find(is_row)];
             let due = Wheels { left: Side::Left, right: Side::Right }.map(|side| {
-                // Not the mean of two speeds: stamps may jitter, and one over a length that does is too large.
+                // Not the mean of two speeds: stamps may jitter, and one over a length that does is too
+                // large.
                 let (counts, time_s) = around.iter().flatten().fold((0.0, 0.0), |(counts, time_s), near| {
                     (counts + shown[side][*near], time_s + lengths_s[*near])
                 });
@@ -168,7 +176,8 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
 mod tests {
     use super::*;
 
-    /// A robot that speeds up, cruises, and slows down, with rows that jitter and counts that are true at their stamps.
+    /// A robot that speeds up, cruises, and slows down, with rows that jitter and counts that are true at
+    /// their stamps.
     fn odometry(missing: &[usize], with_counts: bool) -> (Odometry, Vec<i64>) {
         let stamp_s = |row: usize| 0.05 * row as f64 + 0.006 * (2.4 * row as f64).sin();
         let counted = |t_s: f64| {
@@ -198,7 +207,8 @@ mod tests {
         assert_eq!((missing.rows, missing.lost, missing.kept), (4.0, 3, 0));
         let WheelLog::Ticks(ticks) = &record.wheels else { panic!("counts") };
         for (restored, counted) in ticks.left.iter().zip(&whole) {
-            // 250 counts a row at full speed; a corner of the ramp bends the speed by 12 counts a row at the most.
+            // 250 counts a row at full speed; a corner of the ramp bends the speed by 12 counts a row at the
+            // most.
             assert!((restored - counted).abs() <= 12, "{restored} for {counted}");
         }
     }

@@ -1,8 +1,11 @@
 //! `floor_slope`: on a floor that is not level a robot creeps down the fall line.
 //!
-//! Model: a vector in the room per second of motion, or per metre of tread. Signature: e turns with −θ: its direction in the room is constant.
-//! Observability: the same way at two headings; time and way at two speeds. Alias: `carpet_nap` (same heading at two speeds), exactly where the creep
-//! goes with the way. Reference: tyre creep in proportion to side force: weight times slope over stiffness, 0.04 to 0.1 % per degree.
+//! Model: a vector in the room per second of motion, or per metre of tread.
+//! Signature: e turns with −θ: its direction in the room is constant.
+//! Observability: the same path at two headings; time and distance at two speeds.
+//! Alias: `carpet_nap` (same heading at two speeds), exactly where the creep goes with the distance.
+//! Reference: tyre creep in proportion to side force: weight times slope over stiffness, 0.04 to 0.1 % per
+//! degree.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
@@ -50,7 +53,7 @@ impl PhysicalEffect for FloorSlope {
         }
     }
 
-    /// Creep with time or with the way, by which of them is named.
+    /// Creep with time or with the distance, by which of them is named.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         let pair = |x, y| value_of(values, x).zip(value_of(values, y));
         let (creep, slide) = (pair("creep_x_m_s", "creep_y_m_s"), pair("slide_x", "slide_y"));
@@ -88,7 +91,7 @@ impl Forward for State {
 
 #[derive(Clone)]
 struct Term {
-    /// With the way, or else with the time.
+    /// With the distance, or else with the time.
     way: bool,
 }
 

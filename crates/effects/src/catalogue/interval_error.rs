@@ -1,9 +1,13 @@
 //! `interval_error`: the log's stamps are irregular, and the irregularity is not true.
 //!
-//! Model: a row that is due at t is stamped t + η with η uniform, and read at t + (1 − σ) η: a share σ of the stamps' irregularity is false. Signature: an
-//! interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω); where speeds are logged and not counts, by −σξ(v, 0, ω), a negative share.
-//! Observability: a moving robot and an irregular log; measurements between the rows blur it. Alias: wheel noise, but for the slope against ξ.
-//! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes; milliseconds.
+//! Model: a row that is due at t is stamped t + η with η uniform, and read at t + (1 − σ) η: a share σ of the
+//! stamps' irregularity is false.
+//! Signature: an interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω); where speeds
+//! are logged and not counts, by −σξ(v, 0, ω), a negative share.
+//! Observability: a moving robot and an irregular log; measurements between the rows blur it.
+//! Alias: wheel noise, but for the slope against ξ.
+//! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
+//! milliseconds.
 
 use std::collections::VecDeque;
 
@@ -31,7 +35,8 @@ pub struct IntervalError {
 }
 
 impl IntervalError {
-    /// The irregularity of a fitted effect, seconds: data show the share that is false, and their own irregularity.
+    /// The irregularity of a fitted effect, seconds: data show the share that is false, and their own
+    /// irregularity.
     pub(crate) const TYPICAL_JITTER_S: f64 = 0.005;
 }
 
@@ -65,7 +70,8 @@ impl PhysicalEffect for IntervalError {
         }
     }
 
-    /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the simulator does not write.
+    /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the
+    /// simulator does not write.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         Some(Self {
             share: value_of(values, "share")?.min(1.0),
@@ -104,7 +110,7 @@ impl Forward for State {
 #[derive(Clone, Default)]
 struct Term {
     sampling_period: SamplingPeriodEstimator,
-    /// What its lateness makes of the wheels' ways at the last row, for a share of one.
+    /// What its lateness makes of the wheels' travel at the last row, for a share of one.
     off_m: Wheels<f64>,
     /// The logged interval whose parts come in.
     row: Option<Row>,
@@ -117,7 +123,7 @@ struct Term {
 struct Row {
     end_s: f64,
     length_s: f64,
-    /// What its end being late makes of the wheels' ways beyond what its start does.
+    /// What its end being late makes of the wheels' travel beyond what its start does.
     gained_m: Wheels<f64>,
     /// What came in so far.
     travel_m: Wheels<f64>,
@@ -129,8 +135,9 @@ const RECENT_ROWS: usize = 5;
 const SPEED_CHANGE_RATIO: f64 = 1.5;
 
 impl Term {
-    /// The speed of the wheels by rows that have nothing to do with when this one and the one before were stamped: the speed of an interval by its own stamps goes
-    /// with their errors, and would lengthen or shorten all ways.
+    /// The speed of the wheels by rows that have nothing to do with when this one and the one before were
+    /// stamped: the speed of an interval by its own stamps goes with their errors, and would lengthen or
+    /// shorten all distances.
     fn speed_m_s(&self, now_m_s: Wheels<f64>) -> Wheels<f64> {
         let known = self.recent.iter().take(self.recent.len().saturating_sub(1));
         let (length_s, travel_m) = known.fold((0.0, Wheels::both(0.0)), |(length_s, sum), (of_row_s, travel_m)| {
@@ -165,7 +172,8 @@ impl ModelTerm for Term {
                 }
             }
             self.sampling_period.next_row(from_s, row_s);
-            // What a late stamp makes of a way is gone with the next one: only the speed then and the row count.
+            // What a late stamp makes of a travel is gone with the next one: only the speed then and the row
+            // count.
             let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.sampling_period.late_s);
             let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
             self.row = Some(Row { end_s: row_s, length_s: row_s - from_s, gained_m, travel_m: Wheels::both(0.0) });

@@ -1,8 +1,13 @@
 //! `lateral_skid`: in a bend the tyres give way sideways, so that the drive slides outwards.
 //!
-//! Model: v_y = −c v ω: the side force m v ω bends tyres of a cornering stiffness to a slip angle in proportion. Signature: e_dy = −c v ω T.
-//! Observability: bends at two speeds. Alias: `truth_lever_arm` (same ω, two speeds tell), `truth_yaw`, `truth_latency`: a single circle tells none apart.
-//! Reference: linear tyre, slip angle = side force over cornering stiffness: c = m/C_α, 3 to 10 ms; the moved centre of rotation of skid steer, far more.
+//! Model: v_y = −c v ω: the side force m v ω bends tyres of a cornering stiffness to a slip angle in
+//! proportion.
+//! Signature: e_dy = −c v ω T.
+//! Observability: bends at two speeds.
+//! Alias: `truth_lever_arm` (same ω, two speeds tell), `truth_yaw`, `truth_latency`: a single circle
+//! discriminates none.
+//! Reference: linear tyre, slip angle = side force over cornering stiffness: c = m/C_α, 3 to 10 ms; the moved
+//! centre of rotation of skid steer, far more.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sinc};
@@ -73,7 +78,8 @@ impl Forward for State {
         Hooks { floor: true, ..Hooks::NONE }
     }
 
-    /// The direction "sideways" turns during the step: its mean is that of the middle, shortened by sinc of half the turn.
+    /// The direction "sideways" turns during the step: its mean is that of the middle, shortened by sinc of
+    /// half the turn.
     fn floor(&mut self, step: &mut Step) {
         let speed_m_s = step.contact_speed_m_s();
         let v_m_s = 0.5 * (speed_m_s.left + speed_m_s.right);

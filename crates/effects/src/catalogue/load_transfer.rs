@@ -1,7 +1,10 @@
 //! `load_transfer`: in a bend the outer tyre carries more and is pressed flatter than the inner one.
 //!
-//! Model: ΔN = m v ω h/b moves from the inner to the outer wheel and Δr/r = −ΔN/(k r): r_R = r (1 − c v ω), r_L = r (1 + c v ω).
-//! Signature: e_dθ = −2c v²ω/b. Observability: bends at two speeds; nothing in spins and on straights. Alias: `turn_rate_wheelbase` (0.98 on circles).
+//! Model: ΔN = m v ω h/b moves from the inner to the outer wheel and Δr/r = −ΔN/(k r): r_R = r (1 − c v ω),
+//! r_L = r (1 + c v ω).
+//! Signature: e_dθ = −2c v²ω/b.
+//! Observability: bends at two speeds; nothing in spins and on straights.
+//! Alias: `turn_rate_wheelbase` (0.98 on circles).
 //! Reference: the balance of moments of a rigid body on springs; 0.2 % at v ω = 0.5 m/s² for a soft tyre.
 
 use model_term::{Interval, ModelTerm, TermParameter};

@@ -1,10 +1,15 @@
-//! `low_speed_truncation`: a firmware that keeps whole units of way in every cycle throws the fractions away.
+//! `low_speed_truncation`: a firmware that keeps whole units of distance in every cycle throws the fractions
+//! away.
 //!
-//! Model: of each wheel's way in a cycle only whole units are kept: half a unit is lost a cycle on average, whatever the speed, and all below one. Other
-//! work delays the loop: a cycle lasts from half to one and a half of its mean.
-//! Signature: the robot goes farther than it counts, by a constant speed: a scale error that vanishes at speed. Observability: two speeds.
-//! Alias: `wheel_scale` at one speed. Assumption of the hypothesis: fractions of all sizes are equally likely, which a speed that is a whole number of
-//! units a cycle breaks. Reference: users' reports of integer odometry; the mean of a uniform fraction.
+//! Model: of each wheel's travel in a cycle only whole units are kept: half a unit is lost a cycle on
+//! average, whatever the speed, and all below one. Other work delays the loop: a cycle lasts from half to one
+//! and a half of its mean.
+//! Signature: the robot goes farther than it counts, by a constant speed: a scale error that vanishes at
+//! speed.
+//! Observability: two speeds.
+//! Alias: `wheel_scale` at one speed. Assumption of the hypothesis: fractions of all sizes are equally
+//! likely, which a speed that is a whole number of units a cycle breaks.
+//! Reference: users' reports of integer odometry; the mean of a uniform fraction.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
@@ -93,7 +98,8 @@ impl Forward for State {
         let unit_m = 2.0 * self.effect.loss_m_s * self.effect.cycle_s;
         let step_m = step.encoder_rad.zip_with(step.nominal_radius_m, |rad, radius_m| rad * radius_m);
         let (mut from_s, end_s) = (step.t_s, step.t_s + step.dt_s);
-        // Cycles end between the engine's steps too: way by whole steps would make few fractions, the same ones over and over.
+        // Cycles end between the engine's steps too: way by whole steps would make few fractions, the same
+        // ones over and over.
         while self.cycle_ends_s <= end_s {
             let part = (self.cycle_ends_s - from_s) / step.dt_s;
             let in_cycle_m = self.in_cycle_m.zip_with(step_m, |distance_m, step_m| distance_m + part * step_m);
@@ -150,7 +156,8 @@ mod tests {
             for k in 0..steps {
                 let mut step = specimen_step();
                 (step.t_s, step.dt_s) = (dt_s * f64::from(k), dt_s);
-                // A simple ratio to the unit of 80 µm: cycles of whole steps would leave eighths of it only, 7/16 on average.
+                // A simple ratio to the unit of 80 µm: cycles of whole steps would leave eighths of it only,
+                // 7/16 on average.
                 step.encoder_rad = Wheels::both(sense * 250e-6 / 0.08);
                 let before_rad = step.encoder_rad;
                 state.encoder(&mut step);
@@ -159,7 +166,8 @@ mod tests {
             let mut readout = Readout { ticks: Wheels::both(0), m_per_count: Wheels::both(1e-6), written: true };
             state.readout(&mut readout);
             let lost_m_s = -sense * 1e-6 * readout.ticks.left as f64 / (dt_s * f64::from(steps));
-            // A uniform fraction has a standard deviation of 0.58 of its mean: five standard errors of 5000 are 4 %.
+            // A uniform fraction has a standard deviation of 0.58 of its mean: five standard errors of 5000
+            // are 4 %.
             assert!((lost_m_s / 2e-3 - 1.0).abs() < 0.04, "{lost_m_s}");
         }
     }

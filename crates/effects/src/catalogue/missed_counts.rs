@@ -1,8 +1,12 @@
 //! `missed_counts`: a counter that cannot follow fast edges loses the ones above some rate.
 //!
-//! Model: of the counts above the hinge speed a share is lost: counted speed = h + (1−share)(|v_w|−h) for |v_w| > h. Signature: a one-sided hinge
-//! in |v_w| of that wheel; the robot goes farther than it counts. Observability: speeds on both sides of the hinge. Alias: `slip_speed` of the other sign.
-//! Reference: the HCTL-1100's input filter (a state must stand three clocks); interrupt-driven counters behave alike. 0.1 to 2 %, a rule of thumb.
+//! Model: of the counts above the hinge speed a share is lost: counted speed = h + (1−share)(|v_w|−h) for
+//! |v_w| > h.
+//! Signature: a one-sided hinge in |v_w| of that wheel; the robot goes farther than it counts.
+//! Observability: speeds on both sides of the hinge.
+//! Alias: `slip_speed` of the other sign.
+//! Reference: the HCTL-1100's input filter (a state must stand three clocks); interrupt-driven counters
+//! behave alike. 0.1 to 2 %, a rule of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};

@@ -1,8 +1,10 @@
 //! `payload_compression`: what a robot carries presses its tyres flatter.
 //!
-//! Model: r = r₀ (1 − c p) under a payload p, c = g/(n k r₀) for n springs of stiffness k; a load off the middle presses one wheel more:
-//! c_L = c − ½m, c_R = c + ½m. Signature: the scale steps with the covariate `payload_kg` of the runs, and E_d with it.
-//! Observability: runs with different payloads. Alias: `thermal_drift` and `wear` where the payload was changed once.
+//! Model: r = r₀ (1 − c p) under a payload p, c = g/(n k r₀) for n springs of stiffness k; a load off the
+//! middle presses one wheel more: c_L = c − ½m, c_R = c + ½m.
+//! Signature: the scale steps with the covariate `payload_kg` of the runs, and E_d with it.
+//! Observability: runs with different payloads.
+//! Alias: `thermal_drift` and `wear` where the payload was changed once.
 //! Reference: a linear spring; 0.1 to 1 % for a load that the robot is made for, a rule of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};

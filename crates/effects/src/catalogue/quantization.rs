@@ -1,8 +1,11 @@
 //! `quantization`: the log keeps whole ticks, each of several counts.
 //!
-//! Model: tick = ⌊count / n⌋. A noise model, never a finding. Signature: an error of variance Δ²/12 a pose, so that increments have a lag-1 correlation of −½.
-//! Observability: the record itself. Alias: white noise of the instrument. Reference: Navarro et al.: a pulse of about 1 mm is a number of the
-//! controller's counts; Sheppard 1898 for Δ²/12.
+//! Model: tick = ⌊count / n⌋. A noise model, never a finding.
+//! Signature: an error of variance Δ²/12 a pose, so that increments have a lag-1 correlation of −½.
+//! Observability: the record itself.
+//! Alias: white noise of the instrument.
+//! Reference: Navarro et al.: a pulse of about 1 mm is a number of the controller's counts; Sheppard 1898 for
+//! Δ²/12.
 
 use serde::{Deserialize, Serialize};
 

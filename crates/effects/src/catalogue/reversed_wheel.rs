@@ -1,7 +1,10 @@
 //! `reversed_wheel`: a counter counts down when its wheel rolls forward.
 //!
-//! Model: that column's sign is wrong. Signature: of one wheel, straights look like spins and spins like straights; of both, everything runs backward.
-//! A gross fault, tried before any fit: the records without it have the sign restored. Observability: any motion. Alias: `swapped_wheels` on turns alone.
+//! Model: that column's sign is wrong.
+//! Signature: of one wheel, straights look like spins and spins like straights; of both, everything runs
+//! backward. A gross fault, tried before any fit: the records without it have the sign restored.
+//! Observability: any motion.
+//! Alias: `swapped_wheels` on turns alone.
 //! Reference: the two channels of a quadrature encoder exchanged, or a motor mounted the other way round.
 
 use dataset::{Dataset, WheelLog};

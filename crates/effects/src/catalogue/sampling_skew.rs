@@ -1,7 +1,9 @@
 //! `sampling_skew`: the right counter is read a little later than the left one.
 //!
-//! Model: a row stamped t holds the left count at t and the right count at t + δ. Signature: e_dθ = δ a/b, nothing at constant speed or at rest.
-//! Observability: speed changes on straights. Alias: `slip_acceleration` of one wheel.
+//! Model: a row stamped t holds the left count at t and the right count at t + δ.
+//! Signature: e_dθ = δ a/b, nothing at constant speed or at rest.
+//! Observability: speed changes on straights.
+//! Alias: `slip_acceleration` of one wheel.
 //! Reference: two HCTL-1100 that share no sampling: δ up to one sample time, 0.06 to 2 ms.
 
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -71,7 +73,8 @@ impl ModelTerm for Term {
         &[TermParameter { name: "right_delay_s", unit: "s", prior_sigma: 2e-3 }]
     }
 
-    /// Of the right wheel's counts, its delay times the speed gained since the interval before came too early.
+    /// Of the right wheel's counts, its delay times the speed gained since the interval before came too
+    /// early.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let gained_m_s = interval.speed_m_s().right - interval.previous_speed_m_s().right;
         gradient[0] = interval.change(Wheels { left: 0.0, right: -gained_m_s });

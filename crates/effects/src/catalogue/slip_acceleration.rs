@@ -1,7 +1,10 @@
-//! `slip_acceleration`: a tyre transmits force by slipping a little, so the ground speed lags behind the wheel's.
+//! `slip_acceleration`: a tyre transmits force by slipping a little, so the ground speed lags behind the
+//! wheel's.
 //!
-//! Model: δv_w = −κ a_w. Signature: e_dx ∝ a; zero net over a symmetric start and stop.
-//! Observability: speed changes seen from outside. Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
+//! Model: δv_w = −κ a_w.
+//! Signature: e_dx ∝ a; zero net over a symmetric start and stop.
+//! Observability: speed changes seen from outside.
+//! Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
 //! Reference: tyre slip stiffness; κ = v/(C_s g) with C_s = 20 to 40 gives 1 to 10 ms.
 
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -88,7 +91,8 @@ impl ModelTerm for Term {
         &[TermParameter { name: "kappa_s", unit: "s", prior_sigma: 0.01 }]
     }
 
-    /// The change of the mean speeds from the interval before: summed over a start and a stop it is nothing, exactly.
+    /// The change of the mean speeds from the interval before: summed over a start and a stop it is nothing,
+    /// exactly.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let gained_m_s = interval.speed_m_s().zip_with(interval.previous_speed_m_s(), |now, before| now - before);
         gradient[0] = interval.change(gained_m_s.map(|gained_m_s| -gained_m_s));

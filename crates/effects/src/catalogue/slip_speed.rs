@@ -1,7 +1,9 @@
 //! `slip_speed`: the faster a wheel turns, the larger the share of its motion that slips.
 //!
-//! Model: ground speed = v_w (1 − c|v_w|) for each wheel. Signature: e_dx = −c v|v|, e_dθ = −2c|v|ω; in a spin −(cb/2)ω|ω|.
-//! Observability: at least two speeds. Alias: `missed_counts`, load, `turn_rate_wheelbase`.
+//! Model: ground speed = v_w (1 − c|v_w|) for each wheel.
+//! Signature: e_dx = −c v|v|, e_dθ = −2c|v|ω; in a spin −(cb/2)ω|ω|.
+//! Observability: at least two speeds.
+//! Alias: `missed_counts`, load, `turn_rate_wheelbase`.
 //! Reference: longitudinal slip with rolling resistance that grows with speed; sizes are rules of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};

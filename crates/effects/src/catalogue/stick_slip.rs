@@ -1,10 +1,14 @@
 //! `stick_slip`: at a creep a wheel winds up before its contact lets go.
 //!
-//! Model: below a speed the contact sticks while the tread goes on, until the wind-up reaches a breakaway way, uniform between nothing and twice its mean;
-//! then all of it is let go at once, as it is when the wheel becomes faster. Signature: tails at low speed that do not add up; a creeping contact, and one at
-//! rest after a creep, is on average two thirds of the mean breakaway behind its tread. Observability: looks at a creeping robot, or at rest and on the way.
-//! Alias: quantization; `backlash` and `truth_latency` where measurements are few. Reference: Coulomb friction on a compliant contact, Armstrong-Hélouvry et al.
-//! 1994; the mean age of a renewal process, Cox 1962.
+//! Model: below a speed the contact sticks while the tread goes on, until the wind-up reaches a breakaway
+//! distance, uniform between nothing and twice its mean; then all of it is let go at once, as it is when the
+//! wheel becomes faster.
+//! Signature: tails at low speed that do not add up; a creeping contact, and one at rest after a creep, is on
+//! average two thirds of the mean breakaway behind its tread.
+//! Observability: measurements of a creeping robot, or at rest and while it drives.
+//! Alias: quantization; `backlash` and `truth_latency` where measurements are few.
+//! Reference: Coulomb friction on a compliant contact, Armstrong-Hélouvry et al. 1994; the mean age of a
+//! renewal process, Cox 1962.
 
 use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -111,11 +115,14 @@ impl Forward for State {
 
 /// Speeds of a contact below which it sticks that are tried, m/s.
 const STICK_SPEEDS_M_S: [f64; 6] = [0.01, 0.025, 0.05, 0.1, 0.17, 0.3];
-/// Mean wind-up of a contact that creeps on and on, over the mean breakaway: `E[h²]/(2 E[h])` of a breakaway h that is uniform from nothing on.
+/// Mean wind-up of a contact that creeps on and on, over the mean breakaway: `E[h²]/(2 E[h])` of a breakaway
+/// h that is uniform from nothing on.
 const MEAN_WIND_UP: f64 = 2.0 / 3.0;
-/// Way over which the mean wind-up comes to that, over the mean breakaway: by least squares over ways of up to two breakaways.
+/// Distance over which the mean wind-up comes to that, over the mean breakaway: by least squares over
+/// distances of up to two breakaways.
 const WIND_UP_RATIO: f64 = 0.5;
-/// A breakaway that is usual, metres: the way over which a wind-up comes about is taken from it, whatever its size.
+/// A breakaway that is usual, metres: the distance over which a wind-up comes about is taken from it,
+/// whatever its size.
 const TYPICAL_BREAKAWAY_M: f64 = 1e-3;
 
 /// The mean wind-up for each unit of the mean breakaway.
@@ -222,7 +229,8 @@ mod tests {
                 wound.push(behind_m / breakaway_m);
             }
             let mean = wound.iter().sum::<f64>() / 2000.0;
-            // The exponential is off by a tenth of a breakaway or so; half of the mean wind-up would be off by 0.33, and its sign by 1.3.
+            // The exponential is off by a tenth of a breakaway or so; half of the mean wind-up would be off
+            // by 0.33, and its sign by 1.3.
             assert!((mean - expected).abs() < 0.15, "{ways:?}: {mean} {expected}");
         }
         assert_eq!(Term::new(0.02).next(0.5, 1e-3, 0.03), 0.0, "what is fast has let go");

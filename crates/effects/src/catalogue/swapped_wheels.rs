@@ -1,7 +1,11 @@
 //! `swapped_wheels`: the left counter is logged as the right one and the right one as the left.
 //!
-//! Model: the two columns change places. Signature: every turn has the other sense. A gross fault, tried before any fit: the records without it have the
-//! columns changed back. Observability: any turn. Alias: `reversed_wheel` of both on turns alone. Reference: two plugs that fit each other.
+//! Model: the two columns change places.
+//! Signature: every turn has the other sense. A gross fault, tried before any fit: the records without it
+//! have the columns changed back.
+//! Observability: any turn.
+//! Alias: `reversed_wheel` of both on turns alone.
+//! Reference: two plugs that fit each other.
 
 use dataset::{Dataset, WheelLog};
 use kinematics::{Twist, Wheels};

@@ -1,8 +1,11 @@
 //! `thermal_drift`: tyres warm up and swell from the session's start on.
 //!
-//! Model: k(t) = 1 + α (1 − e^{−t/τ}) on the session's clock, both wheels alike. Signature: a scale that settles.
-//! Observability: runs early and late in a session. Alias: `wear`, at 1.00 while the mean speed is steady: a long pause or a cold restart tells them apart.
-//! Reference: a lumped heat capacity (Newton's law of cooling) and linear expansion; 0.2 % over 10 to 60 minutes for rubber.
+//! Model: k(t) = 1 + α (1 − e^{−t/τ}) on the session's clock, both wheels alike.
+//! Signature: a scale that settles.
+//! Observability: runs early and late in a session.
+//! Alias: `wear`, at 1.00 while the mean speed is steady: a long pause or a cold restart discriminates them.
+//! Reference: a lumped heat capacity (Newton's law of cooling) and linear expansion; 0.2 % over 10 to 60
+//! minutes for rubber.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};

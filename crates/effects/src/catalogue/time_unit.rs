@@ -1,7 +1,10 @@
 //! `time_unit`: times in milliseconds or microseconds are written as if they were seconds.
 //!
-//! Model: stamp = factor × t. Signature: the log lasts a thousand times as long as what was seen of it. A gross fault, tried before any fit: the records
-//! without it have the times of the log, or those of the instrument, divided. Observability: the record itself. Alias: none.
+//! Model: stamp = factor × t.
+//! Signature: the log lasts a thousand times as long as what was seen of it. A gross fault, tried before any
+//! fit: the records without it have the times of the log, or those of the instrument, divided.
+//! Observability: the record itself.
+//! Alias: none.
 //! Reference: what importers meet; ROS headers in nanoseconds, Arduino's millis() and micros().
 
 use dataset::{Dataset, Odometry, Run, WheelLog};

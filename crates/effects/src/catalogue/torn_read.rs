@@ -1,8 +1,13 @@
 //! `torn_read`: a count of several bytes is read while it changes.
 //!
-//! Model: with some probability one counter of a row is off by ± one step of the byte that was torn: 2⁸ or 2¹⁶. Signature: a jump in one sample that is
-//! undone in the next. A gross fault, tried before any fit: the records without it have such samples put back. Observability: the record itself.
-//! Alias: none. Reference: the HCTL-1100's position is three bytes; a counter of 16 or 32 bits behind an 8-bit bus is alike.
+//! Model: with some probability one counter of a row is off by ± one step of the byte that was torn: 2⁸ or
+//! 2¹⁶.
+//! Signature: a jump in one sample that is undone in the next. A gross fault, tried before any fit: the
+//! records without it have such samples put back.
+//! Observability: the record itself.
+//! Alias: none.
+//! Reference: the HCTL-1100's position is three bytes; a counter of 16 or 32 bits behind an 8-bit bus is
+//! alike.
 
 use dataset::{Dataset, WheelLog};
 use kinematics::{Side, Wheels};
@@ -85,13 +90,15 @@ impl Forward for State {
     }
 }
 
-/// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median stands most of them.
+/// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median
+/// stands most of them.
 const NEIGHBOUR_ROWS: usize = 4;
 /// Rows that are torn one after the other, at most.
 const MAX_ROWS: usize = 2;
 
-/// Puts back the samples of a column that are jumps astray, and says how many these were. Increments that are usually an eighth of a jump out of line with
-/// their neighbours, and jumps that are not undone, are none of this fault.
+/// Puts back the samples of a column that are outlying jumps, and says how many these were. Increments that
+/// are usually an eighth of a jump out of line with their neighbours, and jumps that are not undone, are none
+/// of this fault.
 fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     let step = jump as f64;
     let increment = |k: usize| (ticks[k + 1] - ticks[k]) as f64;
@@ -116,12 +123,14 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     let mut restored = 0;
     let (mut at, mut used, mut first_used) = (0, 0, false);
     while at < last {
-        // A wheel that starts or stops is out of line as well, but what a tear does is undone a row or two later.
+        // A wheel that starts or stops is out of line as well, but what a tear does is undone a row or two
+        // later.
         let Some(back) = undone(&jumps[at..]) else {
             at += 1;
             continue;
         };
-        // A wheel that speeds up and slows down again is out of line to one side and then to the other, and goes smoothly.
+        // A wheel that speeds up and slows down again is out of line to one side and then to the other, and
+        // goes smoothly.
         let jumps = &jumps[at..=at + back];
         if !smooths(ticks, at, jumps, jump) {
             at += 1;
@@ -132,10 +141,12 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
         at += back + 1;
         used = at;
     }
-    // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after to undo them.
+    // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after
+    // to undo them.
     if restored > 0 {
         let ends = [(0, -jumps[0], !first_used), (last, jumps[last - 1], used < last)];
-        // A wheel that starts or stops there is on the line through the two increments beside, and not where a tear of its own puts it.
+        // A wheel that starts or stops there is on the line through the two increments beside, and not where
+        // a tear of its own puts it.
         let rate = |k: usize| (ticks[k + 1] - ticks[k]) as f64 / (t_s[k + 1] - t_s[k]);
         let off_line = |own: usize, next: usize, further: usize| {
             (rate(own) - 2.0 * rate(next) + rate(further)) * (t_s[own + 1] - t_s[own])
@@ -152,7 +163,8 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     Restored { samples: restored, clear: if typical < step / CLEAR_JUMP_RATIO { restored } else { 0 } }
 }
 
-/// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that jitter make some that measurement alike.
+/// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that
+/// jitter make some that measurement alike.
 const CLEAR_JUMP_RATIO: f64 = 64.0;
 
 /// Samples put back.
@@ -163,7 +175,7 @@ struct Restored {
     clear: usize,
 }
 
-/// Takes the sum of the jumps so far off each count, and says how many were astray.
+/// Takes the sum of the jumps so far off each count, and says how many were outlying.
 fn put_back(ticks: &mut [i64], jumps: &[f64], jump: i64) -> usize {
     let (mut outlying, mut restored) = (0.0, 0);
     for (count, jumps) in ticks.iter_mut().zip(jumps) {
@@ -175,8 +187,8 @@ fn put_back(ticks: &mut [i64], jumps: &[f64], jump: i64) -> usize {
     restored
 }
 
-/// Whether counts go more smoothly without jumps from one row on: a tear bends them by four jumps, of which two are gone where another tear is beside it, and what is none is
-/// bent by as many.
+/// Whether counts go more smoothly without jumps from one row on: a tear bends them by four jumps, of which
+/// two are gone where another tear is beside it, and what is none is bent by as many.
 fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
     let from = at.saturating_sub(1);
     let near = &ticks[from..(at + jumps.len() + 2).min(ticks.len())];
@@ -186,7 +198,8 @@ fn smooths(ticks: &[i64], at: usize, jumps: &[f64], jump: i64) -> bool {
     roughness(near) - roughness(&restored) >= jump
 }
 
-/// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so, or is not back in time.
+/// After how many rows what begins with a jump of one step is back in line; `None` when it does not begin so,
+/// or is not back in time.
 fn undone(jumps: &[f64]) -> Option<usize> {
     let mut outlying = *jumps.first()?;
     if outlying.abs() != 1.0 {

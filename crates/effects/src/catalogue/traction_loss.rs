@@ -1,10 +1,14 @@
 //! `traction_loss`: a wheel that is accelerated harder than the floor can hold slides until it is caught.
 //!
 //! Model: the contact sticks while the acceleration stays under μ_s g; then it slides with Stribeck friction
-//! μ(u) = μ_k + (μ_s − μ_k) exp(−|u|/u_s) of the sliding speed u, until the speeds meet. Signature: a one-sided heavy tail of e_dx above some |a|; where many
-//! starts and stops are as hard, a mean: ground lost at starts and gained at stops, by the wheel that is accelerated harder than the floor holds.
-//! Observability: hard starts and stops. Alias: `bumps`; `slip_acceleration` and `truth_latency` where measurements are few or the floor holds nearly all: a wheel under
-//! control trembles, so that the ground lags as by a delay until the floor gives way. Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
+//! μ(u) = μ_k + (μ_s − μ_k) exp(−|u|/u_s) of the sliding speed u, until the speeds meet.
+//! Signature: a one-sided heavy tail of e_dx above some |a|; where many starts and stops are as hard, a mean:
+//! ground lost at starts and gained at stops, by the wheel that is accelerated harder than the floor holds.
+//! Observability: hard starts and stops.
+//! Alias: `bumps`; `slip_acceleration` and `truth_latency` where measurements are few or the floor holds
+//! nearly all: a wheel under control trembles, so that the ground lags as by a delay until the floor gives
+//! way.
+//! Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
 
 use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
@@ -17,8 +21,8 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
 
-/// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less than it
-/// should, to one that holds nearly nothing.
+/// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less
+/// than it should, to one that holds nearly nothing.
 const SLIDE_SCALES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 
 /// Standard gravity, m/s² (CGPM 1901).
@@ -32,7 +36,7 @@ pub struct TractionLoss {
     pub static_friction: f64,
     /// The same when sliding fast (μ_k).
     pub kinetic_friction: f64,
-    /// Sliding speed at which friction has fallen by 1/e of the way (u_s), m/s.
+    /// Sliding speed at which friction has fallen to 1/e of its excess (u_s), m/s.
     pub stribeck_speed_m_s: f64,
 }
 
@@ -78,7 +82,8 @@ impl PhysicalEffect for TractionLoss {
         }
     }
 
-    /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's sliding there is beyond it.
+    /// By the frictions, or by the acceleration up to which the floor holds and how much of a usual floor's
+    /// sliding there is beyond it.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         if let Some((sliding, grip_m_s2)) = value_of(values, "sliding").zip(value_of(values, "holds_m_s2")) {
             return (sliding >= 0.0).then(|| Self::sliding(sliding, grip_m_s2));
@@ -165,17 +170,20 @@ impl Forward for State {
 
 /// Accelerations up to which the floor holds that are tried, m/s².
 const GRIP_M_S2: [f64; 10] = [0.1, 0.2, 0.3, 0.36, 0.43, 0.52, 0.62, 0.75, 0.9, 1.2];
-/// Kinetic over static friction, and the Stribeck speed, m/s, of a usual floor: rubber slides with two thirds to four fifths of what it holds.
+/// Kinetic over static friction, and the Stribeck speed, m/s, of a usual floor: rubber slides with two thirds
+/// to four fifths of what it holds.
 const TYPICAL_KINETIC: f64 = 0.7;
 const TYPICAL_STRIBECK_M_S: f64 = 0.05;
 
-/// With what power of the acceleration the way that is lost falls where a floor holds a little more or less than is asked of it: four to six, as driven in the blind benchmark.
+/// With what power of the acceleration the distance that is lost falls where a floor holds a little more or
+/// less than is asked of it: four to six, as driven in the blind benchmark.
 const LOSS_EXPONENT: f64 = 5.0;
 /// A floor on which less than this of the sliding is found holds all.
 const MIN_SLIDING: f64 = 1e-3;
 
 impl TractionLoss {
-    /// The usual floor on which so many times as much way is lost as on one that holds up to an acceleration.
+    /// The usual floor on which so many times as much distance is lost as on one that holds up to an
+    /// acceleration.
     fn sliding(sliding: f64, grip_m_s2: f64) -> Self {
         Self::typical(grip_m_s2 * sliding.max(MIN_SLIDING).powf(-1.0 / LOSS_EXPONENT))
     }
@@ -188,24 +196,28 @@ impl TractionLoss {
     }
 }
 
-/// Speed by which a tread trembles about its mean, m/s: what whole counts and steps of voltage leave a wheel under control, 0.005 to 0.01. Whatever it trembles by
-/// sets it sliding to and fro, so that the floor pulls as hard as it holds only where the mean speeds are apart by as much, and in proportion under that.
+/// Speed by which a tread trembles about its mean, m/s: what whole counts and steps of voltage leave a wheel
+/// under control, 0.005 to 0.01. Whatever it trembles by sets it sliding to and fro, so that the floor pulls
+/// as hard as it holds only where the mean speeds are apart by as much, and in proportion under that.
 const TREAD_JITTER_M_S: f64 = 0.01;
-/// What of the friction is left when sliding fast, in the hypothesis: between a floor that holds as much sliding as at rest, and a usual one's 0.7. A wheel that trembles slides
-/// at rest already.
+/// What of the friction is left when sliding fast, in the hypothesis: between a floor that holds as much
+/// sliding as at rest, and a usual one's 0.7. A wheel that trembles slides at rest already.
 const SLIDING_FRICTION_RATIO: f64 = 0.85;
-/// Longest step in which sliding is followed within a row, seconds: a fifth of what the ground takes to follow a trembling tread.
+/// Longest step in which sliding is followed within a row, seconds: a fifth of what the ground takes to
+/// follow a trembling tread.
 const STEP_S: f64 = 2.5e-3;
 /// Most steps of a piece of a row: rows as long say nothing of a start.
 const MAX_STEPS: f64 = 40.0;
 
-/// The ground's speed under trembling treads, by their mean speeds from row to row: within a row they change steadily.
+/// The ground's speed under trembling treads, by their mean speeds from row to row: within a row they change
+/// steadily.
 #[derive(Clone)]
 struct Term {
     grip_m_s2: f64,
     ground_m_s: Wheels<f64>,
     row: Option<Row>,
-    /// Way that each wheel has lost while the floor had not given way yet: a floor that holds all that is asked of it is none of this effect. `None` once it has.
+    /// Distance that each wheel has lost while the floor had not given way yet: a floor that holds all that
+    /// is asked of it is none of this effect. `None` once it has.
     held_m: Option<Wheels<f64>>,
 }
 
@@ -248,10 +260,11 @@ impl Term {
         self.grip_m_s2 * left * (gap_m_s / TREAD_JITTER_M_S).clamp(-1.0, 1.0)
     }
 
-    /// The way that a wheel loses in some time, from its tread's mean speed on, which changes steadily.
+    /// The distance that a wheel loses in some time, from its tread's mean speed on, which changes steadily.
     fn slide(&mut self, side: Side, time_s: f64, speed_m_s: f64, acceleration_m_s2: f64) -> f64 {
         let gap_m_s = speed_m_s - self.ground_m_s[side];
-        // While the gap stays within what the tread trembles by, the ground lags it by a time constant: in closed form, and the friction as at rest.
+        // While the gap stays within what the tread trembles by, the ground lags it by a time constant: in
+        // closed form, and the friction as at rest.
         let lag_s = TREAD_JITTER_M_S / self.grip_m_s2;
         let steady_m_s = acceleration_m_s2 * lag_s;
         if gap_m_s.abs() <= TREAD_JITTER_M_S && steady_m_s.abs() <= TREAD_JITTER_M_S {
@@ -316,7 +329,8 @@ mod tests {
     use super::*;
     use crate::catalogue::specimen_step;
 
-    /// Ground travel of the left wheel over a start at `acceleration_m_s2` to 0.4 m/s and 0.3 s of cruise, and the tread's.
+    /// Ground travel of the left wheel over a start at `acceleration_m_s2` to 0.4 m/s and 0.3 s of cruise,
+    /// and the tread's.
     fn start(acceleration_m_s2: f64) -> (f64, f64) {
         let mut state = TractionLoss { static_friction: 0.1, kinetic_friction: 0.06, stribeck_speed_m_s: 0.05 }
             .forward()
@@ -350,7 +364,8 @@ mod tests {
         assert!(lost_m > loss(0.1 * GRAVITY_M_S2) && lost_m < loss(0.06 * GRAVITY_M_S2), "{lost_m}");
     }
 
-    /// A wheel under control trembles: speed about its mean after some time, m/s, and the acceleration, m/s². Whole steps of voltage of 2.5 m/s² each 4 ms.
+    /// A wheel under control trembles: speed about its mean after some time, m/s, and the acceleration, m/s².
+    /// Whole steps of voltage of 2.5 m/s² each 4 ms.
     fn trembles(t_s: f64) -> (f64, f64) {
         const SLOPE_M_S2: f64 = 2.5;
         const PERIOD_S: f64 = 8e-3;
@@ -360,7 +375,8 @@ mod tests {
         (SLOPE_M_S2 * PERIOD_S * from_middle, if rises { SLOPE_M_S2 } else { -SLOPE_M_S2 })
     }
 
-    /// Way lost in each row of a start to 0.3 m/s and a stop at 0.6 m/s², by a floor that holds a little less, by terms of several shapes, and by a delay last.
+    /// Way lost in each row of a start to 0.3 m/s and a stop at 0.6 m/s², by a floor that holds a little
+    /// less, by terms of several shapes, and by a delay last.
     fn rows_lost_m(grip_m_s2: f64, variants: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (acceleration_m_s2, cruise_m_s, stops_s) = (0.6, 0.3, 1.5);
         let mut floor = TractionLoss::typical(grip_m_s2).forward().expect("acts");
@@ -407,7 +423,7 @@ mod tests {
             for (term, predicted) in terms.iter_mut().zip(&mut predicted) {
                 let mut gradient = [Pose::IDENTITY];
                 term.motion(&interval, &mut gradient);
-                // Half of a wheel's way is the centre's.
+                // Half of a wheel's travel is the centre's.
                 predicted.push(-2.0 * gradient[0].x_m);
             }
             delay.push(travel_m - previous_m);
@@ -417,7 +433,7 @@ mod tests {
         (truth, predicted)
     }
 
-    /// Share of the lost way, summed along the rows, that a shape at its best size leaves, by squares.
+    /// Share of the lost distance, summed along the rows, that a shape at its best size leaves, by squares.
     fn left_by(truth: &[f64], predicted: &[f64]) -> (f64, f64) {
         let summed = |rows: &[f64]| -> Vec<f64> {
             rows.iter()
@@ -433,8 +449,10 @@ mod tests {
         (1.0 - value * product(&truth, &predicted) / product(&truth, &truth), value)
     }
 
-    /// The hypothesis sees rows of the log, no frictions and no trembling; its grid is a fifth apart, so that some shape lies within a tenth of the floor's. A term whose slides
-    /// begin with the mean acceleration and end where the mean speeds meet left 3 to 7 % of these, with sizes of hundreds; a delay leaves as much.
+    /// The hypothesis sees rows of the log, no frictions and no trembling; its grid is a fifth apart, so that
+    /// some shape lies within a tenth of the floor's. A term whose slides begin with the mean acceleration
+    /// and end where the mean speeds meet left 3 to 7 % of these, with sizes of hundreds; a delay leaves as
+    /// much.
     #[test]
     fn rows_of_the_log_show_what_a_floor_loses_that_holds_a_little_less_than_is_asked() {
         for grip_m_s2 in [0.599, 0.58, 0.55, 0.5] {

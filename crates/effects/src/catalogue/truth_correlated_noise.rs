@@ -1,8 +1,12 @@
 //! `truth_correlated_noise`: the outside instrument's errors resemble those of a moment before.
 //!
-//! Model: a Gauss–Markov process in time beside each coordinate, corr = e^{−Δt/τ}, stationary from the first measurement on.
-//! Signature: residuals that are correlated with no cause in the wheels. Observability: measurements closer than τ. Alias: any slow effect, over one run.
-//! Reference: Ornstein & Uhlenbeck 1930; filters inside trackers, thermal drift of cameras, scan matching against the same wall.
+//! Model: a Gauss–Markov process in time beside each coordinate, corr = e^{−Δt/τ}, stationary from the first
+//! measurement on.
+//! Signature: residuals that are correlated with no cause in the wheels.
+//! Observability: measurements closer than τ.
+//! Alias: any slow effect, over one run.
+//! Reference: Ornstein & Uhlenbeck 1930; filters inside trackers, thermal drift of cameras, scan matching
+//! against the same wall.
 
 use serde::{Deserialize, Serialize};
 
@@ -118,7 +122,8 @@ mod tests {
                 products += before.x_m * after.x_m / 1e-4;
             }
             let n = f64::from(n);
-            // Five standard errors of a variance, √(2/n), and at most that of a covariance; one τ apart the correlation is 1/e.
+            // Five standard errors of a variance, √(2/n), and at most that of a covariance; one τ apart the
+            // correlation is 1/e.
             let allowed = 5.0 * (2.0 / n).sqrt();
             for (moment, expected) in [(squares, 1.0), (thetas, 1.0), (products, (-1.0_f64).exp())] {
                 assert!((moment / n - expected).abs() < allowed, "{measurements}: {}", moment / n);

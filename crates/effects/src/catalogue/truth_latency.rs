@@ -1,8 +1,12 @@
 //! `truth_latency`: the outside instrument's samples are stamped later than they are true.
 //!
-//! Model: what is stamped t was seen at t − τ. Signature: −τ(v, 0, ω) in a seen pose, −τ(v̇, 0, ω̇) per unit of time in increments: nothing on a circle at
-//! constant speed. Observability: starts, stops and reversals. Alias: `slip_acceleration`, exactly: the same lag of both wheels is a time shift.
-//! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100 ms, in published logs up to 0.3 s.
+//! Model: what is stamped t was seen at t − τ.
+//! Signature: −τ(v, 0, ω) in a seen pose, −τ(v̇, 0, ω̇) per unit of time in increments: nothing on a circle
+//! at constant speed.
+//! Observability: starts, stops and reversals.
+//! Alias: `slip_acceleration`, exactly: the same lag of both wheels is a time shift.
+//! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100
+//! ms, in published logs up to 0.3 s.
 
 use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;

@@ -1,8 +1,12 @@
-//! `truth_lever_arm`: the point that the outside instrument takes for the robot is not the centre of its axle.
+//! `truth_lever_arm`: the point that the outside instrument takes for the robot is not the centre of its
+//! axle.
 //!
-//! Model: seen pose = true pose ⊕ ℓ with ℓ = (ℓ_x, ℓ_y) in the body's frame. Signature: e_dx = −ℓ_y ω, e_dy = ℓ_x ω in increments.
-//! Observability: turns; a robot that only drives straight shows nothing, since where it starts is not known beforehand. Alias: `lateral_skid` at one
-//! speed. Reference: Censi et al. 2013, the sensor's place on the robot.
+//! Model: seen pose = true pose ⊕ ℓ with ℓ = (ℓ_x, ℓ_y) in the body's frame.
+//! Signature: e_dx = −ℓ_y ω, e_dy = ℓ_x ω in increments.
+//! Observability: turns; a robot that only drives straight shows nothing, since where it starts is not known
+//! beforehand.
+//! Alias: `lateral_skid` at one speed.
+//! Reference: Censi et al. 2013, the sensor's place on the robot.
 
 use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;

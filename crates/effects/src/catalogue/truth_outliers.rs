@@ -1,11 +1,14 @@
 //! `truth_outliers`: now and then the outside instrument takes the robot to be where it is not.
 //!
-//! Model: every sighting is displaced with probability p, by N(0, jump_m²) along each of x and y, so that the direction is uniform and the distance
-//! √(π/2) jump_m on average, and by N(0, jump_rad²) in heading; sightings are independent. All marks that are read of a standing robot are one sighting.
-//! Signature: an isolated jump in one sample, undone in the next; a run between two readings is off by one jump, or two.
-//! Observability: redundant readings, of which most agree. Alias: `traction_loss` and bumps, which are not undone.
-//! Reference: Tukey 1960 and Huber 1964, a normal distribution contaminated by one of larger variance; scan matching that locks on to the wrong place,
-//! swapped markers, a mark read off the wrong line.
+//! Model: every measurement is displaced with probability p, by N(0, jump_m²) along each of x and y, so that
+//! the direction is uniform and the distance √(π/2) jump_m on average, and by N(0, jump_rad²) in heading;
+//! measurements are independent. All marks that are read of a standing robot are one measurement.
+//! Signature: an isolated jump in one sample, undone in the next; a run between two readings is off by one
+//! jump, or two.
+//! Observability: redundant readings, of which most agree.
+//! Alias: `traction_loss` and bumps, which are not undone.
+//! Reference: Tukey 1960 and Huber 1964, a normal distribution contaminated by one of larger variance; scan
+//! matching that locks on to the wrong place, swapped markers, a mark read off the wrong line.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +23,7 @@ use crate::stream::Stream;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TruthOutliers {
-    /// Probability that a sighting is displaced.
+    /// Probability that a measurement is displaced.
     pub probability: f64,
     /// Standard deviation of the displacement along each axis, metres.
     pub jump_m: f64,
@@ -81,7 +84,8 @@ impl Forward for State {
 
     fn instrument(&mut self, reading: &mut PoseReading) {
         let Some(stream) = &mut self.stream else { return };
-        // Drawn for every sighting: at a larger probability the same sightings jump as at a smaller one, by the same, and others too.
+        // Drawn for every measurement: at a larger probability the same measurements jump as at a smaller
+        // one, by the same, and others too.
         let (chance, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
         if chance < self.effect.probability {
             reading.world_from_body.x_m += self.effect.jump_m * jump[0];
@@ -99,7 +103,7 @@ mod tests {
 
     const HERE: Pose = Pose::new(1.0, -2.0, 0.5);
 
-    /// How far each of `n` sightings of one run is displaced.
+    /// How far each of `n` measurements of one run is displaced.
     fn mahalanobis_distance(effect: TruthOutliers, n: u32) -> Vec<Pose> {
         let mut state = effect.forward().expect("acts on sightings");
         state.seed_run(Address { seed: 8, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
@@ -120,8 +124,9 @@ mod tests {
         let all = mahalanobis_distance(effect, n);
         let jumped: Vec<&Pose> = all.iter().filter(|pose| **pose != Pose::IDENTITY).collect();
         let (share, m) = (jumped.len() as f64 / f64::from(n), jumped.len() as f64);
-        // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven numbers raise a false positive once in 2e5 seeds.
-        // Rejected: an isotropic jump of that *length* (half the variance) and a heading that jumps together with x.
+        // Standard errors √(p(1−p)/n), and of a variance √(2/m), of a covariance 1/√m; at 5 of each, seven
+        // numbers raise a false positive once in 2e5 seeds. Rejected: an isotropic jump of that *length*
+        // (half the variance) and a heading that jumps together with x.
         assert!((share - 0.2).abs() < 5.0 * (0.2_f64 * 0.8 / f64::from(n)).sqrt());
         let moment = |of: &dyn Fn(&Pose) -> f64| jumped.iter().map(|pose| of(pose)).sum::<f64>() / m;
         let of: [fn(&Pose) -> f64; 3] = [|pose| pose.x_m / 0.03, |pose| pose.y_m / 0.03, |pose| pose.theta_rad / 0.1];

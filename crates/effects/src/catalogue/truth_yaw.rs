@@ -1,8 +1,11 @@
 //! `truth_yaw`: the outside instrument's frame is turned on the robot.
 //!
-//! Model: seen heading = true heading + ℓ_θ. Signature: e_dy = −ℓ_θ v: the robot seems to drive a little sideways.
-//! Observability: any straight way, forward or backward. Alias: equal toe of both wheels is the same thing, on every path: no data tells them apart;
-//! `lateral_skid` at one yaw rate. Reference: Censi et al. 2013, the sensor's orientation on the robot.
+//! Model: seen heading = true heading + ℓ_θ.
+//! Signature: e_dy = −ℓ_θ v: the robot seems to drive a little sideways.
+//! Observability: any straight path, forward or backward.
+//! Alias: equal toe of both wheels is the same thing, on every path: no data discriminates them;
+//! `lateral_skid` at one yaw rate.
+//! Reference: Censi et al. 2013, the sensor's orientation on the robot.
 
 use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;

@@ -1,8 +1,12 @@
 //! `turn_rate_wheelbase`: the faster a robot turns, the farther apart its wheels seem to touch.
 //!
-//! Model: b_eff = b (1 + β|ω|). Signature: e_dθ = −β ω|ω|. Observability: turns at two yaw rates.
-//! Alias: `load_transfer` (0.98 on circles), `slip_speed` in spins, `castor_drag`; `wheelbase` at one yaw rate.
-//! Reference: a rule of thumb, 0.1 to 3 %; users report a wheel separation multiplier that depends on the yaw rate.
+//! Model: b_eff = b (1 + β|ω|).
+//! Signature: e_dθ = −β ω|ω|.
+//! Observability: turns at two yaw rates.
+//! Alias: `load_transfer` (0.98 on circles), `slip_speed` in spins, `castor_drag`; `wheelbase` at one yaw
+//! rate.
+//! Reference: a rule of thumb, 0.1 to 3 %; users report a wheel separation multiplier that depends on the yaw
+//! rate.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;

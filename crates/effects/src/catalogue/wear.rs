@@ -1,8 +1,10 @@
 //! `wear`: tyres lose a little of their radius with every metre.
 //!
-//! Model: k = 1 − w s with the way s since the session's start, both wheels alike. Signature: a scale that falls steadily.
-//! Observability: very long sessions. Alias: `thermal_drift`, at 1.00 while the mean speed is steady: a long pause tells them apart.
-//! Reference: Archard 1953, wear in proportion to the way; negligible within a session.
+//! Model: k = 1 − w s with the distance s since the session's start, both wheels alike.
+//! Signature: a scale that falls steadily.
+//! Observability: very long sessions.
+//! Alias: `thermal_drift`, at 1.00 while the mean speed is steady: a long pause discriminates them.
+//! Reference: Archard 1953, wear in proportion to the distance; negligible within a session.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
@@ -13,7 +15,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 
-/// Loss of radius with the way.
+/// Loss of radius with the distance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wear {
@@ -63,7 +65,7 @@ impl Forward for State {
         self.distance_m = run.session_m;
     }
 
-    /// Linear in the way, so the middle of the step is its mean.
+    /// Linear in the distance, so the middle of the step is its mean.
     fn wheel(&mut self, step: &mut Step) {
         let rolled_m = step.wheel_rad.zip_with(step.radius_m, |rad, radius_m| rad * radius_m);
         let ahead_m = 0.5 * (rolled_m.left + rolled_m.right).abs();

@@ -1,8 +1,11 @@
 //! `wheel_eccentricity`: a wheel turns about a point beside its centre.
 //!
-//! Model: rolling radius r(φ) = r (1 + ε sin(φ + φ₀)). Signature: e_dx and e_dθ locked to that wheel's phase, zero over whole turns.
-//! Observability: phase continuity and more than two samples a turn. Alias: `encoder_cycle` with one cycle a turn, exactly.
-//! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a rule of thumb.
+//! Model: rolling radius r(φ) = r (1 + ε sin(φ + φ₀)).
+//! Signature: e_dx and e_dθ locked to that wheel's phase, zero over whole turns.
+//! Observability: phase continuity and more than two samples a turn.
+//! Alias: `encoder_cycle` with one cycle a turn, exactly.
+//! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a
+//! rule of thumb.
 
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels, sinc};
@@ -129,7 +132,8 @@ impl ModelTerm for Term {
         ]
     }
 
-    /// From angle to angle, so that whole turns telescope: ∫sin φ dφ = cos φ₁ − cos φ₂, ∫cos φ dφ = sin φ₂ − sin φ₁.
+    /// From angle to angle, so that whole turns telescope: ∫sin φ dφ = cos φ₁ − cos φ₂, ∫cos φ dφ = sin φ₂ −
+    /// sin φ₁.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if !interval.run.continuous {
             return; // The wheels' phases are lost in its gaps.

@@ -1,7 +1,9 @@
 //! `wheel_mismatch`: the wheels differ in diameter.
 //!
-//! Model: D_R/D_L = E_d with the mean kept: D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1). Signature: e_dθ = (E_d−1)v/b.
-//! Observability: heading after driving straight. Alias: none on paths that drive both ways round.
+//! Model: D_R/D_L = E_d with the mean kept: D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1).
+//! Signature: e_dθ = (E_d−1)v/b.
+//! Observability: heading after driving straight.
+//! Alias: none on paths that drive in both directions.
 //! Reference: Borenstein & Feng 1996, eq. for E_d; Navarro et al., eq. (4): the differential part of α_c.
 
 use kinematics::{DriveGeometry, Wheels};

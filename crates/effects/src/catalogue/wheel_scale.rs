@@ -1,8 +1,11 @@
-//! `wheel_scale`: both wheels are larger or smaller than believed, by the same factor.
+//! `wheel_scale`: both wheels are larger or smaller than nominal, by the same factor.
 //!
-//! Model: D = scale · D_nominal for both wheels. Signature: e_dx = εv, e_dθ = εω with ε = scale − 1.
-//! Observability: any distance measured from outside. Alias: `clock_rate` when speeds are logged; the wheelbase where a robot only spins.
-//! Reference: Navarro et al., eq. (4): the common part of α_c; Borenstein & Feng 1996 (who cannot see it on closed squares).
+//! Model: D = scale · D_nominal for both wheels.
+//! Signature: e_dx = εv, e_dθ = εω with ε = scale − 1.
+//! Observability: any distance measured from outside.
+//! Alias: `clock_rate` when speeds are logged; the wheelbase where a robot only spins.
+//! Reference: Navarro et al., eq. (4): the common part of α_c; Borenstein & Feng 1996 (who cannot see it on
+//! closed squares).
 
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,9 @@
-//! `wheelbase`: the wheels' contacts are farther apart or closer than believed.
+//! `wheelbase`: the wheels' contacts are farther apart or closer than nominal.
 //!
-//! Model: B = ratio · b_nominal (E_b; 1+α_b in the paper). Signature: e_dθ = (1/E_b−1)ω̂.
-//! Observability: turns measured from outside. Alias: `wheel_scale` where the robot only spins; `turn_rate_wheelbase` at one yaw rate.
+//! Model: B = ratio · b_nominal (E_b; 1+α_b in the paper).
+//! Signature: e_dθ = (1/E_b−1)ω̂.
+//! Observability: turns measured from outside.
+//! Alias: `wheel_scale` where the robot only spins; `turn_rate_wheelbase` at one yaw rate.
 //! Reference: Navarro et al., eq. (10); Borenstein & Feng 1996.
 
 use kinematics::DriveGeometry;

@@ -1,9 +1,12 @@
 //! `wrong_counts_per_turn`: a counter makes another number of counts of a turn than the robot believes.
 //!
-//! Model: logged = factor × counts: two or four of one edge, a gear left out, radians for turns, millimetres for inches. Signature: every way and every
-//! turn is off by that factor. A gross fault, tried before any fit: the records without it believe the factor that the ways measured outside show,
-//! where that is far from one; of runs seen at their ends alone, each factor by which people err is tried.
-//! Observability: any way measured outside, or turns. Alias: `wheel_scale`, whose sizes are per cents.
+//! Model: logged = factor × counts: two or four of one edge, a gear left out, radians for turns, millimetres
+//! for inches.
+//! Signature: every distance and every turn is off by that factor. A gross fault, tried before any fit: the
+//! records without it believe the factor that the distances measured outside show, where that is far from
+//! one; of runs seen at their ends alone, each factor by which people err is tried.
+//! Observability: any distance measured outside, or turns.
+//! Alias: `wheel_scale`, whose sizes are per cents.
 //! Reference: quadrature decoding ×1, ×2, ×4; the units that people mix.
 
 use dataset::{Dataset, RunView, WheelLog};
@@ -34,23 +37,24 @@ const FACTORS: [(f64, &str); 14] = [
     (0.001, "metres for millimetres"),
 ];
 
-/// How near an estimate must come to a factor of the list, as a share: wheels are out by less, and the list is not that dense.
+/// How near an estimate must come to a factor of the list, as a share: wheels are out by less, and the list
+/// is not that dense.
 const FACTOR_TOLERANCE: f64 = 0.12;
 
 /// Nearer to one than this share is no gross fault.
 const MIN_DEPARTURE: f64 = 0.3;
 
-/// Shortest way that is compared, metres, and shortest turn, radians: far above what instruments err.
+/// Shortest distance that is compared, metres, and shortest turn, radians: far above what instruments err.
 const MIN_COMPARED_MOTION: [f64; 2] = [0.2, 0.5];
 
 /// A displacement goes on where the one before ended, by the rounding of a file.
 const SAME_INSTANT_S: f64 = 1e-6;
 
-/// Counts of a turn, logged over believed.
+/// Counts of a turn, logged over nominal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WrongCountsPerTurn {
-    /// Logged over believed counts of a turn.
+    /// Logged over nominal counts of a turn.
     pub factor: f64,
 }
 
@@ -99,10 +103,12 @@ impl Forward for State {
     }
 }
 
-/// Counted over seen amounts between measurements that are far enough apart: of the way, and of the turn.
+/// Counted over seen amounts between measurements that are far enough apart: of the distance, and of the
+/// turn.
 fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
     let geometry = dataset.robot.geometry().ok()?;
-    // The way and the turn by the counts at every row; ways of single wheels add up where the robot spins, so both are signed sums.
+    // The distance and the turn by the counts at every row; travel of single wheels add up where the robot
+    // spins, so both are signed sums.
     let mut track: Vec<(f64, [f64; 2])> = Vec::new();
     let (mut amounts, mut before) = ([0.0; 2], None::<Pose>);
     run.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |t_s, pose| {
@@ -143,7 +149,8 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
     Some(found)
 }
 
-/// What the instrument saw, in stretches that hang together: its poses, or displacements that follow each other, each from the first one's start.
+/// What the instrument saw, in stretches that hang together: its poses, or displacements that follow each
+/// other, each from the first one's start.
 fn seen(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
     let displacements = &run.run().displacements;
     if displacements.is_empty() {
@@ -164,7 +171,8 @@ fn seen(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
         .collect()
 }
 
-/// Logged over true counts, by the ways; by the turns where no way was long enough. Absent where the middle one of all is no gross fault.
+/// Logged over true counts, by the distances; by the turns where no path was long enough. Absent where the
+/// middle one of all is no gross fault.
 fn estimate(dataset: &Dataset) -> Option<f64> {
     let mut all = [Vec::new(), Vec::new()];
     for run in &dataset.session().runs {
@@ -176,7 +184,8 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
     (factor.ln().abs() > MIN_DEPARTURE.ln_1p()).then_some(factor)
 }
 
-/// With fewer measurements a run, what lies between two of them is no way that could be measured: paths turn, and may lead back.
+/// With fewer measurements a run, what lies between two of them is no distance that could be measured: paths
+/// turn, and may lead back.
 const MIN_MEASUREMENTS: usize = 4;
 
 /// Whether the runs are seen at their ends alone.
@@ -192,7 +201,8 @@ fn is_seen_at_ends(dataset: &Dataset) -> bool {
     measurements < MIN_MEASUREMENTS * runs
 }
 
-/// The factors that may be: that of the ways that were seen and, where hardly any was, all that people err by.
+/// The factors that may be: that of the distances that were measured and, where hardly any was, all that
+/// people err by.
 fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
     let of_ways = estimate(dataset).map(|estimate| {
         let off = |factor: f64| (estimate / factor).ln().abs();

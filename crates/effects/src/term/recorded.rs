@@ -23,7 +23,8 @@ pub(super) struct PreviousIntervals {
     row: Option<Row>,
 }
 
-/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains add up to the speeds.
+/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains
+/// add up to the speeds.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     end_s: f64,
@@ -41,7 +42,8 @@ impl PreviousIntervals {
         let wheel_m_s = interval.speed_m_s();
         let [from_s, to_s] = interval.row_s;
         let row = match self.row {
-            // A measurement between two rows cuts an interval: its speed changed where its row began, and not at the measurement.
+            // A measurement between two rows cuts an interval: its speed changed where its row began, and not
+            // at the measurement.
             Some(row) if row.end_s == to_s => row,
             before => {
                 let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
@@ -119,7 +121,8 @@ impl ModelTerm for Recorded {
 /// Unit of how much longer a row is than by the beat, as a share of itself.
 pub(super) const ROW_SHARE: f64 = 0.02;
 
-/// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is false. Which speed it goes with is not that by the same stamps.
+/// What goes with how much longer rows are by their stamps: a share of the stamps' irregularity that is
+/// false. Which speed it goes with is not that by the same stamps.
 #[derive(Clone)]
 pub(super) struct OfRows {
     pub(super) of: Box<dyn ModelTerm>,

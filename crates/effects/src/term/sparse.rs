@@ -30,13 +30,15 @@ impl Sparse {
         self.covariates.iter().map(Covariate::name).collect()
     }
 
-    /// Whether it goes with what is found once for all products of an interval: those do that add to the motion or to the wheels' way, but for what goes with rows.
+    /// Whether it goes with what is found once for all products of an interval: those do that add to the
+    /// motion or to the wheels' travel, but for what goes with rows.
     #[must_use]
     pub fn shares_moments(&self) -> bool {
         !self.channel.is_of_instrument() && !self.is_of_rows()
     }
 
-    /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term that does.
+    /// What goes with how much longer rows are by their stamps than by the beat behind them: the only term
+    /// that does.
     #[must_use]
     pub fn of_rows() -> Self {
         Self { channel: Channel::Wheels, covariates: vec![Covariate::WheelSpeed, Covariate::RowLength] }
@@ -56,7 +58,7 @@ impl Sparse {
     }
 }
 
-/// A moment at which an instrument looks: twist, heading and time alone are known of it.
+/// A moment at which an instrument measures: twist, heading and time alone are known of it.
 pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> KinematicSample<'static> {
     static NONE: BTreeMap<String, f64> = BTreeMap::new();
     KinematicSample {
@@ -96,7 +98,8 @@ pub(super) fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64
     }
 }
 
-/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second; more of what fades after a reversal.
+/// What would be large for a real robot: two per cent at unit covariates, two hundredths of a second; more of
+/// what fades after a reversal.
 pub(super) fn parameter(of: &Sparse) -> TermParameter {
     let unit = match of.channel {
         Channel::Yaw => "rad/s",

@@ -1,7 +1,8 @@
 //! Many products of covariates as one term: what a library of them asks of an interval is found once for all.
 //!
-//! A library has hundreds of products of a few dozen covariates, most of them on several channels. The moment, the value of each covariate at it and each product
-//! are found once; a sine and a cosine of the same angle come together.
+//! A library has hundreds of products of a few dozen covariates, most of them on several channels. The
+//! moment, the value of each covariate at it and each product are found once; a sine and a cosine of the same
+//! angle come together.
 
 use dataset::RunInfo;
 use kinematics::{Pose, Side, Wheels};
