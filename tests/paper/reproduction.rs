@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use paper_reproduction::cause::Extension;
+use paper_reproduction::extension::Extension;
 use paper_reproduction::table_1::{Hypothesis, Row};
 use paper_reproduction::{Reproduction, reproduce};
 
@@ -35,7 +35,7 @@ fn paper_table_1_falls_inside_its_simulation() {
     // By hand: 0.5 to 0.65 mm of reading error explain all of it.
     assert!((0.5e-3..0.65e-3).contains(&measuring.reading_sigma_m), "{}", measuring.reading_sigma_m);
     let mean = row(&measuring.right, "mean");
-    assert!(mean.percentiles[2] < 1.0322 * 1.001, "0.1 % of C_R is told apart");
+    assert!(mean.percentiles[2] < 1.0322 * 1.001, "0.1 % of C_R is undecided apart");
     // The hypotheses cannot be discriminated: under 3 in log likelihood.
     assert!(REPRODUCTION.table_1.iter().all(|table| table.below_best < 3.0));
 }
@@ -102,14 +102,14 @@ fn paper_causes_only_a_wheelbase_that_differs_in_corners_fits_and_is_plausible()
     // One degree of freedom is left: a misfit of 7.9 has a probability of 0.5 %. The model as it stands
     // misses by hundreds.
     let corner = fitted(Extension::CornerWheelbase);
-    assert!(corner.misfit < 7.9 && corner.prior_sigma && (2.2..2.8).contains(&corner.size), "{corner:?}");
+    assert!(corner.misfit < 7.9 && corner.is_plausible && (2.2..2.8).contains(&corner.size), "{corner:?}");
     assert!(fitted(Extension::None).misfit > 100.0);
     // Slip in every turn, spins and corners alike, is a wheelbase by another name and reconciles nothing.
     assert!((fitted(Extension::TurnSlip).misfit / fitted(Extension::None).misfit - 1.0).abs() < 1e-3);
     assert!(fitted(Extension::NominalOf500).misfit > 100.0);
-    let told: Vec<Extension> = causes.not_discriminated.clone();
-    assert_eq!(told, [Extension::CornerWheelbase, Extension::StartStopLength, Extension::ScaleOnSquares]);
-    assert!(!fitted(Extension::StartStopLength).prior_sigma && !fitted(Extension::ScaleOnSquares).prior_sigma);
+    let undecided: Vec<Extension> = causes.not_discriminated.clone();
+    assert_eq!(undecided, [Extension::CornerWheelbase, Extension::StartStopLength, Extension::ScaleOnSquares]);
+    assert!(!fitted(Extension::StartStopLength).is_plausible && !fitted(Extension::ScaleOnSquares).is_plausible);
     // A straight of 4 m tells all three apart; ten turns do not.
     assert!(causes.experiments[0].does.contains("straight of 4 m") && causes.experiments[0].discriminates_by > 10.0);
     assert!(causes.experiments.last().expect("three").discriminates_by < 3.0);

@@ -10,13 +10,14 @@ use calib::methods::direct::Direct;
 use calib::methods::umbmark::Umbmark;
 use calib::{CalibError, Calibration, Method};
 use dataset::{Protocol, ProtocolSettings, Run};
-use effects::{Command, Effect, Forward, Step, WheelMismatch, WheelScale, Wheelbase};
+use effects::{Effect, WheelMismatch, WheelScale, Wheelbase};
 use motion_programs::{Motion, MotionProgram, Platform, Schedule, record_session};
 use nalgebra::{SMatrix, SVector};
 use scenario::{Instrument, Scenario};
 use serde::Serialize;
 use sim_yair::{SimulatedRobot, SimulationError};
 
+use super::extension::{ActingExtension, Extension};
 use super::published::{TABLE_1, TABLE_2_DIRECT, TABLE_2_UMBMARK};
 use super::table_2::Table2;
 use super::units::MM_PER_M;
@@ -29,91 +30,6 @@ const MAX_PARAMETERS: usize = 4;
 
 /// Two extensions whose misfits differ by less cannot be discriminated: a likelihood ratio of 20.
 const DISCRIMINATION_LEVEL: f64 = 6.0;
-
-/// A guess at what the model lacks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Extension {
-    /// Nothing.
-    None,
-    /// The wheelbase in quarter turns differs from the one in long spins.
-    CornerWheelbase,
-    /// Each wheel loses a length at every start and stop.
-    StartStopLength,
-    /// The wheels slip by a share of their travel whenever the robot turns on the spot.
-    TurnSlip,
-    /// The squares were driven by a robot that believed in 500 pulses a turn, 1.0053 mm a pulse.
-    NominalOf500,
-    /// The scale error of the short runs is not there, or not all of it, on the squares.
-    ScaleOnSquares,
-}
-
-/// Name, what it says, the unit of its size, and the sizes that are physically plausible with the reason.
-struct Description {
-    says: &'static str,
-    unit: &'static str,
-    scale: f64,
-    prior_sigma: (f64, f64),
-    because: &'static str,
-}
-
-impl Extension {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::None,
-        Self::CornerWheelbase,
-        Self::StartStopLength,
-        Self::TurnSlip,
-        Self::NominalOf500,
-        Self::ScaleOnSquares,
-    ];
-
-    fn words(self) -> Description {
-        let words = |says, unit, scale, prior_sigma, because| Description { says, unit, scale, prior_sigma, because };
-        match self {
-            Self::None => words("the paper's model as it stands", "", 1.0, (0.0, 0.0), "nothing is assumed"),
-            Self::CornerWheelbase => words(
-                "the wheelbase in quarter turns differs from the one in long spins (turn rate, acceleration)",
-                "%",
-                100.0,
-                (-3.0, 3.0),
-                "wheelbases that depend on the turn are known up to about 3 %",
-            ),
-            Self::StartStopLength => words(
-                "each wheel loses a length at every start and stop",
-                "mm",
-                MM_PER_M,
-                (-2.6, 2.6),
-                "backlash at a wheel of this size loses up to about 2.6 mm",
-            ),
-            Self::TurnSlip => words(
-                "the wheels slip by a share of their travel in every turn on the spot",
-                "%",
-                100.0,
-                (0.0, 1.0),
-                "slip at walking speed is a per cent at most",
-            ),
-            Self::NominalOf500 => words(
-                "the squares were driven with a nominal 1.0053 mm/pulse (500 pulses a turn)",
-                "",
-                1.0,
-                (0.0, 0.0),
-                "a robot may assume a round number of pulses",
-            ),
-            Self::ScaleOnSquares => words(
-                "both wheels roll farther or shorter on the squares than on the short runs",
-                "%",
-                100.0,
-                (-0.5, 0.5),
-                "load and floor change a wheel's radius by tenths of a per cent",
-            ),
-        }
-    }
-
-    const fn has_size(self) -> bool {
-        !matches!(self, Self::None | Self::NominalOf500)
-    }
-}
 
 /// An extension fitted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -128,7 +44,7 @@ pub struct Fitted {
     pub unit: &'static str,
     /// Whether the size is physically plausible.
     #[serde(rename = "plausible")]
-    pub prior_sigma: bool,
+    pub is_plausible: bool,
     /// Why that is judged so.
     pub because: &'static str,
     /// Sum of squared departures from the five published numbers, in their standard deviations.
@@ -189,44 +105,6 @@ pub enum CauseError {
     Calibration(#[from] CalibError),
 }
 
-/// A turn on the spot of less travel a wheel is a corner: a quarter turn takes 285 mm, a whole one 1140 mm,
-/// at 80 counts a millimetre.
-const CORNER_BELOW_COUNTS: f64 = 80.0 * 570.0;
-
-/// The extension at work. Sizes are small against the travels they change.
-struct Acting {
-    extension: Extension,
-    size: f64,
-    corner: bool,
-    starting: bool,
-}
-
-impl Forward for Acting {
-    fn start_motion(&mut self) {
-        self.starting = true;
-    }
-
-    fn command(&mut self, command: &mut Command) {
-        let turning = command.travel_counts.left * command.travel_counts.right < 0.0;
-        self.corner = turning && command.travel_counts.right.abs() < CORNER_BELOW_COUNTS;
-    }
-
-    fn floor(&mut self, step: &mut Step) {
-        let turning = step.travel_m.left * step.travel_m.right < 0.0;
-        match self.extension {
-            Extension::CornerWheelbase if self.corner => step.wheel_separation_m *= 1.0 + self.size,
-            Extension::TurnSlip if turning => {
-                step.travel_m = step.travel_m.map(|travel_m| travel_m * (1.0 - self.size));
-            }
-            Extension::StartStopLength if self.starting => {
-                step.travel_m = step.travel_m.map(|travel_m| travel_m - self.size * travel_m.signum());
-            }
-            _ => {}
-        }
-        self.starting = false;
-    }
-}
-
 /// The robot of given C_L, C_R (mm/pulse) and B (mm) with an extension, measured exactly.
 fn robot(
     base: &Scenario,
@@ -255,7 +133,7 @@ fn robot(
         Effect::WheelMismatch(WheelMismatch { right_over_left: right / left }),
         Effect::Wheelbase(Wheelbase { ratio: base_mm / (MM_PER_M * base.robot.wheel_separation_m) }),
     ];
-    let acting = Acting { extension, size, corner: false, starting: false };
+    let acting = ActingExtension::new(extension, size);
     SimulatedRobot::with_more_effects(&scenario, scenario.seed, 0, vec![("extension", Box::new(acting))])
 }
 
@@ -332,7 +210,7 @@ fn fit(
     published: &[f64; NUMBERS],
     sigma: &[f64; NUMBERS],
 ) -> Result<Fitted, CauseError> {
-    let words = extension.words();
+    let description = extension.description();
     let parameters = if extension.has_size() { MAX_PARAMETERS } else { MAX_PARAMETERS - 1 };
     // Steps of the numeric derivatives, small against the sizes that matter and large against rounding; in
     // these units the problem is well scaled.
@@ -360,14 +238,14 @@ fn fit(
         }
     }
     let predicted = predict(base, extension, &at)?;
-    let size = at[3] * words.scale;
+    let size = at[3] * description.scale;
     Ok(Fitted {
         extension,
-        says: words.says,
+        says: description.says,
         size,
-        unit: words.unit,
-        prior_sigma: (words.prior_sigma.0..=words.prior_sigma.1).contains(&size),
-        because: words.because,
+        unit: description.unit,
+        is_plausible: (description.plausible_range.0..=description.plausible_range.1).contains(&size),
+        because: description.because,
         misfit: residual(&predicted).norm_squared(),
         parameters,
         drive: [at[0], at[1], at[2]],
@@ -476,7 +354,7 @@ fn drive(
     motions: &[Motion],
     on_squares: bool,
 ) -> Result<(Run, SimulatedRobot), CauseError> {
-    let size = fitted.size / fitted.extension.words().scale;
+    let size = fitted.size / fitted.extension.description().scale;
     let [left, right, base_mm] = fitted.drive;
     let mut robot = robot(base, fitted.extension, &SVector::from([left, right, base_mm, size]), on_squares)?;
     let program = MotionProgram {

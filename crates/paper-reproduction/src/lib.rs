@@ -6,6 +6,7 @@
 pub mod audit;
 pub mod cause;
 mod error;
+pub mod extension;
 pub mod figures;
 mod page;
 mod pictures;

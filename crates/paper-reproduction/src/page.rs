@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::Reproduction;
-use super::cause::{Causes, Extension, NUMBER_NAMES};
+use super::cause::{Causes, NUMBER_NAMES};
+use super::extension::Extension;
 use super::published::{Column, TABLE_1, TABLE_2_NOMINAL};
 use super::table_1::{Hypothesis, Row, Table1};
 
@@ -217,11 +218,11 @@ impl Reproduction {
         for fitted in &causes.fitted {
             let size =
                 if fitted.unit.is_empty() { "–".to_owned() } else { format!("{:+.2} {}", fitted.size, fitted.unit) };
-            let prior_sigma = if fitted.prior_sigma { "yes" } else { "no" };
+            let plausible_word = if fitted.is_plausible { "yes" } else { "no" };
             let [c_left, c_right, base, ratio, squares] = fitted.predicts;
             writeln!(
                 page,
-                "| {} | {size} | {prior_sigma}: {} | {:.1} | {} | {c_left:.4} | {c_right:.4} | {base:.1} | {ratio:.5} | {squares:.1} |",
+                "| {} | {size} | {plausible_word}: {} | {:.1} | {} | {c_left:.4} | {c_right:.4} | {base:.1} | {ratio:.5} | {squares:.1} |",
                 fitted.says, fitted.because, fitted.misfit, fitted.parameters
             )?;
         }
@@ -274,13 +275,13 @@ impl Causes {
         let names = |extensions: &[Extension]| {
             extensions.iter().map(|extension| spoken(*extension)).collect::<Vec<_>>().join(", ")
         };
-        let prior_sigma: Vec<Extension> = self
+        let plausible_ones: Vec<Extension> = self
             .fitted
             .iter()
-            .filter(|fitted| fitted.prior_sigma && self.not_discriminated.contains(&fitted.extension))
+            .filter(|fitted| fitted.is_plausible && self.not_discriminated.contains(&fitted.extension))
             .map(|fitted| fitted.extension)
             .collect();
-        let of_these = match prior_sigma.as_slice() {
+        let of_these = match plausible_ones.as_slice() {
             [] => "None of them has a plausible size.".to_owned(),
             [one] => format!("Of these only **{}** has a plausible size.", spoken(*one)),
             several => format!("Of these {} have a plausible size.", names(several)),

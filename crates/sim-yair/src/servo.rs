@@ -1,18 +1,14 @@
 //! One wheel's servo: HCTL-1100, amplifier, motor, gear, encoder, decoder, and the host that commands the
 //! chip.
 //!
-//! An engine alternates `turn` (the motor moves), `count` (the encoder sees an angle, perhaps not the one
-//! turned) and `sample_if_due`. In trapezoidal mode the chip does the whole move. In the velocity modes the
-//! robot's interface card (the host) must stop the wheel; it is modelled as a loop at controller samples that
-//! commands v = min(v_cruise, √(2 a·remaining)), so it starts to brake when what remains equals the braking
-//! distance, and hands over to position control of the target within one count of it. In integral velocity
-//! `remaining` is read from the command position, so that the profile ends even where the wheel lags, and the
-//! chip makes the ramps; in proportional velocity it is read from the actual position, the host makes the
-//! ramps, and a wheel whose friction the gain K/4 does not overcome is handed over where it stalls: braking,
-//! to its target; at its cruising speed, to where it stands. So every mode ends by holding a target.
+//! An engine alternates `turn` (the motor moves), `count` (the encoder measures an angle) and
+//! `sample_if_due`. In trapezoidal mode the chip does the whole move. In the velocity modes the host stops
+//! the wheel: at controller samples it commands v = min(v_cruise, √(2 a·remaining)), and hands over to
+//! position control within one count of the target. In integral velocity `remaining` is read from the command
+//! position and the chip makes the ramps; in proportional velocity it is read from the actual position and
+//! the host makes them. A wheel that stalls is handed over: braking, to its target; cruising, to where it
+//! stands. Moves are relative to the last target, so that errors of single moves do not add up.
 //!
-//! Moves are relative to the last target, not to where the wheel stands: errors of single moves do not add
-//! up.
 //! Source: HP HCTL-1100 datasheet, control modes; the host is ours (the paper does not describe YAIR's).
 
 use scenario::{ControlMode, Controller, Encoder, Motor};
