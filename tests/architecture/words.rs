@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use syn::Ident;
 use syn::visit::{self, Visit};
 
-use crate::{files, text};
+use crate::support::succeed;
+use crate::{files, root, text};
 
 /// A private name and the standard term for it.
 const PRIVATE: &[(&str, &str)] = &[
@@ -81,6 +82,47 @@ const PRIVATE: &[(&str, &str)] = &[
 /// Beginnings of constants, and the standard one.
 const PREFIXES: &[(&str, &str)] = &[("LEAST_", "MIN_"), ("MOST_", "MAX_")];
 
+/// Private phrases of prose, in lower case, and the standard term. A space in front or behind is part of the
+/// phrase; every other character that is no letter counts as one.
+const PHRASES: &[(&str, &str)] = &[
+    (" a look ", "a measurement"),
+    (" every look ", "every measurement"),
+    (" of looks ", "of measurements"),
+    (" the looks ", "the measurements"),
+    (" all looks ", "all measurements"),
+    (" sighting ", "measurement"),
+    (" sightings ", "measurements"),
+    (" told apart ", "discriminated"),
+    (" tell apart ", "discriminate"),
+    (" tells apart ", "discriminates"),
+    (" tell them apart ", "discriminate them"),
+    (" tells them apart ", "discriminates them"),
+    (" of the way ", "of the distance"),
+    (" reckoned ", "dead-reckoned"),
+    (" faint ", "of low significance"),
+    (" false alarm ", "false positive"),
+    (" false alarms ", "false positives"),
+    (" an alarm ", "a false positive"),
+    (" nine chances in ten ", "with power 0.9"),
+    (" even chances ", "even odds"),
+    (" in disguise ", "spurious"),
+    (" hard to believe ", "implausible"),
+    (" hardly stands out ", "is of low significance"),
+    (" could not have shown ", "is not detectable in these data"),
+    (" would have shown ", "would have been detected"),
+    (" out of sight ", "not detectable"),
+    (" foreseen ", "predicted"),
+    (" astray ", "outlying"),
+    (" calibrated lengths ", "calibrated geometry"),
+    (" three lengths ", "three geometry parameters"),
+    (" than believed ", "than nominal"),
+    (" forward face ", "simulation model"),
+    (" hypothesis face ", "estimation model"),
+];
+
+/// Words between which a phrase is none of the private ones: "dead reckoned" is the standard term.
+const STANDARD: &[&str] = &[" dead reckoned "];
+
 /// How often each identifier of a source text stands in it, macros left out.
 #[derive(Default)]
 struct Identifiers(BTreeMap<String, usize>);
@@ -113,6 +155,75 @@ fn identifiers_are_the_fields_words() {
         found.extend(private_names(&text(&file)).into_iter().map(|name| format!("{}: {name}", file.display())));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// A text as the phrases see it: lower case, letters and digits and hyphens, one space between words.
+fn plain(prose: &str) -> String {
+    let letters = prose.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { ' ' });
+    let words: String = letters.collect();
+    let joined = words.split_whitespace().collect::<Vec<_>>().join(" ");
+    STANDARD.iter().fold(format!(" {joined} "), |plain, standard| plain.replace(standard, " "))
+}
+
+/// Private phrases in prose, each with the standard term.
+fn private_phrases(prose: &str) -> Vec<String> {
+    let plain = plain(prose);
+    let found = PHRASES.iter().filter(|(phrase, _)| plain.contains(phrase));
+    found.map(|(phrase, standard)| format!("\"{}\" is {standard}", phrase.trim())).collect()
+}
+
+/// The comments of a source text, as one.
+fn comments(source: &str) -> String {
+    let of_line = |line: &str| {
+        let line = line.trim_start();
+        let comment = ["//!", "///", "//"].iter().find_map(|mark| line.strip_prefix(mark))?;
+        Some(comment.to_owned())
+    };
+    source.lines().filter_map(of_line).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn documents_help_and_comments_are_in_the_fields_words() {
+    let mut found = Vec::new();
+    let mut hold = |place: String, prose: &str| {
+        found.extend(private_phrases(prose).into_iter().map(|phrase| format!("{place}: {phrase}")));
+    };
+    for file in files("").into_iter().filter(|file| file.extension().is_some_and(|extension| extension == "md")) {
+        hold(file.display().to_string(), &text(&file));
+    }
+    let sources = files("crates").into_iter().chain(files("src")).chain(files("tests")).chain(files("benches"));
+    for file in sources.filter(|file| file.extension().is_some_and(|extension| extension == "rs")) {
+        // This file has the phrases as data.
+        if !file.ends_with("architecture/words.rs") {
+            hold(file.display().to_string(), &comments(&text(&file)));
+        }
+    }
+    let help = |arguments: &[&str]| succeed(root(), &[arguments, &["--help"]].concat()).stdout;
+    let commands = help(&[]);
+    let (_, list) = commands.split_once("Commands:").expect("the command lists its subcommands");
+    let names: Vec<&str> = list
+        .lines()
+        .skip(1)
+        .take_while(|line| !line.trim().is_empty())
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect();
+    assert!(names.contains(&"diagnose"), "{names:?}");
+    hold("yair --help".to_owned(), &commands);
+    for name in names {
+        hold(format!("yair {name} --help"), &help(&[name]));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn private_phrases_are_found_across_lines_and_marks() {
+    for planted in ["names that are told\napart", "2 % of the way.", "A look, then", "end reckoned by counts"] {
+        assert_eq!(private_phrases(planted).len(), 1, "{planted}");
+    }
+    for standard in ["it looks like a delay", "the dead-reckoned pose", "dead reckoned end", "a false-positive rate"] {
+        assert!(private_phrases(standard).is_empty(), "{standard}");
+    }
 }
 
 #[test]

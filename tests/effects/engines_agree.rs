@@ -4,7 +4,7 @@
 //! Compared is what dead reckoning misses: the true end seen from the true start, against the end by the
 //! counts. Moments of both engines are compared by z tests at 4.5 standard errors, a false positive of 7e-6
 //! each. Every comparison is also made against a closed form without the noise inside an arc (the L²/12
-//! term), which must be told apart: it was.
+//! term), which must be discriminated: it was.
 
 use dataset::{Protocol, ProtocolSettings, Run, RunView};
 use kinematics::{BridgeCovariance, Increment, Pose, Rule, Wheels};
@@ -33,7 +33,7 @@ fn program(motions: &[Motion]) -> MotionProgram {
     MotionProgram { id: "run".to_owned(), protocol: Protocol::Free, settings, motions: motions.to_vec() }
 }
 
-/// What dead reckoning missed in `trials` runs: true end minus reckoned end, seen from the start.
+/// What dead reckoning missed in `trials` runs: true end minus dead-reckoned end, seen from the start.
 fn missed(engine: Engine, motions: &[Motion], trials: u64) -> Vec<Pose> {
     let (scenario, program) = (scenario(engine), program(motions));
     (0..trials)
@@ -44,7 +44,7 @@ fn missed(engine: Engine, motions: &[Motion], trials: u64) -> Vec<Pose> {
             robot.drive_into(&program, &mut run).expect("drives");
             let (start, end) = robot.last_true_ends();
             let (nominal, geometry) = (robot.robot(), robot.true_geometry());
-            let mut reckoned = Pose::IDENTITY;
+            let mut dead_reckoned = Pose::IDENTITY;
             let dataset = dataset::Dataset {
                 provenance: dataset::Provenance::default(),
                 robot: nominal,
@@ -53,9 +53,13 @@ fn missed(engine: Engine, motions: &[Motion], trials: u64) -> Vec<Pose> {
                 runs: vec![run],
             };
             let view: RunView<'_> = dataset.session().runs[0];
-            view.dead_reckon(&nominal, &geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| reckoned = pose);
+            view.dead_reckon(&nominal, &geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| dead_reckoned = pose);
             let seen = start.to(end);
-            Pose::new(seen.x_m - reckoned.x_m, seen.y_m - reckoned.y_m, seen.theta_rad - reckoned.theta_rad)
+            Pose::new(
+                seen.x_m - dead_reckoned.x_m,
+                seen.y_m - dead_reckoned.y_m,
+                seen.theta_rad - dead_reckoned.theta_rad,
+            )
         })
         .collect()
 }
@@ -92,7 +96,7 @@ fn without_noise_inside(motions: &[Motion], trials: u64) -> Vec<Pose> {
         .map(|trial| {
             let mut stream =
                 effects::Address { seed: 77, point: 0, trial, run: 0 }.stream(effects::StreamName::new("specimen"));
-            let (mut world, mut reckoned) = (Pose::IDENTITY, Pose::IDENTITY);
+            let (mut world, mut dead_reckoned) = (Pose::IDENTITY, Pose::IDENTITY);
             for motion in motions {
                 let increment = match *motion {
                     Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
@@ -103,9 +107,13 @@ fn without_noise_inside(motions: &[Motion], trials: u64) -> Vec<Pose> {
                 let travel_m = nominal.travel_m(increment).zip_with(scale, |travel_m, scale| travel_m * scale);
                 let noisy_m = travel_m.map(|m| m + K_M_PER_SQRT_M * m.abs().sqrt() * stream.normal());
                 world = world * geometry.increment(noisy_m).arc();
-                reckoned = reckoned * geometry.increment(travel_m).arc();
+                dead_reckoned = dead_reckoned * geometry.increment(travel_m).arc();
             }
-            Pose::new(world.x_m - reckoned.x_m, world.y_m - reckoned.y_m, world.theta_rad - reckoned.theta_rad)
+            Pose::new(
+                world.x_m - dead_reckoned.x_m,
+                world.y_m - dead_reckoned.y_m,
+                world.theta_rad - dead_reckoned.theta_rad,
+            )
         })
         .collect()
 }
@@ -116,7 +124,7 @@ fn agree(motions: &[Motion], stepped: u64, closed: u64) {
     let z = largest_z(&stepped, &closed);
     assert!(z < Z_LIMIT, "the engines differ: z = {z}");
     let wrong = largest_z(&stepped, &without_noise_inside(motions, 40_000));
-    assert!(wrong > Z_LIMIT, "a closed form without the noise inside its arcs is not told apart: z = {wrong}");
+    assert!(wrong > Z_LIMIT, "a closed form without the noise inside its arcs is not discriminated: z = {wrong}");
 }
 
 #[test]

@@ -164,7 +164,7 @@ pub enum Sign {
     IsolatedErrors,
     /// Jumps of the heading that stay.
     HeadingJumps,
-    /// Jumps of the way travelled that stay.
+    /// Persistent jumps of the travelled distance.
     DistanceJumps,
     /// Measurements whose errors resemble those of the measurements before.
     AutocorrelatedErrors,

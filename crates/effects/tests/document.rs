@@ -21,8 +21,8 @@ const LARGE: &str = "Plausible: ";
 const INTRODUCTION: &str = "\
 # Effects
 
-What makes real wheel odometry deviate. Every effect has two faces, in one file under [crates/effects/src/catalogue/](../crates/effects/src/catalogue). The *forward* face is how the
-world does it, inside a step of the simulator; its sizes are keys of a scenario ([scenario.md](scenario.md#effects)). The *hypothesis* face is how recorded data show it, and sees
+What makes real wheel odometry deviate. Every effect has two models, in one file under [crates/effects/src/catalogue/](../crates/effects/src/catalogue). The *simulation model* is how the
+world does it, inside a step of the simulator; its parameters are keys of a scenario ([scenario.md](scenario.md#effects)). The *estimation model* is how recorded data show it, and sees
 recorded quantities only. They share names and no code. `tests/effects/laws.rs` holds what all promise; `tests/effects/hypotheses/` drives every simulation model that has a mean and asks
 that its hypothesis, at the same sizes, predicts what was seen, and at half of them, one and a half, or with one sign turned does not.
 ";
@@ -237,7 +237,7 @@ fn section(id: &str, source: &str) -> Result<String, String> {
         let trace = if fault.leaves_a_trace {
             "the log itself can show it"
         } else {
-            "no trace in the log; tried where the base fit is hard to believe"
+            "no trace in the log; tried where the base fit is implausible"
         };
         let rough = if fault.is_restored_roughly { "; restored roughly" } else { "" };
         add("In the records", format!("{trace}{rough}."));

@@ -1,4 +1,4 @@
-//! The closed form where all of a run but its draws is foreseen: when it moves, rests and is read follows
+//! The closed form where all of a run but its draws is known beforehand: when it moves, rests and is read follows
 //! from the plan, so that no clock has to be asked.
 //!
 //! That is so where no effect has a say in commands and counters, nothing is logged between motions and no
@@ -25,7 +25,7 @@ struct PropagationInterval {
     is_read: bool,
 }
 
-/// A run foreseen.
+/// A precomputed run.
 #[derive(Debug, Clone)]
 pub(crate) struct PrecomputedRun {
     /// Each leg ends with a row.

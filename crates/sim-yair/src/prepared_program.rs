@@ -11,7 +11,7 @@ use crate::precomputed_run::PrecomputedRun;
 pub struct PreparedProgram {
     pub(crate) program: MotionProgram,
     pub(crate) motions: Vec<PlannedMotion>,
-    /// The motions once more, where the closed form foresees all of the run.
+    /// The motions once more, where the closed form knows all of the run beforehand.
     pub(crate) precomputed_run: Option<PrecomputedRun>,
 }
 

@@ -1,4 +1,4 @@
-//! Every stage of the way from command to instrument can be touched by an effect, in both engines.
+//! Every stage from command to instrument can be touched by an effect, in both engines.
 
 use std::f64::consts::PI;
 

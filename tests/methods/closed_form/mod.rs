@@ -257,7 +257,7 @@ fn linear_needs_no_dense_log_and_takes_poses_of_any_number() {
     }
 }
 
-/// Robots that a method must not tell apart, and what it says of that.
+/// Robots that a method must not discriminate, and what it says of that.
 #[test]
 fn what_a_method_cannot_see_it_says_and_keeps() {
     let blind: [(&dyn Method, [Robot; 2], Parameter); 4] = [
@@ -463,7 +463,7 @@ fn as_optiodom(dataset: &Dataset, twice: bool) -> [f64; 3] {
 
 /// Dividing the mean heading by the number of runs once more leaves a fifth of the correction with five runs
 /// a direction: on the paper's robot a base of
-/// 360.6 mm where 351.47 is right (its wheels are 3.28 % larger than believed). And a term for unequal wheels in the corner is wrong where they are unequal.
+/// 360.6 mm where 351.47 is right (its wheels are 3.28 % larger than nominal). And a term for unequal wheels in the corner is wrong where they are unequal.
 #[test]
 fn jung_chung_divides_once_and_does_not_couple_the_corner() {
     let protocols = [Schedule::Squares { side_m: 4.0, runs_each_way: 5 }];

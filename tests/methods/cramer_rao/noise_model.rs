@@ -65,7 +65,7 @@ fn programs() -> [Vec<Motion>; 4] {
     ]
 }
 
-/// Seen end minus reckoned end, from the seen start.
+/// Measured end minus dead-reckoned end, from the measured start.
 fn misses(scenario: &Scenario, motions: &[Motion]) -> Vec<Vector3<f64>> {
     let program = program(motions);
     (0..RUNS)
@@ -85,12 +85,14 @@ fn misses(scenario: &Scenario, motions: &[Motion]) -> Vec<Vector3<f64>> {
                 };
                 let view = dataset.session().runs[0];
                 let (start, end) = view.observed_ends().expect("read at both ends");
-                let mut reckoned = Pose::IDENTITY;
+                let mut dead_reckoned = Pose::IDENTITY;
                 let geometry = robot.true_geometry();
-                view.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| reckoned = pose);
+                view.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| {
+                    dead_reckoned = pose
+                });
                 let seen = start.to(end);
-                let turn_rad = wrap_to_pi(seen.theta_rad - reckoned.theta_rad);
-                Vector3::new(seen.x_m - reckoned.x_m, seen.y_m - reckoned.y_m, turn_rad)
+                let turn_rad = wrap_to_pi(seen.theta_rad - dead_reckoned.theta_rad);
+                Vector3::new(seen.x_m - dead_reckoned.x_m, seen.y_m - dead_reckoned.y_m, turn_rad)
             },
         )
         .collect()
@@ -122,7 +124,7 @@ fn hold(scenario: &Scenario, motions: &[Motion]) -> (Vec<Vector3<f64>>, Matrix3<
     (misses, innovations[0].covariance)
 }
 
-/// Is the filter's covariance with this mistake in it told apart?
+/// Is the filter's covariance with this mistake in it discriminated?
 fn reject(wrong: Wrong, scenario: &Scenario, motions: &[Motion], held: &(Vec<Vector3<f64>>, Matrix3<f64>)) {
     let own = |wrong| *Batch::of(scenario, motions, wrong).end_covariance();
     let z = largest_z(&held.0, &(held.1 - own(Wrong::Nothing) + own(wrong)));
