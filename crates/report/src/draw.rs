@@ -38,8 +38,8 @@ pub(crate) fn document(figure: &Figure, layout: &Layout, font: &Font) -> String 
         let y = layout.margin + (row as f64 + 0.5) * TITLE_PX * LINE;
         page = page.add(text(line, layout.margin, y, TITLE_PX, "start").set("font-weight", "bold"));
     }
-    for (panel, place) in figure.panels.iter().zip(&layout.panels) {
-        page = page.add(panel_group(panel, place, &styles, font));
+    for (panel, layout) in figure.panels.iter().zip(&layout.panels) {
+        page = page.add(panel_group(panel, layout, &styles, font));
     }
     for (row, line) in layout.caption.iter().enumerate() {
         let y = layout.caption_y + (row as f64 + 0.5) * CAPTION_PX * LINE;
@@ -64,14 +64,14 @@ fn line(x1: f64, y1: f64, x2: f64, y2: f64, colour: &str) -> Line {
     line.set("stroke", colour).set("stroke-width", "1")
 }
 
-fn panel_group(panel: &Panel, place: &PanelLayout, styles: &Styles, font: &Font) -> Group {
+fn panel_group(panel: &Panel, layout: &PanelLayout, styles: &Styles, font: &Font) -> Group {
     let mut group = Group::new().set("class", "panel");
-    for (row, content) in place.title.iter().enumerate() {
-        let y = place.title_y + (row as f64 + 0.5) * PANEL_TITLE_PX * LINE;
-        group = group.add(text(content, place.title_x, y, PANEL_TITLE_PX, "start").set("font-weight", "bold"));
+    for (row, content) in layout.title.iter().enumerate() {
+        let y = layout.title_y + (row as f64 + 0.5) * PANEL_TITLE_PX * LINE;
+        group = group.add(text(content, layout.title_x, y, PANEL_TITLE_PX, "start").set("font-weight", "bold"));
     }
-    let frame = &place.frame;
-    group = group.add(axes(panel, place, font));
+    let frame = &layout.frame;
+    group = group.add(axes(panel, layout, font));
     let layer = |series: &&Series, wanted: usize| {
         wanted
             == match series.marks {
@@ -91,7 +91,7 @@ fn panel_group(panel: &Panel, place: &PanelLayout, styles: &Styles, font: &Font)
     }
     group = group.add(clipped).add(outline(&frame.rect).set("class", "frame").set("fill", "none").set("stroke", INK));
     group = marks(3).fold(group, Group::add);
-    for label in &place.references {
+    for label in &layout.references {
         let series = &panel.series[label.series];
         let anchor = if matches!(series.marks, Marks::HorizontalLine { .. }) { "start" } else { "middle" };
         for (row, content) in label.lines.iter().enumerate() {
@@ -100,8 +100,8 @@ fn panel_group(panel: &Panel, place: &PanelLayout, styles: &Styles, font: &Font)
             group = group.add(text(content, label.x, y, REFERENCE_PX, anchor).set("fill", colour));
         }
     }
-    match &place.legend {
-        Some(legend) => group.add(legend_group(legend, panel, place, styles, font)),
+    match &layout.legend {
+        Some(legend) => group.add(legend_group(legend, panel, layout, styles, font)),
         None => group,
     }
 }
@@ -119,12 +119,12 @@ fn outline(rect: &Rect) -> Rectangle {
     Rectangle::new().set("x", x).set("y", y).set("width", w).set("height", h)
 }
 
-fn axes(panel: &Panel, place: &PanelLayout, font: &Font) -> Group {
-    let frame = &place.frame;
+fn axes(panel: &Panel, layout: &PanelLayout, font: &Font) -> Group {
+    let frame = &layout.frame;
     let Rect { x: left, y: top, w, h } = frame.rect;
     let (right, bottom) = (left + w, top + h);
     let mut group = Group::new().set("class", "axes");
-    for tick in &place.x_ticks {
+    for tick in &layout.x_ticks {
         let x = frame.x_px(tick.value);
         let length = if tick.label.is_some() { TICK_LENGTH_PX } else { TICK_LENGTH_PX / 2.0 };
         if let Some(label) = &tick.label {
@@ -133,7 +133,7 @@ fn axes(panel: &Panel, place: &PanelLayout, font: &Font) -> Group {
         }
         group = group.add(line(x, bottom, x, bottom + length, INK));
     }
-    for tick in &place.y_ticks {
+    for tick in &layout.y_ticks {
         let y = frame.y_px(tick.value);
         let length = if tick.label.is_some() { TICK_LENGTH_PX } else { TICK_LENGTH_PX / 2.0 };
         if let Some(label) = &tick.label {
@@ -141,24 +141,24 @@ fn axes(panel: &Panel, place: &PanelLayout, font: &Font) -> Group {
         }
         group = group.add(line(left - length, y, left, y, INK));
     }
-    let x_px = font.fitting_px(&panel.x.label, LABEL_PX, Weight::Regular, place.cell.1);
+    let x_px = font.fitting_px(&panel.x.label, LABEL_PX, Weight::Regular, layout.cell.1);
     let x_y = bottom + TICK_GAP_PX + TICK_PX + 8.0 + LABEL_PX / 2.0;
     let half = font.width_px(&panel.x.label, x_px, Weight::Regular) / 2.0;
     // In the middle of the frame, unless it is so long that it would leave the column.
-    let x_x = (left + w / 2.0).min(place.cell.0 + place.cell.1 - half).max(place.cell.0 + half);
+    let x_x = (left + w / 2.0).min(layout.cell.0 + layout.cell.1 - half).max(layout.cell.0 + half);
     let y_px = font.fitting_px(&panel.y.label, LABEL_PX, Weight::Regular, h + 2.0 * LABEL_PX);
-    let (y_x, y_y) = (left - place.y_label_gap, top + h / 2.0);
+    let (y_x, y_y) = (left - layout.y_label_gap, top + h / 2.0);
     let turned = format!("rotate(-90 {} {})", number(y_x), number(y_y));
     group
         .add(text(&panel.x.label, x_x, x_y, x_px, "middle"))
         .add(text(&panel.y.label, y_x, y_y, y_px, "middle").set("transform", turned))
 }
 
-fn legend_group(legend: &Legend, panel: &Panel, place: &PanelLayout, styles: &Styles, font: &Font) -> Group {
+fn legend_group(legend: &Legend, panel: &Panel, layout: &PanelLayout, styles: &Styles, font: &Font) -> Group {
     let mut group = Group::new().set("class", "legend");
     let (x, y) = legend.inside.unwrap_or_else(|| {
-        let middle = place.frame.rect.x + place.frame.rect.w / 2.0 - legend.width / 2.0;
-        (middle.min(place.cell.0 + place.cell.1 - legend.width).max(place.cell.0), place.legend_y)
+        let middle = layout.frame.rect.x + layout.frame.rect.w / 2.0 - legend.width / 2.0;
+        (middle.min(layout.cell.0 + layout.cell.1 - legend.width).max(layout.cell.0), layout.legend_y)
     });
     if legend.inside.is_some() {
         let rect = Rect { x, y, w: legend.width, h: legend.height };
@@ -171,7 +171,7 @@ fn legend_group(legend: &Legend, panel: &Panel, place: &PanelLayout, styles: &St
             group = group.add(swatch(series, styles.style(series), x + entry.x, middle));
         }
         let text_x = x + entry.text_x();
-        let room = place.cell.0 + place.cell.1 - text_x;
+        let room = layout.cell.0 + layout.cell.1 - text_x;
         let size_px = font.fitting_px(&entry.text, legend::TEXT_PX, Weight::Regular, room);
         group = group.add(text(&entry.text, text_x, middle, size_px, "start"));
     }

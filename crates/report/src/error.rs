@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Where in a figure something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// The figure's title.
     pub figure: Box<str>,
     /// The panel's title.
@@ -14,7 +14,7 @@ pub struct Place {
     pub series: Box<str>,
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Location {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "figure \"{}\", panel \"{}\", series \"{}\"", self.figure, self.panel, self.series)
     }
@@ -49,10 +49,10 @@ pub enum ReportError {
         panel: String,
     },
     /// A series with too few values to be seen.
-    #[error("{place}: {found} {what}; at least {needed} are needed")]
+    #[error("{location}: {found} {what}; at least {needed} are needed")]
     TooFew {
         /// Where.
-        place: Place,
+        location: Location,
         /// What there is too little of.
         what: &'static str,
         /// The least number that can be drawn.
@@ -61,10 +61,10 @@ pub enum ReportError {
         found: usize,
     },
     /// Lists that belong together and are not equally long.
-    #[error("{place}: {found} {what}; {expected} are expected")]
+    #[error("{location}: {found} {what}; {expected} are expected")]
     Lengths {
         /// Where.
-        place: Place,
+        location: Location,
         /// The list that does not fit.
         what: &'static str,
         /// The length that would fit.
@@ -73,10 +73,10 @@ pub enum ReportError {
         found: usize,
     },
     /// A value that is NaN, infinite or beyond ±1e100.
-    #[error("{place}: {what}[{index}] = {value} cannot be drawn")]
+    #[error("{location}: {what}[{index}] = {value} cannot be drawn")]
     NotDrawable {
         /// Where.
-        place: Place,
+        location: Location,
         /// The list that holds the value.
         what: &'static str,
         /// Its index there.
@@ -85,10 +85,10 @@ pub enum ReportError {
         value: f64,
     },
     /// A value that has no place on a logarithmic axis.
-    #[error("{place}: {what}[{index}] = {value} is not positive, but the axis \"{axis}\" is logarithmic")]
+    #[error("{location}: {what}[{index}] = {value} is not positive, but the axis \"{axis}\" is logarithmic")]
     NotPositive {
         /// Where.
-        place: Place,
+        location: Location,
         /// The axis' label.
         axis: String,
         /// The list that holds the value.
@@ -99,20 +99,20 @@ pub enum ReportError {
         value: f64,
     },
     /// A half-width of an error bar that is negative.
-    #[error("{place}: y_error[{index}] = {value} is negative")]
+    #[error("{location}: y_error[{index}] = {value} is negative")]
     NegativeError {
         /// Where.
-        place: Place,
+        location: Location,
         /// The index in `y_error`.
         index: usize,
         /// The value.
         value: f64,
     },
     /// Bin edges or a band's abscissae that do not ascend.
-    #[error("{place}: {what}[{index}] = {value} is not above {previous}, the one before")]
+    #[error("{location}: {what}[{index}] = {value} is not above {previous}, the one before")]
     NotAscending {
         /// Where.
-        place: Place,
+        location: Location,
         /// The list.
         what: &'static str,
         /// The index of the second value of the pair.
@@ -123,10 +123,10 @@ pub enum ReportError {
         value: f64,
     },
     /// A band whose lower edge is above its upper edge.
-    #[error("{place}: low[{index}] = {low} is above high[{index}] = {high}")]
+    #[error("{location}: low[{index}] = {low} is above high[{index}] = {high}")]
     BandUpsideDown {
         /// Where.
-        place: Place,
+        location: Location,
         /// The index.
         index: usize,
         /// The lower edge.
@@ -135,18 +135,18 @@ pub enum ReportError {
         high: f64,
     },
     /// Bars on an axis that does not show zero, where their lengths would not compare.
-    #[error("{place}: bars need zero on the axis \"{axis}\"")]
+    #[error("{location}: bars need zero on the axis \"{axis}\"")]
     BarsWithoutZero {
         /// Where.
-        place: Place,
+        location: Location,
         /// The axis' label.
         axis: String,
     },
     /// A reference line outside a fixed range.
-    #[error("{place}: the line at {value} is outside the fixed range from {low} to {high}")]
+    #[error("{location}: the line at {value} is outside the fixed range from {low} to {high}")]
     ReferenceOutside {
         /// Where.
-        place: Place,
+        location: Location,
         /// Where the line is.
         value: f64,
         /// The range's lower end.

@@ -27,7 +27,7 @@ mod series;
 mod ticks;
 
 pub use axis::{Axis, Range, Scale};
-pub use error::{Place, ReportError};
+pub use error::{Location, ReportError};
 pub use figure::{Figure, MAX_COLUMNS, WIDTH_PX};
 pub use panel::Panel;
 pub use series::{Colour, Marks, Series};

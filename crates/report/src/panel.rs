@@ -1,7 +1,7 @@
 //! One panel of a figure: two axes and the series between them.
 
 use crate::axis::{Axis, Scale, Span};
-use crate::error::{Place, ReportError};
+use crate::error::{Location, ReportError};
 use crate::series::{Along, Series};
 
 /// Two axes with series. Bands and bars are drawn first, then references and lines, then points; in each of
@@ -67,9 +67,9 @@ impl Panel {
             return Err(ReportError::EqualAspectOnLog { figure: figure(), panel: panel() });
         }
         for series in &self.series {
-            let place =
-                || Place { figure: figure().into(), panel: panel().into(), series: series.name.as_str().into() };
-            series.check(place, &self.x, &self.y)?;
+            let location =
+                || Location { figure: figure().into(), panel: panel().into(), series: series.name.as_str().into() };
+            series.check(location, &self.x, &self.y)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! What is drawn in a panel: one series of marks under one name.
 
 use crate::axis::{Axis, LARGEST, Scale};
-use crate::error::{Place, ReportError};
+use crate::error::{Location, ReportError};
 
 /// The palette of Okabe and Ito (2008), distinct under the common colour blindnesses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,13 +165,13 @@ impl Series {
     }
 
     /// Whether the marks can be drawn on these axes.
-    pub(crate) fn check(&self, place: impl Fn() -> Place, x: &Axis, y: &Axis) -> Result<(), ReportError> {
+    pub(crate) fn check(&self, location: impl Fn() -> Location, x: &Axis, y: &Axis) -> Result<(), ReportError> {
         let enough = |what, found, needed| {
-            (found >= needed).then_some(()).ok_or_else(|| ReportError::TooFew { place: place(), what, needed, found })
+            (found >= needed).then_some(()).ok_or_else(|| ReportError::TooFew { location: location(), what, needed, found })
         };
         let as_long = |what, found, expected| {
             (found == expected).then_some(()).ok_or_else(|| ReportError::Lengths {
-                place: place(),
+                location: location(),
                 what,
                 expected,
                 found,
@@ -180,7 +180,7 @@ impl Series {
         let ascending = |what, values: &[f64]| match values.windows(2).position(|pair| pair[0] >= pair[1]) {
             None => Ok(()),
             Some(at) => Err(ReportError::NotAscending {
-                place: place(),
+                location: location(),
                 what,
                 index: at + 1,
                 previous: values[at],
@@ -206,17 +206,17 @@ impl Series {
         }
         for (along, axis) in [(Along::X, x), (Along::Y, y)] {
             for (what, values) in self.lists(along) {
-                self.check_values(&place, what, &values, axis)?;
+                self.check_values(&location, what, &values, axis)?;
             }
         }
         match &self.marks {
             Marks::Points { y_error: Some(errors), .. } => {
                 for (index, &value) in errors.iter().enumerate() {
                     if !drawable(value) {
-                        return Err(ReportError::NotDrawable { place: place(), what: "y_error", index, value });
+                        return Err(ReportError::NotDrawable { location: location(), what: "y_error", index, value });
                     }
                     if value < 0.0 {
-                        return Err(ReportError::NegativeError { place: place(), index, value });
+                        return Err(ReportError::NegativeError { location: location(), index, value });
                     }
                 }
             }
@@ -224,14 +224,14 @@ impl Series {
                 ascending("x", x)?;
                 if let Some(index) = (0..x.len()).find(|&index| low[index] > high[index]) {
                     let (low, high) = (low[index], high[index]);
-                    return Err(ReportError::BandUpsideDown { place: place(), index, low, high });
+                    return Err(ReportError::BandUpsideDown { location: location(), index, low, high });
                 }
             }
             Marks::Bars { edges, .. } => {
                 ascending("edges", edges)?;
                 let hidden = matches!(y.range, crate::Range::Fixed { low, high } if !(low..=high).contains(&0.0));
                 if hidden || y.scale == Scale::Log {
-                    return Err(ReportError::BarsWithoutZero { place: place(), axis: y.label.clone() });
+                    return Err(ReportError::BarsWithoutZero { location: location(), axis: y.label.clone() });
                 }
             }
             _ => {}
@@ -241,23 +241,23 @@ impl Series {
 
     fn check_values(
         &self,
-        place: &impl Fn() -> Place,
+        location: &impl Fn() -> Location,
         what: &'static str,
         values: &[f64],
         axis: &Axis,
     ) -> Result<(), ReportError> {
         for (index, &value) in values.iter().enumerate() {
             if !drawable(value) {
-                return Err(ReportError::NotDrawable { place: place(), what, index, value });
+                return Err(ReportError::NotDrawable { location: location(), what, index, value });
             }
             // A height of zero on a logarithmic axis is said as what it is: bars have no place there.
             if axis.scale == Scale::Log && value <= 0.0 && what != "heights" {
-                return Err(ReportError::NotPositive { place: place(), axis: axis.label.clone(), what, index, value });
+                return Err(ReportError::NotPositive { location: location(), axis: axis.label.clone(), what, index, value });
             }
             if let (true, crate::Range::Fixed { low, high }) = (self.is_reference(), axis.range)
                 && !(low..=high).contains(&value)
             {
-                return Err(ReportError::ReferenceOutside { place: place(), value, low, high });
+                return Err(ReportError::ReferenceOutside { location: location(), value, low, high });
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! What a figure's SVG and PNG contain, and what is refused. Rejected when tried: an inverted y axis, one bar
 //! left out, NaN let through, a rasteriser without the font.
 
-use report::{Axis, Colour, Figure, Marks, Panel, Place, Range, ReportError, Scale, Series};
+use report::{Axis, Colour, Figure, Marks, Panel, Location, Range, ReportError, Scale, Series};
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, Node};
 
@@ -187,7 +187,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         |series: Series, x: Axis, y: Axis| Figure::new("F").panel(Panel::new("P", x, y).series(series)).to_svg().err();
     let auto = || Axis::new("length", "m");
     let refused = |marks: Marks| of(Series::new("S", marks), auto(), auto()).expect("refused").to_string();
-    let place = "figure \"F\", panel \"P\", series \"S\": ";
+    let location = "figure \"F\", panel \"P\", series \"S\": ";
     let points = |points: &[(f64, f64)], y_error: Option<&[f64]>| Marks::Points {
         points: points.to_vec(),
         y_error: y_error.map(<[f64]>::to_vec),
@@ -210,12 +210,12 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         (Marks::HorizontalLine { y: f64::NAN }, "y[0] = NaN cannot be drawn"),
     ];
     for (marks, reason) in cases {
-        assert_eq!(refused(marks), format!("{place}{reason}"));
+        assert_eq!(refused(marks), format!("{location}{reason}"));
     }
     let log = || auto().scale(Scale::Log);
-    let at = Place { figure: "F".into(), panel: "P".into(), series: "S".into() };
+    let at = Location { figure: "F".into(), panel: "P".into(), series: "S".into() };
     let zero = of(Series::points("S", [(1.0, 1.0), (2.0, 0.0)]), auto(), log());
-    assert!(matches!(zero, Some(ReportError::NotPositive { place, what: "y", index: 1, .. }) if place == at));
+    assert!(matches!(zero, Some(ReportError::NotPositive { location, what: "y", index: 1, .. }) if location == at));
     for y in [log(), fixed(1.0, 2.0)] {
         let error = of(Series::new("S", bars(&[0.0, 1.0], &[1.0])), auto(), y);
         assert!(matches!(error, Some(ReportError::BarsWithoutZero { .. })), "{error:?}");
