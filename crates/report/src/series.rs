@@ -167,7 +167,12 @@ impl Series {
     /// Whether the marks can be drawn on these axes.
     pub(crate) fn check(&self, location: impl Fn() -> Location, x: &Axis, y: &Axis) -> Result<(), ReportError> {
         let enough = |what, found, needed| {
-            (found >= needed).then_some(()).ok_or_else(|| ReportError::TooFew { location: location(), what, needed, found })
+            (found >= needed).then_some(()).ok_or_else(|| ReportError::TooFew {
+                location: location(),
+                what,
+                needed,
+                found,
+            })
         };
         let as_long = |what, found, expected| {
             (found == expected).then_some(()).ok_or_else(|| ReportError::Lengths {
@@ -252,7 +257,13 @@ impl Series {
             }
             // A height of zero on a logarithmic axis is said as what it is: bars have no place there.
             if axis.scale == Scale::Log && value <= 0.0 && what != "heights" {
-                return Err(ReportError::NotPositive { location: location(), axis: axis.label.clone(), what, index, value });
+                return Err(ReportError::NotPositive {
+                    location: location(),
+                    axis: axis.label.clone(),
+                    what,
+                    index,
+                    value,
+                });
             }
             if let (true, crate::Range::Fixed { low, high }) = (self.is_reference(), axis.range)
                 && !(low..=high).contains(&value)

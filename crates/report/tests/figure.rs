@@ -1,7 +1,7 @@
 //! What a figure's SVG and PNG contain, and what is refused. Rejected when tried: an inverted y axis, one bar
 //! left out, NaN let through, a rasteriser without the font.
 
-use report::{Axis, Colour, Figure, Marks, Panel, Location, Range, ReportError, Scale, Series};
+use report::{Axis, Colour, Figure, Location, Marks, Panel, Range, ReportError, Scale, Series};
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, Node};
 
