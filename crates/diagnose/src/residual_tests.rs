@@ -5,7 +5,7 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::{Innovation, ModelFit, Projected, Segment, WHITE_BELOW};
+use estimation::{Innovation, ModelFit, Projected, Segment, WHITENESS_Z};
 use kinematics::Side;
 
 use crate::augmented_model::AugmentedModel;
@@ -129,7 +129,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
     let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
-    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
+    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
     Checked { autocorrelated, checks, correlation, outliers }
 }
 

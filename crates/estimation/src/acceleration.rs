@@ -7,10 +7,10 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-/// So many differences are kept.
-const DEPTH: usize = 3;
-/// A step that is made longer than so many times is none that the last ones showed.
-const LONGEST: f64 = 10.0;
+use crate::settings::{
+    ANDERSON_DEPTH, ANDERSON_DIVERGED_MEAN_STEP, ANDERSON_DIVERGED_NOISE_STEP, ANDERSON_MEAN_STEP, ANDERSON_NOISE_STEP,
+    ANDERSON_SINGULAR_VALUE, MAX_ANDERSON_DIVERGENCES, MAX_ANDERSON_STEP_RATIO,
+};
 
 /// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
 #[derive(Debug, Clone, Copy)]
@@ -18,15 +18,6 @@ pub(super) struct Size {
     pub(super) mean: f64,
     pub(super) noise: f64,
 }
-
-/// Steps that are smaller follow each other as those of a linear map do; larger ones do not. A variance that is far too large shrinks by one in its logarithm.
-const NEAR: Size = Size { mean: 1.0, noise: 0.3 };
-/// Where steps become larger than this, what the last ones showed has led astray.
-const DIVERGED: Size = Size { mean: 10.0, noise: 0.9 };
-/// Led astray so often, the fit goes on without.
-const MAX_DIVERGED: u32 = 2;
-/// Differences that hardly differ, as a share of the largest, tell nothing apart.
-const SINGULAR: f64 = 1e-10;
 
 /// The steps so far.
 #[derive(Debug, Default)]
@@ -42,12 +33,14 @@ pub(super) struct Acceleration {
 impl Acceleration {
     /// Whether to go by the last steps at all, the next one being so large.
     pub(super) fn engages(&mut self, step: Size) -> bool {
-        if self.engaged && (step.mean > DIVERGED.mean || step.noise > DIVERGED.noise) {
+        if self.engaged && (step.mean > ANDERSON_DIVERGED_MEAN_STEP || step.noise > ANDERSON_DIVERGED_NOISE_STEP) {
             (self.engaged, self.last) = (false, None);
             self.differences.clear();
             self.diverged += 1;
         }
-        self.engaged |= step.mean < NEAR.mean && step.noise < NEAR.noise && self.diverged < MAX_DIVERGED;
+        self.engaged |= step.mean < ANDERSON_MEAN_STEP
+            && step.noise < ANDERSON_NOISE_STEP
+            && self.diverged < MAX_ANDERSON_DIVERGENCES;
         self.engaged
     }
 
@@ -57,7 +50,7 @@ impl Acceleration {
         if let Some((before, moved)) = self.last.take() {
             self.differences.push_back((step - before, moved));
         }
-        if self.differences.len() > DEPTH {
+        if self.differences.len() > ANDERSON_DEPTH {
             self.differences.pop_front();
         }
         if self.differences.is_empty() {
@@ -68,14 +61,16 @@ impl Acceleration {
             self.differences.iter().map(|(difference, _)| metric * difference).collect();
         let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&part_equations[j]));
         let along = DVector::from_fn(n, |i, _| part_equations[i].dot(step));
-        let least = SINGULAR * products.diagonal().max();
+        let least = ANDERSON_SINGULAR_VALUE * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
         let mixed = self
             .differences
             .iter()
             .zip(shares.iter())
             .fold(step.clone(), |sum, ((difference, moved), share)| sum - (difference + moved) * *share);
-        if mixed.iter().all(|by| by.is_finite()) && squared(&mixed) <= LONGEST * LONGEST * squared(step) {
+        if mixed.iter().all(|by| by.is_finite())
+            && squared(&mixed) <= MAX_ANDERSON_STEP_RATIO * MAX_ANDERSON_STEP_RATIO * squared(step)
+        {
             mixed
         } else {
             self.differences.clear();

@@ -10,12 +10,13 @@ use crate::error::EstimationError;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
-use crate::noise::{MIN_SIGMA, NoiseComponent};
+use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
 use crate::optimizer::Fit;
 use crate::pass::pass;
 use crate::propagation::{CarriedState, Propagator};
 use crate::records::{MeasuredPose, Segment};
+use crate::settings::{MAX_DECIMATION_NONCENTRALITY, MIN_NOISE_SIGMA};
 use crate::wheel_angles::WheelInterval;
 
 /// How far off dead reckoning ends.
@@ -62,8 +63,6 @@ impl ModelFit<'_> {
     /// would leave more than half of the intervals, or by longer steps the fit is another one: measurements then lie elsewhere, or a term goes with single rows.
     #[must_use]
     pub fn decimated(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
-        /// Measurements that lie elsewhere by δ of their standard deviations make Σδ² at the most of what is not there: less than chance does.
-        const SAME: f64 = 1.0;
         let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
         let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
         let runs = coarse.scan_parts(terms, &[]);
@@ -71,7 +70,7 @@ impl ModelFit<'_> {
         let same_looks = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
-        (same_looks && squares < SAME).then_some(coarse)
+        (same_looks && squares < MAX_DECIMATION_NONCENTRALITY).then_some(coarse)
     }
 
     /// How far displacements that follow each other, taken together, lie from dead reckoning with the geometry parameters found, in standard deviations of a measurement; `None` where
@@ -106,7 +105,7 @@ impl ModelFit<'_> {
         let mut without = Self { prior: self.prior.without(component), ..self.clone() };
         let mut from = self.here();
         from.noise = from.noise.map(|mut noise| {
-            noise.variance[component as usize] = MIN_SIGMA * MIN_SIGMA;
+            noise.variance[component as usize] = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
             noise
         });
         without.refit_with(Some(from), terms)?;

@@ -6,6 +6,7 @@
 use kinematics::Wheels;
 
 use crate::records::{MeasuredPose, Records, Segment};
+use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;
 
@@ -22,7 +23,7 @@ impl<'a> Decimated<'a> {
             records.segments.iter().map(|segment| put_together(segment, longest_s)).unzip();
         let intervals =
             |segments: &[Segment<'_>]| segments.iter().map(|segment| segment.intervals.len()).sum::<usize>();
-        if 2 * intervals(&segments) > intervals(&records.segments) {
+        if MIN_DECIMATION * intervals(&segments) > intervals(&records.segments) {
             return None;
         }
         let of_segment = |(propagations, ends): (&Vec<PropagationInterval>, &Vec<usize>)| {
@@ -52,7 +53,7 @@ fn put_together<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<
         match together.last_mut() {
             Some(last)
                 if !seen_before
-                    && last.dt_s + interval.dt_s <= longest_s * (1.0 + 1e-9)
+                    && last.dt_s + interval.dt_s <= longest_s * (1.0 + STEP_LENGTH_TOLERANCE)
                     && turns_on(last.wheel_rad, interval.wheel_rad) =>
             {
                 last.dt_s += interval.dt_s;

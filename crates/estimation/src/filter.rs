@@ -14,13 +14,10 @@ use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
 use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
 use crate::records::{MeasuredPose, Segment, Start};
+use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 
-/// A measurement whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
-pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
-/// After so many measurements in a row that do not fit, it is the filter that is wrong: it starts again.
-const RESTART_AFTER: u32 = 2;
 const NOISES: usize = 4;
 
 /// One whitened component of a measurement's innovation.
@@ -219,7 +216,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.outliers.push(propagation.measurement);
             rejected_in_a_row += 1;
             // Without a heading the filter cannot start in the middle of a segment.
-            if rejected_in_a_row >= RESTART_AFTER
+            if rejected_in_a_row >= RESTART_AFTER_OUTLIERS
                 && self.segment.measurements[propagation.measurement].theta_rad.is_some()
                 && self.segment.start == Start::MeasuredPose
             {

@@ -9,6 +9,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::{Column, GroupExtrinsics, Model};
 use crate::normal_equations::NormalEquations;
+use crate::settings::{
+    EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S, MAX_POSTERIOR_TO_PRIOR_SIGMA,
+};
 
 /// How a group's own columns follow a step of the others: at rest, and by each column of the normal equation.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +73,7 @@ impl GroupExtrinsics {
         let Some(inverse) = follow.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return false;
         };
-        inverse[(at, at)].sqrt() < 0.5 * plausible_sd(column)
+        inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * plausible_sd(column)
     }
 
     /// Gradient and curvature of what is plausible of each own column's distance from the common value.
@@ -93,16 +96,11 @@ impl GroupExtrinsics {
     }
 }
 
-/// A marker that is taken off and put back sits elsewhere by less than a hand's breadth, turned by less than one sees; clocks are set to a tenth of a second.
-const MOUNT_SD_M: f64 = 0.05;
-const MOUNT_SD_RAD: f64 = 0.1;
-const LATENCY_SD_S: f64 = 0.1;
-
 const fn plausible_sd(column: Column) -> f64 {
     match column {
-        Column::SensorX | Column::SensorY => MOUNT_SD_M,
-        Column::SensorTheta => MOUNT_SD_RAD,
-        _ => LATENCY_SD_S,
+        Column::SensorX | Column::SensorY => EXTRINSICS_PRIOR_SIGMA_M,
+        Column::SensorTheta => EXTRINSICS_PRIOR_SIGMA_RAD,
+        _ => LATENCY_PRIOR_SIGMA_S,
     }
 }
 

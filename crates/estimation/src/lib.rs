@@ -31,6 +31,7 @@ mod products;
 mod profile;
 mod propagation;
 mod records;
+mod settings;
 #[cfg(test)]
 mod tests;
 mod thinning;
@@ -41,15 +42,15 @@ pub use error::{EstimationError, refuse_wrapped_counters};
 pub use filter::{Innovation, OutlierGate};
 pub use maximum_likelihood::FitSettings;
 pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
-pub use model_fit::{ModelFit, WHITE_BELOW};
+pub use model_fit::ModelFit;
 pub use noise::{Noise, NoiseComponent};
 pub use normal_equations::{
-    ClusterRobust, Information, NormalEquations, Projected, RIDGE, SchurComplement, free_basis, inverse, total,
+    ClusterRobust, Information, NormalEquations, Projected, SchurComplement, free_basis, inverse, total,
 };
-pub use one_step::{LARGE_ROWS, LargeFit, OneStep, OneStepError, fit_large, is_large};
+pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
 pub use optimizer::{ConvergenceCriterion, Fit, FitOptions, fit, pass_with_innovations};
 pub use pass::Pass;
-pub use profile::RISE_95;
 pub use records::{Records, Segment};
+pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

@@ -8,7 +8,8 @@ use crate::filter::OutlierGate;
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
-use crate::optimizer::{ConvergenceCriterion, NOISE_SETTLED};
+use crate::optimizer::ConvergenceCriterion;
+use crate::settings::NOISE_STEP_TOLERANCE;
 
 /// What a fit may do beside the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +34,7 @@ impl FitSettings {
     /// # Errors
     /// [`EstimationError`] when the sessions hold no measurements, or the fit diverges.
     pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<ModelFit<'a>, EstimationError> {
-        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_SETTLED), sessions)
+        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE), sessions)
     }
 
     /// The fit, its steps followed so far.

@@ -14,25 +14,11 @@ use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, f
 use crate::optimizer::{ConvergenceCriterion, Fit, FitOptions, From, fit_from};
 use crate::pass::{Pass, pass};
 use crate::records::{Records, Segment};
+use crate::settings::{
+    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_RUNS_TO_HOLD_OUT,
+    MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES, WHITENESS_Z,
+};
 use crate::thinning::{Selection, Thinning};
-
-/// Innovations are taken for white while no component's correlation with the measurement before reaches this many standard errors: three components at 1 % together.
-pub const WHITE_BELOW: f64 = 2.935;
-/// How many before an innovation it may resemble.
-const LAGS: i32 = 5;
-/// In how many phases thinned measurements are taken.
-const PHASES: usize = 4;
-/// Thinned further, a run would be little more than its ends.
-const MIN_MEASUREMENTS_PER_RUN: f64 = 1.0;
-/// A direction of the geometry parameters is seen when its relative standard deviation is below this: nominal values are better known than worse.
-const LARGEST_SIGMA: f64 = 0.03;
-/// An instrument whose heading on the robot seems to be more than this is mounted so on purpose; less may be the lie of a short log.
-const ROTATED_SENSOR_RAD: f64 = 0.2;
-/// With fewer runs, they are cut into blocks to be held out.
-pub(crate) const MIN_RUNS: usize = 6;
-pub(crate) const FOLDS: usize = 6;
-/// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
-const MIN_RUNS_FOR_ROBUST: usize = 20;
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
 #[derive(Debug, Clone)]
@@ -163,7 +149,7 @@ impl ModelFit<'_> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
         while !self.is_white() {
-            every_s *= 2.0;
+            every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
             self.refit(Some(self.here()))?;
@@ -173,7 +159,7 @@ impl ModelFit<'_> {
 
     /// Measurements so far apart; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
-        let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
+        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
         let selections = Selection::of(&self.records, thinning, &self.nominal);
         (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
     }
@@ -181,11 +167,11 @@ impl ModelFit<'_> {
     /// Does [`Self::thin`] take measurements farther apart than all of them?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
         let between_s = median_between(&self.records).filter(|_| !self.is_white());
-        between_s.is_some_and(|between_s| self.thinned(2.0 * between_s, between_s).is_some())
+        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
     }
 
     pub(crate) fn is_white(&self) -> bool {
-        self.correlation() <= WHITE_BELOW
+        self.correlation() <= WHITENESS_Z
     }
 
     /// The largest correlation of an innovation with the one before, of displacements (where they are to be thinned) with several before, over the components, in standard errors.
@@ -200,7 +186,7 @@ impl ModelFit<'_> {
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
                         count += 1.0;
-                        for (lag, before) in (1..=LAGS).zip(series[..number].iter().rev()) {
+                        for (lag, before) in (1..=MAX_AUTOCORRELATION_LAG).zip(series[..number].iter().rev()) {
                             let weight = self.records.weight_of_pair(before.segment, innovation.segment, lag);
                             let counts = self.displacements_follow || before.segment == innovation.segment;
                             if counts && weight > 0.0 {
@@ -230,13 +216,13 @@ impl ModelFit<'_> {
 
     /// The normal equation in units that can be held out: runs, or blocks where runs are few.
     pub(crate) fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
-        if self.fit.pass.runs.len() >= MIN_RUNS {
+        if self.fit.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {
             return self.fit.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(terms, MIN_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.fit.pass.runs.len().max(1)))
     }
 
     /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
@@ -355,7 +341,7 @@ impl ModelFit<'_> {
         let free = self.free_basis();
         let (_, inverse) = self.fit.information(&self.columns)?.along(&free).solve()?;
         let units = self.units(terms);
-        let enough = if self.thinning == Thinning::NONE { MIN_RUNS_FOR_ROBUST } else { free.ncols() + 2 };
+        let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
         if units.len() < enough {
             return Some(&free * inverse * free.transpose());
         }
@@ -382,7 +368,7 @@ impl ModelFit<'_> {
 pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
     (0..3)
-        .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
+        .filter(|&k| eigenvalues[k] < MAX_OBSERVABLE_SIGMA.powi(-2))
         .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
         .collect()
 }

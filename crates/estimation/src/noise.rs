@@ -2,6 +2,11 @@
 
 use dataset::TruthNoise;
 
+use crate::settings::{
+    FIXED_NOISE_LOG_SIGMA, HEADING_PRIOR_SIGMA_RAD, MIN_NOISE_SIGMA, NOISE_PRIOR_LOG_SIGMA, POSITION_PRIOR_SIGMA_M,
+    STATED_NOISE_LOG_SIGMA, TURN_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA,
+};
+
 /// One of the variances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoiseComponent {
@@ -34,33 +39,20 @@ pub(crate) struct NoisePrior {
     pub(crate) log_sd: [f64; 4],
 }
 
-/// Wheels on a floor scatter by 0.1 to 5 mm/√m (Chong & Kleeman 1997 and the paper's 0.5), and instruments err by tenths of a millimetre to centimetres. The prior is
-/// worth less than one run of data, and keeps apart what endpoints alone cannot.
-const WHEEL_SIGMA: f64 = 7e-4;
-const TURN_SIGMA: f64 = 1e-3;
-const MEASUREMENT_SIGMA_M: f64 = 1e-3;
-const MEASUREMENT_SIGMA_RAD: f64 = 3e-3;
-const VAGUE: f64 = 2.0;
-/// A precision that the dataset states is believed to a factor of two: instruments are sold by their best.
-const STATED: f64 = 0.7;
-/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
-pub(crate) const MIN_SIGMA: f64 = 1e-6;
-/// A standard deviation that is not to move stays within e^±0.01 of where it is.
-const HELD: f64 = 0.01;
-
 impl NoisePrior {
     pub(crate) fn of(stated: TruthNoise) -> Self {
         let reused = |sigma: Option<f64>| sigma.filter(|sigma| *sigma > 0.0);
         let (xy, theta) = (reused(stated.sigma_xy_m), reused(stated.sigma_theta_rad));
-        let log_sd = |stated: Option<f64>| if stated.is_some() { STATED } else { VAGUE };
+        let log_sd =
+            |stated: Option<f64>| if stated.is_some() { STATED_NOISE_LOG_SIGMA } else { NOISE_PRIOR_LOG_SIGMA };
         Self {
             centre: [
-                WHEEL_SIGMA,
-                TURN_SIGMA,
-                xy.unwrap_or(MEASUREMENT_SIGMA_M),
-                theta.unwrap_or(MEASUREMENT_SIGMA_RAD),
+                WHEEL_PRIOR_SIGMA,
+                TURN_PRIOR_SIGMA,
+                xy.unwrap_or(POSITION_PRIOR_SIGMA_M),
+                theta.unwrap_or(HEADING_PRIOR_SIGMA_RAD),
             ],
-            log_sd: [VAGUE, VAGUE, log_sd(xy), log_sd(theta)],
+            log_sd: [NOISE_PRIOR_LOG_SIGMA, NOISE_PRIOR_LOG_SIGMA, log_sd(xy), log_sd(theta)],
         }
     }
 
@@ -74,7 +66,7 @@ impl NoisePrior {
 
     /// The same with one standard deviation held at next to nothing.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
-        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_SIGMA, HELD);
+        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_NOISE_SIGMA, FIXED_NOISE_LOG_SIGMA);
         self
     }
 

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Column;
+use crate::settings::{FREE_EIGENVALUE, RIDGE};
 
 /// Sums of a run's whitened innovations v/√s and their derivatives j/√s by the mean parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,9 +113,6 @@ impl Information {
     }
 }
 
-/// What is added to each diagonal element, as a share of it, before a matrix is inverted that may be singular by rounding alone.
-pub const RIDGE: f64 = 1e-12;
-
 /// The inverse of an information matrix by Cholesky, in columns of like size (radians, metres and ratios differ by orders of magnitude); `ridge` is added to each
 /// diagonal element as a share of it. `None` when a direction is not determined.
 #[must_use]
@@ -129,15 +127,13 @@ pub fn inverse(matrix: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
 /// An orthonormal basis of the directions of so many columns that may move: those orthogonal to the fixed ones.
 #[must_use]
 pub fn free_basis(columns: usize, fixed: &[DVector<f64>]) -> DMatrix<f64> {
-    /// Fixed directions have eigenvalue 1 or more in H Hᵀ, the others 0 up to rounding.
-    const ZERO: f64 = 1e-9;
     if fixed.is_empty() {
         return DMatrix::identity(columns, columns);
     }
     let fixed = DMatrix::from_columns(fixed);
     let eigen = (&fixed * fixed.transpose()).symmetric_eigen();
     let free: Vec<_> = (0..columns)
-        .filter(|&k| eigen.eigenvalues[k] < ZERO)
+        .filter(|&k| eigen.eigenvalues[k] < FREE_EIGENVALUE)
         .map(|k| eigen.eigenvectors.column(k).into_owned())
         .collect();
     if free.is_empty() { DMatrix::zeros(columns, 0) } else { DMatrix::from_columns(&free) }

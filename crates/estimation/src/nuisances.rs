@@ -6,15 +6,11 @@ use nalgebra::DVector;
 use crate::error::EstimationError;
 use crate::filter::OutlierGate;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
-use crate::model_fit::{FOLDS, MIN_RUNS, ModelFit};
+use crate::model_fit::ModelFit;
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Fit;
+use crate::settings::{BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT};
 use crate::thinning::Thinning;
-
-/// A nuisance must gain by so many standard errors on what was held out.
-const GAIN_IN_SIGMAS: f64 = 2.0;
-/// What a run has for itself is judged on the other parts of it.
-const PARTS_OF_PER_RUN: usize = 3;
 
 /// A run, or a part of one, with the fold that holds it out.
 struct Unit {
@@ -97,7 +93,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
-            if mean > GAIN_IN_SIGMAS * error && !drifts {
+            if mean > MIN_HELD_OUT_GAIN_SIGMA * error && !drifts {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
                 of_grouping = Some(Earned { gain, columns, own, held_out: found });
             }
@@ -147,7 +143,7 @@ pub(crate) fn explained_by_nuisances<'a>(
         plain.thin()?;
     }
     let far = |found: &ModelFit<'_>| found.fit.pass.outliers.len();
-    let uses_more = plain.thinning != Thinning::NONE || 2 * far(&explained) < far(&plain);
+    let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * far(&explained) < far(&plain);
     let is_better = uses_more && !(thin && explained.is_to_be_thinned());
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
@@ -189,9 +185,9 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
     let runs = fit.fit.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
-        (Some(Grouping::Run), gate) => fit.blocks(&mut [], PARTS_OF_PER_RUN, gate),
+        (Some(Grouping::Run), gate) => fit.blocks(&mut [], BLOCKS_PER_RUN, gate),
         (_, OutlierGate::On) => fit.units(&mut []),
-        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS.div_ceil(runs), gate),
+        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS_TO_HOLD_OUT.div_ceil(runs), gate),
     };
     // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
     let mut measured: Vec<((usize, usize), usize)> = Vec::new();

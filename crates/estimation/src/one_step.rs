@@ -19,30 +19,12 @@ use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::{ConvergenceCriterion, pass_settled};
 use crate::records::Records;
+use crate::settings::{
+    LARGE_ROWS, MAX_PART_THREADS, MAX_ROWS_PER_MEASUREMENT, MAX_SCORING_STEPS, MAX_SUBSAMPLE_ROWS, MIN_PART_BLOCKS,
+    MIN_PART_MEASUREMENTS, MIN_PART_PROPAGATIONS, ONE_STEP_TOLERANCE, PRELIMINARY_NOISE_TOLERANCE,
+    SUBSAMPLE_MEASUREMENTS, SUBSAMPLE_NOISE_TOLERANCE, SUBSAMPLES,
+};
 use crate::thinning::Selection;
-
-/// With more rows of odometry and measurements together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
-pub const LARGE_ROWS: usize = 500_000;
-/// With more rows a measurement, pieces would show too few measurements: such datasets are fitted as a whole.
-const MAX_ROWS_PER_MEASUREMENT: usize = 500;
-/// Measurements of the pieces together. They show a variance to 0.3 %, and a correlation of innovations to 0.4 %.
-const FIRST_MEASUREMENTS: usize = 1 << 16;
-/// Rows of the pieces together at most, where measurements are few.
-const FIRST_ROWS: usize = 1 << 19;
-/// As many as can be held out, and no more: measurements may have to be thinned to some of hundreds of rows, and only a long way shows by its end what lengths are worth.
-const PIECES: usize = 8;
-/// How far the noise of the pieces is followed before measurements are told to be white or not, and at last: nearer than the pieces know it.
-const FIRST_NOISE_SETTLED: f64 = 5e-2;
-const LAST_NOISE_SETTLED: f64 = 1e-3;
-/// A part that is held at a time has so many blocks at least, and so many measurements and thinned measurements: at its cut one of them has no other to begin at.
-const PART_BLOCKS: usize = 32;
-const PART_MEASUREMENTS: usize = 1000;
-const PART_PROPAGATIONS: usize = 50;
-/// Parts wait for no more cores than these, as each holds its memory.
-const MAX_WORKERS: usize = 4;
-/// A step whose square, of lengths by ratio and of headings in radians, is below this share of a standard deviation is right to about that share.
-const NEAR: f64 = 0.05;
-const MAX_PASSES: usize = 5;
 
 /// How a calibration of large datasets was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,8 +108,8 @@ pub fn fit_large(
 ) -> Result<LargeFit, OneStepError> {
     let pieces = pieces(datasets)?;
     let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
-    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
-    first.ends = ConvergenceCriterion::NoiseShare(LAST_NOISE_SETTLED);
+    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(PRELIMINARY_NOISE_TOLERANCE), &sessions)?;
+    first.ends = ConvergenceCriterion::NoiseShare(SUBSAMPLE_NOISE_TOLERANCE);
     first.refit(Some(first.here()))?;
     let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
@@ -141,7 +123,7 @@ pub fn fit_large(
         passes += 1;
         let GatheredParts { parts, measurements } = found.gather(datasets, part_blocks, &mut notice)?;
         let is_near = found.step_over(parts)?;
-        if is_near || passes == MAX_PASSES {
+        if is_near || passes == MAX_SCORING_STEPS {
             found.fit.converged &= is_near;
             return Ok(LargeFit {
                 fit: found,
@@ -156,10 +138,10 @@ pub fn fit_large(
 /// The pieces, a dataset of them from each dataset.
 fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
     let (rows, measurements) = rows_and_looks(datasets);
-    let wanted = (FIRST_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(FIRST_ROWS);
+    let wanted = (SUBSAMPLE_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(MAX_SUBSAMPLE_ROWS);
     // Every so many rows a piece, in the middle of these.
-    let stride = (rows / PIECES).max(1);
-    let within = stride.saturating_sub(wanted / PIECES) / 2..(stride + wanted / PIECES) / 2;
+    let stride = (rows / SUBSAMPLES).max(1);
+    let within = stride.saturating_sub(wanted / SUBSAMPLES) / 2..(stride + wanted / SUBSAMPLES) / 2;
     let mut before = 0;
     let mut pieces = Vec::with_capacity(datasets.len());
     for blocks in datasets {
@@ -189,8 +171,8 @@ fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
     let propagations: usize =
         first.selections.first().map_or(0, |selection| selection.propagations.iter().map(Vec::len).sum::<usize>());
     let looks_a_leg = first.records.measurements().div_ceil(propagations.max(1));
-    let wanted_looks = PART_MEASUREMENTS.max(PART_PROPAGATIONS * looks_a_leg);
-    PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
+    let wanted_looks = MIN_PART_MEASUREMENTS.max(MIN_PART_PROPAGATIONS * looks_a_leg);
+    MIN_PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
 }
 
 impl ModelFit<'_> {
@@ -212,7 +194,7 @@ impl ModelFit<'_> {
                 (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
             })
             .collect();
-        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_WORKERS);
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_PART_THREADS);
         let mut part_equations = std::thread::scope(|scope| -> Result<Vec<PartEquations>, OneStepError> {
             // No part waits: the thread that reads waits for one that has time.
             let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
@@ -305,7 +287,7 @@ impl ModelFit<'_> {
             moved[column.index()] = step[row];
             self.fit.model.advance(*column, step[row]);
             let bends = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
-            is_near &= !bends || step[row].powi(2) <= NEAR * covariance[(row, row)].sqrt();
+            is_near &= !bends || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
         }
         follows.iter().for_each(|follow| self.fit.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
         // To first order the scores are those at the new values.

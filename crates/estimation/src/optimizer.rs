@@ -8,38 +8,19 @@ use crate::acceleration::{Acceleration, Size};
 use crate::error::EstimationError;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
-use crate::noise::{MIN_SIGMA, Noise, NoisePrior};
+use crate::noise::{Noise, NoisePrior};
 use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
 use crate::propagation::CachedPropagation;
 use crate::records::{Records, Segment, Start};
+use crate::settings::{
+    ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
+    HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
+    MAX_UNGATED_STEPS, MEAN_COST_TOLERANCE, MEAN_STEP_TOLERANCE, MIN_NOISE_SIGMA, MIN_UNGATED_STEPS,
+    NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE, START_HEADING_BASELINE_M,
+    STEP_DECREASE, STEP_INCREASE,
+};
 use crate::thinning::Selection;
-
-/// Median of χ² with one degree of freedom.
-const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
-/// A step this small, squared and over its variance, changes nothing that a print shows.
-const SETTLED: f64 = 1e-8;
-/// Nor does one of the noise by less than this share of a variance.
-pub(crate) const NOISE_SETTLED: f64 = 1e-4;
-/// Where models are compared by their likelihoods, steps of the mean and of the noise may end that are this small, squared and over their variance: they change its
-/// logarithm by half of it.
-const MEAN_COST: f64 = 1e-4;
-const NOISE_COST: f64 = 1e-2;
-const LARGEST_NOISE_STEP: f64 = 1.5;
-/// After a step of less than a standard deviation, propagation intervals need not be driven again for the next: they follow it to first order.
-const NEAR: f64 = 1.0;
-/// Where steps by kept propagation intervals have settled, one by driven propagation intervals that is this small, squared and over its variance, is the last: the next would be less by orders.
-const CONFIRMED: f64 = 1e-4;
-/// So near to where they were driven, squared and over the variance, propagation intervals are what they would be if they were driven again: at 0.02, driven propagation intervals made a step of 5e-8.
-const REUSE_TOLERANCE: f64 = 0.1;
-/// Steps before outliers are told: at least, and at most.
-const MIN_STARTS: usize = 3;
-const MAX_STARTS: usize = 20;
-/// A step of ten standard deviations, squared, is a long way.
-const FAR: f64 = 100.0;
-/// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
-const DAMPING: f64 = 1e-7;
-const MIN_INFORMATION: f64 = 1e-9;
 
 /// Where the steps of a fit end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +56,8 @@ impl FitOptions {
             columns: columns.to_vec(),
             fixed: Vec::new(),
             noise_fixed: false,
-            ends: ConvergenceCriterion::NoiseShare(NOISE_SETTLED),
-            max_steps: 60,
+            ends: ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
+            max_steps: MAX_FIT_STEPS,
             ungated: false,
         }
     }
@@ -163,7 +144,7 @@ pub(crate) fn fit_from(
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
         // Sizes first, by medians, which outliers do not move; then outliers can be told.
-        for round in 1..=MAX_STARTS {
+        for round in 1..=MAX_UNGATED_STEPS {
             let pass_options = PassOptions { innovations: true, gate: OutlierGate::Off, ..PassOptions::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &basis)?;
@@ -176,9 +157,12 @@ pub(crate) fn fit_from(
             }
             let middle = squares.len() / 2;
             let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), MIN_SIGMA * MIN_SIGMA);
+            noise = noise.scaled(
+                (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
+                MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
+            );
             // A long way with few measurements bends the path: while steps are large, every measurement would be taken for an outlier.
-            if round >= MIN_STARTS && moved < 1.0 {
+            if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
                 break;
             }
         }
@@ -213,19 +197,21 @@ pub(crate) fn fit_from(
             take_step(&mut model, &mut headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
-        left_basin |= moved > FAR.max(*first.get_or_insert(moved));
+        left_basin |= moved > LEFT_BASIN_STEP.max(*first.get_or_insert(moved));
         // By kept propagation intervals steps only seem to settle: driven ones have the last word, where the model has gone on since.
         moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
-        let mean_settled = if confirms { CONFIRMED } else { SETTLED };
+        let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
         let settles = match options.ends {
             ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
-            ConvergenceCriterion::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
+            ConvergenceCriterion::Likelihood => {
+                moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE
+            }
         };
         if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
             (converged, cached) = (true, cached.or(found.cached.take()));
             break;
         }
-        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < NEAR) };
+        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < CACHED_STEP) };
         confirms = settles;
     }
     // The last step was so small that propagation intervals follow it as if they were driven.
@@ -235,9 +221,6 @@ pub(crate) fn fit_from(
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
     Ok(Fit { model, noise, free_headings: headings, pass, converged, left_basin })
 }
-
-/// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
-const HEADING_SETTLED_RAD: f64 = 1e-6;
 
 /// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for
 /// themselves, are followed until they settle; nothing else moves.
@@ -254,7 +237,7 @@ pub(crate) fn pass_settled(
         let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
         let mut next = model.clone();
         let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
-        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MAX_STARTS {
+        if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
             return Ok((model, found));
         }
         model = next;
@@ -302,7 +285,7 @@ impl MeanStep {
             return Ok(Self { by: DVector::zeros(options.columns.len()), information: system.matrix, squared: 0.0 });
         }
         let reduced = system.along(basis);
-        let damping = reduced.matrix.diagonal().map(|information| DAMPING * information + MIN_INFORMATION);
+        let damping = reduced.matrix.diagonal().map(|information| RELATIVE_DAMPING * information + ABSOLUTE_DAMPING);
         let damped = reduced.clone().with_precision(damping.iter().copied());
         let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
         let squared = (step.transpose() * &reduced.matrix * &step)[0];
@@ -322,7 +305,7 @@ fn take_step(
     let mut moved = vec![0.0; found.runs.first().ok_or(EstimationError::NoMeasurements)?.gradient.len()];
     for (column, by) in options.columns.iter().zip(step.iter_mut()) {
         // A drive that a step makes a half or twice as large is none; the next step goes on.
-        *by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
+        *by = if Column::GEOMETRY.contains(column) { by.clamp(-MAX_GEOMETRY_STEP, MAX_GEOMETRY_STEP) } else { *by };
         if !by.is_finite() {
             return Err(EstimationError::Diverges);
         }
@@ -373,7 +356,7 @@ impl NoiseStep {
         };
         // What stands at its floor does not move.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
-            if variance <= MIN_SIGMA * MIN_SIGMA {
+            if variance <= MIN_NOISE_SIGMA * MIN_NOISE_SIGMA {
                 *by = by.max(0.0);
             }
         }
@@ -403,8 +386,11 @@ impl StepDamping {
     /// The step to take instead of `step`.
     fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
-            self.share[k] =
-                if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
+            self.share[k] = if step[k] * self.last[k] < 0.0 {
+                STEP_DECREASE * self.share[k]
+            } else {
+                (STEP_INCREASE * self.share[k]).min(1.0)
+            };
         }
         self.last = step;
         step.component_mul(&self.share)
@@ -413,10 +399,10 @@ impl StepDamping {
 
 /// Moves the noise, by so much at the most; returns by how much.
 fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
-    let by = by * (LARGEST_NOISE_STEP / by.amax()).min(1.0);
+    let by = by * (MAX_NOISE_STEP / by.amax()).min(1.0);
     let before = *noise;
     for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
-        *variance = (*variance * by.exp()).max(MIN_SIGMA * MIN_SIGMA);
+        *variance = (*variance * by.exp()).max(MIN_NOISE_SIGMA * MIN_NOISE_SIGMA);
     }
     Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
 }
@@ -455,10 +441,10 @@ pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
         cross += pose.x_m * y_m - pose.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));
         // Reckoning is good at the start; half a metre of way shows the heading to a degree.
-        if longest_m > 0.5 || heading_rad == 0.0 {
+        if longest_m > START_HEADING_BASELINE_M || heading_rad == 0.0 {
             heading_rad = unwrap_near(cross.atan2(dot), 0.0);
         }
-        if longest_m > 0.5 {
+        if longest_m > START_HEADING_BASELINE_M {
             break;
         }
     }

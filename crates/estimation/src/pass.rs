@@ -13,10 +13,8 @@ use crate::normal_equations::NormalEquations;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
 use crate::records::{Records, Segment, Start};
+use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
-
-/// From so many intervals of propagation intervals on, or kept propagation intervals, which take a millisecond, runs are filtered on all cores; without terms, all segments.
-pub(super) const PROPAGATIONS_AT_ONCE: usize = 4096;
 
 /// The result of a pass.
 #[derive(Debug, Clone)]
@@ -126,7 +124,7 @@ pub(crate) fn pass(
         let work = |propagation: &PropagationInterval| {
             if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
         };
-        let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= PROPAGATIONS_AT_ONCE;
+        let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= MIN_PARALLEL_WORK;
         let found: Vec<Vec<OfSegment>> = if at_once && terms.is_empty() {
             let of = |number: usize| {
                 (!propagations[number].is_empty())

@@ -9,16 +9,21 @@ use nalgebra::{Matrix3, Vector3};
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::noise::Noise;
-use crate::optimizer::{ConvergenceCriterion, Fit, NOISE_SETTLED, start_heading};
+use crate::optimizer::{ConvergenceCriterion, Fit, start_heading};
 use crate::pass::Pass;
+use crate::settings::NOISE_STEP_TOLERANCE;
 use crate::thinning::Selection;
 
 impl<'a> ModelFit<'a> {
     /// A model with its noise on records that it was not fitted to; the three geometry parameters are free.
     #[must_use]
     pub fn from_parameters(model: Model, noise: Noise, sessions: &[Session<'a>]) -> Self {
-        let fit =
-            Self::before_any_step(sessions, model.clone(), ConvergenceCriterion::NoiseShare(NOISE_SETTLED), false);
+        let fit = Self::before_any_step(
+            sessions,
+            model.clone(),
+            ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
+            false,
+        );
         let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
         let reused = Fit { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
         Self { fit: reused, ..fit }

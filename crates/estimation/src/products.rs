@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::normal_equations::NormalEquations;
+use crate::settings::MIN_VARIANCE_PRODUCT;
 
 /// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
 /// each other.
@@ -25,9 +26,6 @@ impl Products {
         Self { common, first }
     }
 }
-
-/// A product of variances is kept within this and its inverse: the next factor, of 10⁻¹⁰⁰ at the least, leaves it a number.
-const MIN_PRODUCT: f64 = 1e-200;
 
 /// Normal equation of one segment, its free heading last.
 pub(crate) struct Sums<'p> {
@@ -100,7 +98,7 @@ impl<'p> Sums<'p> {
         }
         self.chi_square += v * v * per_s;
         self.det *= s;
-        if !(MIN_PRODUCT..=MIN_PRODUCT.recip()).contains(&self.det) {
+        if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
             self.log_det += self.det.ln();
             self.det = 1.0;
         }

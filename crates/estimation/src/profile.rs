@@ -10,16 +10,10 @@ use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::normal_equations::NormalEquations;
 use crate::optimizer::{FitOptions, fit_from};
-
-/// Half of χ² with one degree of freedom at 95 %: the rise of the cost at the ends of an interval.
-pub const RISE_95: f64 = 1.920_729;
-
-/// An end is found when the cost is right to this share of its rise, which is a thousandth of a standard deviation.
-const RIGHT: f64 = 2e-3;
-const MAX_STEPS: u32 = 30;
+use crate::settings::{MAX_PROFILE_STEPS, MIN_PROFILE_RISE, PROFILE_RISE_TOLERANCE};
 
 impl ModelFit<'_> {
-    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by `rise` ([`RISE_95`]).
+    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by `rise` ([`crate::RISE_95`]).
     ///
     /// # Errors
     /// [`EstimationError`] when the column is not free, or a refit diverges.
@@ -47,14 +41,14 @@ impl ModelFit<'_> {
     fn end(&self, column: Column, position: usize, first: f64, level: f64) -> Result<f64, EstimationError> {
         let best = self.cost();
         let mut by = first;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_PROFILE_STEPS {
             let risen = self.cost_with(column, position, by)? - best;
             let wanted = level - best;
-            if (risen - wanted).abs() < RIGHT * wanted {
+            if (risen - wanted).abs() < PROFILE_RISE_TOLERANCE * wanted {
                 break;
             }
             // A cost that hardly rises is followed outwards by no more than a factor of two at a time.
-            by *= (wanted / risen.max(0.25 * wanted)).sqrt();
+            by *= (wanted / risen.max(MIN_PROFILE_RISE * wanted)).sqrt();
         }
         Ok(by)
     }

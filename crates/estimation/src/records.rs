@@ -9,13 +9,10 @@ use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
-use crate::wheel_angles::{SAME_INSTANT_S, WheelAngleInterpolator, WheelInterval};
-
-/// A motion whose chord is less than this share of its way hardly shows where it went.
-const MIN_CHORD: f64 = 0.3;
-
-/// Errors of displacements that are worth finding last for about three of them: e^(−1/3) is 0.7.
-const FADES: f64 = 0.7;
+use crate::settings::{
+    AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S,
+};
+use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
 /// What the instrument saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,14 +89,12 @@ impl Segment<'_> {
     /// fastest that either went in the segment.
     #[must_use]
     pub fn changes_of_speed(&self) -> Vec<bool> {
-        const BEFORE_S: f64 = 0.5;
-        const SHARE: f64 = 0.2;
         let speed = |interval: &WheelInterval| {
             interval.wheel_rad.map(|rad| if interval.dt_s > 0.0 { rad / interval.dt_s } else { 0.0 })
         };
         let fastest = self.intervals.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
         let changes = |(measurement, (before_s, _)): (&MeasuredPose, (f64, Wheels<f64>))| {
-            let from_s = (measurement.t_s - BEFORE_S).min(before_s);
+            let from_s = (measurement.t_s - SPEED_CHANGE_WINDOW_S).min(before_s);
             let near = self.intervals[..measurement.after]
                 .iter()
                 .rev()
@@ -110,7 +105,7 @@ impl Segment<'_> {
                 high = high.zip_with(of, f64::max);
             }
             let change = high.zip_with(low, |high, low| high - low);
-            change.left.max(change.right) > SHARE * fastest
+            change.left.max(change.right) > SPEED_CHANGE_RATIO * fastest
         };
         self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
     }
@@ -261,7 +256,7 @@ impl<'a> Records<'a> {
                         moved = moved * increment.arc();
                     }
                     // Where a loop ends, it ends by its errors: they have no direction.
-                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD * distance_m {
+                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD_RATIO * distance_m {
                         let measured = measured.to(pose);
                         dot += moved.x_m * measured.x_m + moved.y_m * measured.y_m;
                         cross += measured.x_m * moved.y_m - measured.y_m * moved.x_m;
@@ -309,7 +304,7 @@ impl<'a> Records<'a> {
         if segment == next {
             f64::from(u8::from(lag == 1))
         } else if self.are_in_series(segment, next) {
-            FADES.powi(lag - 1)
+            AUTOCORRELATION_DECAY.powi(lag - 1)
         } else {
             0.0
         }
@@ -436,7 +431,7 @@ fn add_displacements<'a>(
                 after: intervals.len(),
                 variance_factor: [1.0; 2],
             };
-            let continues = (measured.t0_s - last_s).abs() <= SAME_INSTANT_S;
+            let continues = (measured.t0_s - last_s).abs() <= TIME_TOLERANCE_S;
             last_s = measured.t1_s;
             segments.push(Segment {
                 start: Start::Origin,

@@ -9,7 +9,8 @@ use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use crate::decimation::Decimated;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::normal_equations::total;
-use crate::pass::{PROPAGATIONS_AT_ONCE, pass};
+use crate::pass::pass;
+use crate::settings::MIN_PARALLEL_WORK;
 use crate::{Column, FitSettings, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
@@ -117,7 +118,7 @@ impl ModelTerm for Worn {
 #[test]
 fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
     // Runs of at least four propagation intervals each: more than those from which on runs go at once.
-    let dataset = dataset_of(PROPAGATIONS_AT_ONCE.div_ceil(4) as u32, true);
+    let dataset = dataset_of(MIN_PARALLEL_WORK.div_ceil(4) as u32, true);
     let records = Records::of(&[dataset.session()]);
     let selections = Selection::of(&records, Thinning { every_s: 1.0, phases: 2 }, &MODEL);
     let headings = vec![0.0; records.segments.len()];
@@ -129,7 +130,7 @@ fn runs_at_once_say_what_they_say_one_after_the_other_to_the_last_bit() {
         (found.runs, found.innovations, found.outliers, found.noise)
     };
     let one_by_one = on(1);
-    assert!(one_by_one.1.iter().all(|phase| phase.len() > PROPAGATIONS_AT_ONCE), "measurements were left out");
+    assert!(one_by_one.1.iter().all(|phase| phase.len() > MIN_PARALLEL_WORK), "measurements were left out");
     assert_eq!(on(2), one_by_one);
     assert_eq!(on(3), one_by_one);
 }

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use crate::covariances::Covariances;
 use crate::model::Model;
 use crate::records::{Records, Segment, Start};
+use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
 
 /// How measurements are thinned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,13 +89,9 @@ impl Selection {
     /// Whether driving the propagation intervals takes long, and longer than all else in a pass. So many intervals leave errors so small that propagation intervals follow a step of that size to first
     /// order; where few measurements are followed over a few intervals, they need not.
     pub(crate) fn has_long_legs(all: &[Self]) -> bool {
-        /// Pieces of a propagation interval, on average.
-        const LONG: usize = 3;
-        /// Pieces in all: some ten milliseconds.
-        const MANY: usize = 100_000;
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
-        intervals >= MANY && intervals >= LONG * propagations().count()
+        intervals >= MIN_CACHED_INTERVALS && intervals >= MIN_INTERVALS_PER_CACHED_PROPAGATION * propagations().count()
     }
 
     /// How many looks it takes of a series that has any, on average; starts left out. A series is a segment of measurements, or the displacements of one run.
@@ -132,7 +129,7 @@ fn displacements_taken(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec
     let mut taken: Vec<Vec<usize>> = series
         .iter()
         .map(|segment| match end_s(segment) {
-            Some(end_s) if every_s == 0.0 || end_s >= due_s - 1e-9 => {
+            Some(end_s) if every_s == 0.0 || end_s >= due_s - TIME_TOLERANCE_S => {
                 due_s = end_s + every_s;
                 vec![0]
             }
@@ -159,7 +156,7 @@ fn taken(segment: &Segment<'_>, every_s: f64, offset: f64) -> Vec<usize> {
     let mut due_s = start.t_s + every_s * (1.0 + offset);
     let mut taken = Vec::new();
     for (number, measurement) in segment.measurements.iter().enumerate().skip(1) {
-        if measurement.t_s >= due_s - 1e-9 {
+        if measurement.t_s >= due_s - TIME_TOLERANCE_S {
             taken.push(number);
             due_s = measurement.t_s + every_s;
         }

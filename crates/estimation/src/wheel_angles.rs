@@ -7,10 +7,7 @@
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
-/// An instant may miss a row by the rounding of its file.
-pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
-/// How far out of the log an instant may be, as a share of the interval there: farther, another row would have been written.
-const OUTSIDE: f64 = 0.5;
+use crate::settings::{MAX_EXTRAPOLATION, TIME_TOLERANCE_S};
 
 /// A stretch of constant wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,8 +80,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         let (first, last) = (self.row_at(from_s)?, self.row_at(to_s)?);
         let from = self.turn_at(first, from_s)?;
         let to = self.turn_at(last, to_s)?;
-        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + SAME_INSTANT_S)
-            ..self.t_s.partition_point(|t_s| *t_s < to_s - SAME_INSTANT_S);
+        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + TIME_TOLERANCE_S)
+            ..self.t_s.partition_point(|t_s| *t_s < to_s - TIME_TOLERANCE_S);
         if to_s < from_s || !(self.continuous || within.is_empty()) {
             return None;
         }
@@ -128,7 +125,7 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of the outer interval where it is close outside of the
     /// log; `None` farther out.
     fn row_at(&self, t_s: f64) -> Option<usize> {
-        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S);
+        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + TIME_TOLERANCE_S);
         self.row_of(before, t_s)
     }
 
@@ -136,18 +133,18 @@ impl<'a> WheelAngleInterpolator<'a> {
     fn row_of(&self, before: usize, t_s: f64) -> Option<usize> {
         let rows_s = self.t_s;
         let last = rows_s.len() - 1;
-        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= SAME_INSTANT_S {
+        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= TIME_TOLERANCE_S {
             return Some(before - 1);
         }
         let (row, outside_s) =
             if before == 0 { (0, rows_s[0] - t_s) } else { (last.checked_sub(1)?, t_s - rows_s[last]) };
         let next_s = rows_s.get(row + 1).filter(|_| self.continuous)?;
-        (outside_s <= OUTSIDE * (next_s - rows_s[row])).then_some(row)
+        (outside_s <= MAX_EXTRAPOLATION * (next_s - rows_s[row])).then_some(row)
     }
 
     fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
         let since_s = t_s - self.t_s[row];
-        if since_s.abs() <= SAME_INSTANT_S {
+        if since_s.abs() <= TIME_TOLERANCE_S {
             return Some(self.row_rad(row));
         }
         let next_s = *self.t_s.get(row + 1)?;
@@ -168,7 +165,7 @@ impl Cursor<'_, '_> {
     /// Goes to the row of an instant; false where the log does not span it.
     fn seek(&mut self, t_s: f64) -> bool {
         let rows_s = self.track.t_s;
-        let is_before = |row_s: f64| row_s <= t_s + SAME_INSTANT_S;
+        let is_before = |row_s: f64| row_s <= t_s + TIME_TOLERANCE_S;
         let mut before = if is_before(rows_s[self.row]) { self.row + 1 } else { 0 };
         while before < rows_s.len() && is_before(rows_s[before]) {
             before += 1;
@@ -200,7 +197,7 @@ impl Cursor<'_, '_> {
             intervals.push(WheelInterval { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
             (at_s, angle) = (t_s, next);
         };
-        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
+        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - TIME_TOLERANCE_S {
             row += 1;
             push(rows_s[row], self.track.row_rad(row), row - 1);
         }
