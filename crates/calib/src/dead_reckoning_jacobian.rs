@@ -7,6 +7,7 @@ use kinematics::{Increment, Pose, Wheels, sinc, sinc_derivative};
 use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
 
 use crate::estimate::Parameter;
+use crate::settings::MIN_COMMON_SCALE_COMPONENT;
 
 /// The lengths that turn wheel turns into motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +80,7 @@ impl DeadReckoned {
 pub(crate) fn unobservable(direction: &Vector3<f64>) -> (Parameter, &'static str) {
     let sizes = direction.normalize().abs();
     // All three grow together: every turn stays, every length grows.
-    if sizes.min() > 0.3 {
+    if sizes.min() > MIN_COMMON_SCALE_COMPONENT {
         (
             Parameter::CommonScale,
             "the runs only turn on the spot, or close: add straight runs, or measurements on the way",

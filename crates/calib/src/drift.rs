@@ -8,9 +8,7 @@ use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
 use serde::Serialize;
 
 use crate::report::NamedCalibration;
-
-/// A truth sample may miss a row's instant by the rounding of its file.
-const SAME_INSTANT_S: f64 = 1e-9;
+use crate::settings::TIME_TOLERANCE_S;
 
 /// Drift of every run under one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -130,7 +128,7 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     let Some(&(log_start_s, _)) = log.first() else { return unknown(run, length_m, "the run has no odometry") };
     // The start pose holds at the first truth instant, which may be later than the log's first row.
     let first_s = observed[0].0;
-    let moved = if first_s > log_start_s + SAME_INSTANT_S {
+    let moved = if first_s > log_start_s + TIME_TOLERANCE_S {
         match at(&log, first_s, &mut 0) {
             Some(dead_reckoned) => start * dead_reckoned.inverse(),
             None => return unknown(run, length_m, "the truth does not overlap the odometry in time"),
@@ -167,11 +165,11 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
 
 /// The reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the log.
 fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
-    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + SAME_INSTANT_S {
+    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + TIME_TOLERANCE_S {
         *row += 1;
     }
     let (row_s, pose) = *log.get(*row)?;
-    if (t_s - row_s).abs() <= SAME_INSTANT_S {
+    if (t_s - row_s).abs() <= TIME_TOLERANCE_S {
         return Some(pose);
     }
     let (next_s, next) = *log.get(*row + 1)?;

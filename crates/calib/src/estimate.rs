@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use estimation::{EstimationError, OneStep};
 
+use crate::settings::{MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO};
+
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
@@ -211,8 +213,11 @@ impl Calibration {
         ];
         let remark = |(parameter, nominal): (Parameter, f64)| {
             let factor = self.estimate(parameter)?.value / nominal;
-            // Skid steering doubles the effective separation at most (users report 1.5 to 2 times); wheels are known to a few per cent.
-            let most = if parameter == Parameter::WheelSeparation { 2.2 } else { 1.3 };
+            let most = if parameter == Parameter::WheelSeparation {
+                MAX_PLAUSIBLE_SEPARATION_RATIO
+            } else {
+                MAX_PLAUSIBLE_DIAMETER_RATIO
+            };
             let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
             let message = || format!("{} is {factor:.3} times its nominal value: {cause}", parameter.key());
             (factor > most || factor < 1.0 / most).then(message)

@@ -11,6 +11,7 @@ mod estimate;
 mod pose_measurements;
 mod report;
 mod robust;
+mod settings;
 
 pub mod methods;
 

@@ -9,6 +9,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter};
+use crate::settings::MAX_FILE_BYTES;
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -209,9 +210,6 @@ impl MethodReport {
     }
 }
 
-/// Calibration files are small; anything larger is another file.
-const LARGEST_FILE_BYTES: u64 = 1 << 20;
-
 impl CalibrationReport {
     /// The calibration file's text.
     ///
@@ -233,9 +231,9 @@ impl CalibrationReport {
         let place = path.display().to_string();
         let mut text = String::new();
         let file = std::fs::File::open(path).map_err(io)?;
-        file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
-        if text.len() as u64 > LARGEST_FILE_BYTES {
-            let message = format!("it has more than {LARGEST_FILE_BYTES} bytes");
+        file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > MAX_FILE_BYTES {
+            let message = format!("it has more than {MAX_FILE_BYTES} bytes");
             return Err(ReportError::NotACalibration { place, message });
         }
         let report: Self = toml::from_str(&text).map_err(|error| {

@@ -2,6 +2,8 @@
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
+use crate::settings::{MAD_CUT, MAD_TO_SIGMA, MIN_VALUES_FOR_OUTLIERS};
+
 /// Rejection by median and median absolute deviation: a value is an outlier when |x − median| > cut · 1.4826 · MAD.
 ///
 /// The paper says that "statistical filtering rejects atypical values" and not which; this is the rule of Iglewicz & Hoaglin (1993), whose cut of 3.5
@@ -15,15 +17,9 @@ pub struct MedianMad {
     pub cut: f64,
 }
 
-/// The MAD of a Gaussian times this is its standard deviation: 1/Φ⁻¹(3/4).
-const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
-
-/// Fewer values than this have no shape to depart from.
-const FEWEST_TO_JUDGE: usize = 5;
-
 impl Default for MedianMad {
     fn default() -> Self {
-        Self { cut: 3.5 }
+        Self { cut: MAD_CUT }
     }
 }
 
@@ -32,7 +28,7 @@ impl MedianMad {
     /// is not known.
     #[must_use]
     pub fn keep(&self, values: &[f64], stated_sigma: f64) -> Vec<bool> {
-        if values.len() < FEWEST_TO_JUDGE {
+        if values.len() < MIN_VALUES_FOR_OUTLIERS {
             return vec![true; values.len()];
         }
         let sorted = sorted(values);

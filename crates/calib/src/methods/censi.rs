@@ -12,14 +12,18 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 use dataset::{RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{Increment, Pose, Wheels, unwrap_near, wrap_to_pi};
+use motion_programs::Schedule;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector3};
 
-use crate::estimate::{CalibError, Calibration, Covariance, Method, Extrinsics, Parameter, Rejected, drive, nominal};
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
+use crate::estimate::{CalibError, Calibration, Covariance, Extrinsics, Method, Parameter, Rejected, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::robust::left_of_variance;
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use crate::settings::{
+    DISPLACEMENT_DISTANCE_M, DISPLACEMENT_TURN_RAD, MAX_POSITION_CONDITION, MAX_PROPORTION_OFFSET, MAX_TURN_CONDITION,
+    MIN_COST_RATIO, MIN_DISPLACEMENT_SIGMA, TRIMMED_SHARE, TRIMMING_ROUNDS,
+};
 use estimation::WheelAngleInterpolator;
 
 /// The method with its trimming and its limits.
@@ -34,15 +38,6 @@ pub struct Censi {
     /// … or so much turn, radians: the error of a displacement does not shrink with its length.
     pub least_turn_rad: f64,
 }
-
-/// A larger ratio of the extreme eigenvalues of Σ Φ Φᵀ is "not very exciting data" to the authors' program.
-const LARGEST_CONDITION: f64 = 75.0;
-
-/// The same for the axle and the instrument's place. A hundred times worse known than the axle is little use and still told by sigma; beyond is none.
-const LARGEST_PLACE_CONDITION: f64 = 1e4;
-
-/// The wrong solution must cost so many times the right one, or the instrument's heading is not seen.
-const MIN_COST_RATIO: f64 = 4.0;
 
 /// A displacement that the instrument saw, and how the wheels turned meanwhile.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,8 +161,12 @@ fn not_applicable(why: impl Into<String>) -> CalibError {
 
 impl Censi {
     /// The method as the table of contents offers it, with the authors' trimming.
-    pub const DEFAULT: Self =
-        Self { rounds: 4, trimmed_share: 0.01, least_distance_m: 1.5, least_turn_rad: 3.0 * FRAC_PI_2 };
+    pub const DEFAULT: Self = Self {
+        rounds: TRIMMING_ROUNDS,
+        trimmed_share: TRIMMED_SHARE,
+        least_distance_m: DISPLACEMENT_DISTANCE_M,
+        least_turn_rad: DISPLACEMENT_TURN_RAD,
+    };
 
     const NAME: &'static str = "censi";
 
@@ -245,7 +244,12 @@ impl Censi {
     }
 }
 
-fn sample(run: &RunView<'_>, nominal: &CensiFit, wheel_rad: Vec<Wheels<f64>>, seen: Pose) -> Option<DisplacementSample> {
+fn sample(
+    run: &RunView<'_>,
+    nominal: &CensiFit,
+    wheel_rad: Vec<Wheels<f64>>,
+    seen: Pose,
+) -> Option<DisplacementSample> {
     let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: seen };
     // Standing still says nothing, and its small errors would make those of motion look like outliers.
     if sample.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
@@ -257,7 +261,10 @@ fn sample(run: &RunView<'_>, nominal: &CensiFit, wheel_rad: Vec<Wheels<f64>>, se
     Some(sample)
 }
 
-fn among<'e>(samples: &'e [DisplacementSample], kept: &'e [bool]) -> impl Iterator<Item = (usize, &'e DisplacementSample)> {
+fn among<'e>(
+    samples: &'e [DisplacementSample],
+    kept: &'e [bool],
+) -> impl Iterator<Item = (usize, &'e DisplacementSample)> {
     samples.iter().enumerate().filter(|(index, _)| kept[*index])
 }
 
@@ -265,7 +272,9 @@ fn among<'e>(samples: &'e [DisplacementSample], kept: &'e [bool]) -> impl Iterat
 ///
 /// # Errors
 /// [`CalibError`] when the excursions do not determine the parameters.
-pub fn solutions<'e>(samples: &mut (dyn Iterator<Item = &'e DisplacementSample> + '_)) -> Result<[Solution; 2], CalibError> {
+pub fn solutions<'e>(
+    samples: &mut (dyn Iterator<Item = &'e DisplacementSample> + '_),
+) -> Result<[Solution; 2], CalibError> {
     // First the turns, linear in J₂₁ and J₂₂.
     let samples: Vec<&DisplacementSample> = samples.collect();
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
@@ -277,7 +286,8 @@ pub fn solutions<'e>(samples: &mut (dyn Iterator<Item = &'e DisplacementSample> 
     excited(&normal)?;
     let turn_by_rad: Vector2<f64> = normal.lu().solve(&right).unwrap_or_default();
     // Then the rest. A robot with a separation of 1 and these turns moves by o/b.
-    let unit = GeometryParameters { m_per_rad: Wheels { left: -turn_by_rad.x, right: turn_by_rad.y }, separation_m: 1.0 };
+    let unit =
+        GeometryParameters { m_per_rad: Wheels { left: -turn_by_rad.x, right: turn_by_rad.y }, separation_m: 1.0 };
     let (mut place, mut mixed, mut heading) = (Matrix3::zeros(), Matrix3x2::zeros(), Matrix2::zeros());
     for sample in &samples {
         let by_separation = sample.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
@@ -299,7 +309,7 @@ pub fn solutions<'e>(samples: &mut (dyn Iterator<Item = &'e DisplacementSample> 
         why: "between two measurements the robot turns by nothing or by whole turns only; add measurements after quarter turns"
             .to_owned(),
     };
-    if eigenvalues.min() * LARGEST_PLACE_CONDITION <= eigenvalues.max() {
+    if eigenvalues.min() * MAX_POSITION_CONDITION <= eigenvalues.max() {
         return Err(unobservable);
     }
     let inverse = place.try_inverse().ok_or(unobservable)?;
@@ -332,7 +342,7 @@ fn excited(normal: &Matrix2<f64>) -> Result<(), CalibError> {
     let eigen = normal.symmetric_eigen();
     let (weak, strong) = if eigen.eigenvalues[0] < eigen.eigenvalues[1] { (0, 1) } else { (1, 0) };
     let condition = eigen.eigenvalues[strong] / eigen.eigenvalues[weak];
-    if condition > 0.0 && condition <= LARGEST_CONDITION {
+    if condition > 0.0 && condition <= MAX_TURN_CONDITION {
         return Ok(());
     }
     if eigen.eigenvalues[strong] <= 0.0 {
@@ -340,16 +350,15 @@ fn excited(normal: &Matrix2<f64>) -> Result<(), CalibError> {
     }
     let proportion = eigen.eigenvectors.column(strong);
     let (left, right) = (proportion[0], proportion[1]);
-    // The strong direction within an eighth of a right angle of (1, 1) or of (1, −1).
-    let missing = if (left - right).abs() < 0.3 {
+    let missing = if (left - right).abs() < MAX_PROPORTION_OFFSET {
         "the robot drives straight: add spins, or arcs to both sides"
-    } else if (left + right).abs() < 0.3 {
+    } else if (left + right).abs() < MAX_PROPORTION_OFFSET {
         "the robot spins: add straight runs"
     } else {
         "the robot drives one arc: add straight runs and spins, or arcs to the other side"
     };
     let why = format!(
-        "the wheels turn almost always in one proportion (condition {condition:.0}, at most {LARGEST_CONDITION}), since {missing}"
+        "the wheels turn almost always in one proportion (condition {condition:.0}, at most {MAX_TURN_CONDITION}), since {missing}"
     );
     Err(CalibError::Unobservable { method: Censi::NAME, parameter: Parameter::WheelSeparation, why })
 }
@@ -415,7 +424,12 @@ impl Method for Censi {
 }
 
 /// Inverse Fisher information with the instrument's error as the kept residuals show it, made up for what trimming took of them.
-fn covariance(fit: &CensiFit, samples: &[DisplacementSample], kept: &[bool], dropped: (f64, f64)) -> Option<Matrix6<f64>> {
+fn covariance(
+    fit: &CensiFit,
+    samples: &[DisplacementSample],
+    kept: &[bool],
+    dropped: (f64, f64),
+) -> Option<Matrix6<f64>> {
     let (sum, count) = among(samples, kept).fold((Vector3::zeros(), 0.0), |(sum, count), (_, sample)| {
         let residual = fit.residual(sample);
         (sum + residual.component_mul(&residual), count + 1.0)
@@ -427,8 +441,7 @@ fn covariance(fit: &CensiFit, samples: &[DisplacementSample], kept: &[bool], dro
     }
     let (plane, axis) = left_of_variance(dropped);
     let var = (sum / degrees_of_freedom).component_div(&Vector3::new(plane, plane, axis));
-    // Errors below a picometre are arithmetic's.
-    let sigma = var.map(|var| var.sqrt().max(1e-12));
+    let sigma = var.map(|var| var.sqrt().max(MIN_DISPLACEMENT_SIGMA));
     fit.information(among(samples, kept).map(|(_, sample)| sample), sigma).try_inverse()
 }
 
@@ -546,8 +559,8 @@ mod tests {
         assert!(message(&whole).contains("whole turns only"), "{}", message(&whole));
         // The limit itself, from both sides.
         let normal = |ratio: f64| Matrix2::from_diagonal(&Vector2::new(1.0, ratio));
-        assert!(excited(&normal(1.0 / (0.999 * LARGEST_CONDITION))).is_ok());
-        assert!(excited(&normal(1.0 / (1.001 * LARGEST_CONDITION))).is_err());
+        assert!(excited(&normal(1.0 / (0.999 * MAX_TURN_CONDITION))).is_ok());
+        assert!(excited(&normal(1.0 / (1.001 * MAX_TURN_CONDITION))).is_err());
     }
 
     #[test]

@@ -12,34 +12,20 @@
 //! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no small-angle form.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Wheels, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
+use crate::settings::{CIRCULAR_MAX_STEPS, CIRCULAR_TOLERANCE, MAX_RATIO_CHANGE, MIN_ARC_RAD, MIN_ARC_SINE};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Circular;
-
-/// A leg is the shortest stretch between two readings that turns by this: a quarter turn less what its rounding and a wrong wheelbase may take off.
-const LEG_RAD: f64 = 1.4;
-
-/// |sin Θ/2| of a leg at least this, 60° to 300°: a leg that nearly closes shows no radius.
-const MIN_SINE: f64 = 0.5;
-
-/// The wheels' ratio may differ by this share between the halves of a leg: twice the rounding of a coarse counter (1 mm on 100 mm of inner wheel).
-const CONSTANT_RATIO: f64 = 0.02;
-
-/// Rounds of Gauss–Newton; three are enough, and the method says when they were not.
-const ROUNDS: u32 = 30;
-
-/// A change of the answer by less than this share is none.
-const SETTLED: f64 = 1e-13;
 
 /// An arc of constant wheel ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,32 +94,39 @@ fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -
 }
 
 /// The legs of one run; or why it has none.
-fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<PropagationInterval>, &'static str> {
+fn legs(
+    run: &RunView<'_>,
+    robot: &NominalRobot,
+    geometry: &DriveGeometry,
+) -> Result<Vec<PropagationInterval>, &'static str> {
     let readings = readings(run, robot, geometry).ok_or("the run has no odometry")?;
     let (mut legs, mut bent, mut end) = (Vec::new(), false, 0);
     for (start, first) in readings.iter().enumerate() {
         end = end.max(start + 1);
-        while readings.get(end).is_some_and(|last| (last.reckoned_rad - first.reckoned_rad).abs() < LEG_RAD) {
+        while readings.get(end).is_some_and(|last| (last.reckoned_rad - first.reckoned_rad).abs() < MIN_ARC_RAD) {
             end += 1;
         }
         let Some(last) = readings.get(end) else { break };
         // Whole turns come from the odometry.
         let turn_rad = unwrap_near(last.theta_rad - first.theta_rad, last.reckoned_rad - first.reckoned_rad);
         let sine = (0.5 * turn_rad).sin();
-        if sine.abs() < MIN_SINE {
+        if sine.abs() < MIN_ARC_SINE {
             continue;
         }
         let turned = |a: &Reading, b: &Reading| b.wheel_rad.zip_with(a.wheel_rad, |b, a| b - a);
         let middle = &readings[usize::midpoint(start, end)];
         let (one, other) = (turned(first, middle), turned(middle, last));
         let (one, other) = (one.right * other.left, one.left * other.right);
-        if (one - other).abs() > CONSTANT_RATIO * one.abs().max(other.abs()) {
+        if (one - other).abs() > MAX_RATIO_CHANGE * one.abs().max(other.abs()) {
             bent = true;
             continue;
         }
         let wheel_rad = turned(first, last);
         let forward = (wheel_rad.left + wheel_rad.right).signum();
-        legs.push(PropagationInterval { radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine), wheel_rad });
+        legs.push(PropagationInterval {
+            radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine),
+            wheel_rad,
+        });
     }
     match (legs.is_empty(), bent) {
         (false, _) => Ok(legs),
@@ -220,12 +213,12 @@ struct Fit {
 impl Fit {
     fn of(runs: &[Vec<PropagationInterval>], nominal_separation_m: f64) -> Self {
         let mut fit = Self { ratio: 1.0, separation_m: nominal_separation_m, settled: false };
-        for _ in 0..ROUNDS {
+        for _ in 0..CIRCULAR_MAX_STEPS {
             let (normal, right) = fit.normal(runs);
             let Some(step) = normal.try_inverse().map(|inverse| inverse * right) else { break };
             fit.ratio += step.x;
             fit.separation_m += step.y;
-            if step.x.abs() < SETTLED && step.y.abs() < SETTLED * fit.separation_m.abs() {
+            if step.x.abs() < CIRCULAR_TOLERANCE && step.y.abs() < CIRCULAR_TOLERANCE * fit.separation_m.abs() {
                 fit.settled = true;
                 break;
             }
@@ -261,7 +254,10 @@ mod tests {
     fn leg(radius_m: f64, ratio: f64, separation_m: f64) -> PropagationInterval {
         // A quarter turn on wheels of 1/(e + 1) and e/(e + 1) metres a radian.
         let arc = |side: f64| (radius_m + side * 0.5 * separation_m) * 1.5;
-        PropagationInterval { radius_m, wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio } }
+        PropagationInterval {
+            radius_m,
+            wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio },
+        }
     }
 
     #[test]

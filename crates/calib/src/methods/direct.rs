@@ -9,12 +9,13 @@
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
 use dataset::{PointReading, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
+use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
 use crate::pose_measurements::ConvergenceCriterion;
 use crate::robust::{MedianMad, Summary, mean};
+use crate::settings::{MAD_CUT, MAX_MARK_OFFSET_M, MIN_SPIN_RAD};
 
 /// The method with its outlier rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,12 +23,6 @@ pub struct Direct {
     /// Which values are atypical.
     pub outliers: MedianMad,
 }
-
-/// Marks farther from the axle's line than this break (6): at 5 mm a 2° turn shifts the chord by 0.003 mm.
-const MARK_OFF_AXLE_M: f64 = 5e-3;
-
-/// A spin of less than this says little of the wheelbase and its sign is not sure.
-const SMALLEST_SPIN_RAD: f64 = 0.5;
 
 /// What one run says, with its id.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,10 +76,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
     }
 
     /// The runs of one protocol, each with its wheels' turns and its marks, where both were measured.
-    fn runs(
-        &self,
-        protocol: Protocol,
-    ) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
+    fn runs(&self, protocol: Protocol) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
         let runs = self.session.runs.iter().filter(move |run| run.info().protocol == Some(protocol));
         runs.filter_map(|run| {
             let measured = self.measured(run).transpose()?;
@@ -109,12 +101,13 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
             return Err(Direct::not_applicable("it needs one marked point on each side of the robot".to_owned()));
         }
-        if body.left.x_m.abs().max(body.right.x_m.abs()) > MARK_OFF_AXLE_M {
+        if body.left.x_m.abs().max(body.right.x_m.abs()) > MAX_MARK_OFFSET_M {
             return Err(Direct::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
         }
         let start = outermost.map(|(point, _)| readings.iter().find(|reading| reading.point == point));
         let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
-        let both = |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
+        let both =
+            |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
         let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
         // Marks are read while the robot stands, before and after all that its log has.
         let Some(wheel_rad) = run.wheel_turn_rad(self.session.robot) else { return Ok(None) };
@@ -125,7 +118,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
 
 impl Direct {
     /// The method as the table of contents offers it.
-    pub const DEFAULT: Self = Self { outliers: MedianMad { cut: 3.5 } };
+    pub const DEFAULT: Self = Self { outliers: MedianMad { cut: MAD_CUT } };
 
     const NAME: &'static str = "direct";
 
@@ -179,7 +172,7 @@ impl Direct {
                 // Whole turns come from the counts and the sensitivities already found.
                 let travel_m = wheel_rad.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad);
                 let turn_rad = marks.turn_rad(reader.geometry.increment(travel_m).turn_rad);
-                if turn_rad.abs() > SMALLEST_SPIN_RAD {
+                if turn_rad.abs() > MIN_SPIN_RAD {
                     let value = (travel_m.right - travel_m.left) / turn_rad;
                     let slope = Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad };
                     // Two marks across the axle, read at both ends, give the turn to 2σ/w.
@@ -212,7 +205,10 @@ impl Direct {
 }
 
 /// The values that are kept.
-fn kept<'v>(values: impl Iterator<Item = f64> + Clone + 'v, keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
+fn kept<'v>(
+    values: impl Iterator<Item = f64> + Clone + 'v,
+    keep: &'v [bool],
+) -> impl Iterator<Item = f64> + Clone + 'v {
     values.zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| value)
 }
 
@@ -257,13 +253,13 @@ impl Method for Direct {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way".to_owned(),
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way"
+                    .to_owned(),
             });
         };
 
-        let slope = Wheels::from_sides(|side| {
-            mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0)
-        });
+        let slope =
+            Wheels::from_sides(|side| mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
         Ok(Calibration {
@@ -304,7 +300,10 @@ mod tests {
     fn marks_after(increment: Increment, outside_m: Wheels<f64>) -> Marks {
         let half_m = 0.5 * 0.363;
         let start_pose = Pose::new(0.3, -0.2, 0.8);
-        let body = Wheels { left: Point::new(0.0, half_m + outside_m.left), right: Point::new(0.0, -half_m - outside_m.right) };
+        let body = Wheels {
+            left: Point::new(0.0, half_m + outside_m.left),
+            right: Point::new(0.0, -half_m - outside_m.right),
+        };
         let end_pose = start_pose * increment.arc();
         Marks { start: body.map(|p| start_pose * p), end: body.map(|p| end_pose * p), outside_m }
     }
@@ -318,7 +317,8 @@ mod tests {
                 let marks = marks_after(increment, outside_m);
                 let measured_rad = marks.turn_rad(0.0);
                 assert!((measured_rad - turn_rad).abs() < 1e-14);
-                let arc_m = Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
+                let arc_m =
+                    Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
                 for side in Side::BOTH {
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * distance_m.signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };

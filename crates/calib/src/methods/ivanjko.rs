@@ -10,29 +10,21 @@
 //! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves out a wheel, is not offered.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::robust::Summary;
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use crate::settings::{IVANJKO_MAX_ROUNDS, IVANJKO_TOLERANCE, MIN_SPIN_RAD};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ivanjko;
-
-/// A spin of less than this says little of the wheelbase and its sign is not sure.
-const SMALLEST_SPIN_RAD: f64 = 0.5;
-
-/// Rounds of both steps; a handful are enough, and the method says when they were not.
-const ROUNDS: u32 = 50;
-
-/// A change by less than this share is none.
-const SETTLED: f64 = 1e-12;
 
 impl Ivanjko {
     /// The method as the table of contents offers it.
@@ -183,7 +175,8 @@ impl Method for Ivanjko {
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
         let (mut straights, mut spins) = (Vec::new(), Vec::new());
-        let mut at = GeometryParameters { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
+        let mut at =
+            GeometryParameters { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
         for session in sessions {
             for run in &session.runs {
                 let Some((start, end)) = whole(run, session.robot, &geometry) else { continue };
@@ -197,7 +190,7 @@ impl Method for Ivanjko {
                     }
                     Some(Protocol::Spin) => {
                         let spin = Spin { wheel_rad, seen_rad: end.theta_rad - start.theta_rad };
-                        if spin.of_wheels(&at).1.abs() >= SMALLEST_SPIN_RAD {
+                        if spin.of_wheels(&at).1.abs() >= MIN_SPIN_RAD {
                             spins.push(spin);
                         }
                     }
@@ -219,7 +212,7 @@ impl Method for Ivanjko {
             });
         }
         let (mut converged, mut last) = (false, None);
-        for _ in 0..ROUNDS {
+        for _ in 0..IVANJKO_MAX_ROUNDS {
             let Some(step) = Step1::of(&straights, &at) else { break };
             at.m_per_rad.left += step.asked.x;
             at.m_per_rad.right += step.asked.y;
@@ -227,7 +220,7 @@ impl Method for Ivanjko {
             let changed = (step.asked.amax() / at.m_per_rad.left).abs().max((base_m / at.separation_m - 1.0).abs());
             at.separation_m = base_m;
             last = Some(step);
-            if changed < SETTLED {
+            if changed < IVANJKO_TOLERANCE {
                 converged = true;
                 break;
             }

@@ -8,14 +8,14 @@
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
-use motion_programs::Schedule;
-use estimation::{Grouping, Column, FitSettings, ModelFit, LargeFit, Model, OneStepError, fit_large};
+use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, OneStepError, fit_large};
 use kinematics::Pose;
+use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Method, Extrinsics, NotObservable, GroupInstrument, Rejected, drive, nominal,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, Rejected, drive, nominal,
 };
 
 /// The method with the settings of its fit.

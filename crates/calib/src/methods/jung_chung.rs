@@ -13,8 +13,8 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dataset::{Protocol, Session};
-use motion_programs::Schedule;
 use kinematics::{Wheels, wrap_to_pi};
+use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
 use crate::pose_measurements::ConvergenceCriterion;

@@ -12,11 +12,12 @@
 //! Reference: Antonelli, Chiaverini, Fusco 2005 (general form); Antonelli & Chiaverini 2007 (physical form).
 
 use dataset::{NominalRobot, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Side, Wheels, sinc, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
+use crate::settings::{CLOSED_PATH_RATIO, COLLINEARITY_TOLERANCE, DIFFERENCE_STEP};
 use estimation::WheelAngleInterpolator;
 
 /// How many parameters the model has.
@@ -56,15 +57,6 @@ pub struct Gains {
     /// Covariance in the order c11, c12, c21, c22; `None` when there are too few runs to show a scatter.
     pub covariance: Option<DMatrix<f64>>,
 }
-
-/// Two regressors are one when 1 − |cosine| of the angle between them is less: wheels whose turns differ by less than 1.4 % of themselves over all runs.
-const COLLINEAR: f64 = 1e-4;
-
-/// Paths whose ends are nearer to their starts than this share of what the wheels went are closed: they do not show the scale.
-const CLOSED: f64 = 0.05;
-
-/// Step of central differences of the paths over step 1's result, as a share of it: h² of a smooth function is left, 1e-8.
-const DIFFERENCE: f64 = 1e-4;
 
 impl Linear {
     /// The method as the table of contents offers it: the physical form on the runs' ends.
@@ -179,7 +171,7 @@ impl Headings {
     /// Slope of a function of c21 and c22 over both, by central differences.
     fn slopes<T>(&self, of: impl Fn(Wheels<f64>) -> T, difference: impl Fn(T, T, f64) -> T) -> [T; 2] {
         [Side::Right, Side::Left].map(|side| {
-            let size = DIFFERENCE * self.turn_per_rad[side].abs();
+            let size = DIFFERENCE_STEP * self.turn_per_rad[side].abs();
             let (mut more, mut less) = (self.turn_per_rad, self.turn_per_rad);
             more[side] += size;
             less[side] -= size;
@@ -191,7 +183,7 @@ impl Headings {
 /// Two normal equations; `None` when their regressors are one.
 fn solve(normal: &Matrix2<f64>, right: &Vector2<f64>) -> Option<Vector2<f64>> {
     let cosine = normal[(0, 1)] / (normal[(0, 0)] * normal[(1, 1)]).sqrt();
-    if cosine.is_nan() || 1.0 - cosine.abs() < COLLINEAR {
+    if cosine.is_nan() || 1.0 - cosine.abs() < COLLINEARITY_TOLERANCE {
         return None;
     }
     Some(normal.try_inverse()? * right)
@@ -237,7 +229,7 @@ impl Scale {
         let normal: f64 = pairs().map(|(_, path)| path.norm_squared()).sum();
         let travelled = |rad: Wheels<f64>| 0.5 * (rad.right * at.right - rad.left * at.left);
         let travelled: f64 = pairs().map(|(equation, _)| travelled(equation.rolled_rad).powi(2)).sum();
-        if normal.is_nan() || normal <= CLOSED * CLOSED * travelled {
+        if normal.is_nan() || normal <= CLOSED_PATH_RATIO * CLOSED_PATH_RATIO * travelled {
             return None;
         }
         let separation_m = pairs().map(|(equation, path)| path.dot(&equation.moved_m)).sum::<f64>() / normal;
@@ -286,7 +278,7 @@ impl Linear {
         }
         let rolled = |equation: &Equation| equation.rolled_rad.left.powi(2) + equation.rolled_rad.right.powi(2);
         let rolled: f64 = runs.iter().flat_map(|run| &run.equations).map(rolled).sum();
-        let open = normal.trace() > CLOSED * CLOSED * rolled;
+        let open = normal.trace() > CLOSED_PATH_RATIO * CLOSED_PATH_RATIO * rolled;
         let Some(solution) = solve(&normal, &right).filter(|_| open) else {
             let why = "the paths close, or are of one shape for both wheels, so that no gain shows, or only their sum; drive open curves, or use the physical form";
             return Err(Self::unobservable(Parameter::LeftWheelDiameter, why));

@@ -8,14 +8,15 @@
 //! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends by Rprop and stops before the minimum.
 
 use dataset::Session;
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Wheels};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
+use motion_programs::Schedule;
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters, unobservable};
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned, unobservable};
+use crate::settings::{HEADING_WEIGHT_M, MIN_SENSITIVITY, SEGMENT_M};
 
 /// The method with its segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,9 +35,6 @@ pub struct Cost {
     /// Its derivatives by left diameter, right diameter and separation, metres.
     pub gradient_m: Vector3<f64>,
 }
-
-/// A direction in which relative changes of the three geometry parameters move the path by so much less than in the best one is not seen.
-const MIN_SENSITIVITY: f64 = 1e-3;
 
 /// Errors of all paths as a function of the three geometry parameters over their nominal values.
 #[derive(Debug, Clone)]
@@ -120,7 +118,7 @@ impl PathErrors<'_> {
 
 impl Segments {
     /// The method as the table of contents offers it: the segments of the authors' program, and headings for their effect over one.
-    pub const DEFAULT: Self = Self { segment_m: 0.5, heading_m: 0.5 };
+    pub const DEFAULT: Self = Self { segment_m: SEGMENT_M, heading_m: HEADING_WEIGHT_M };
 
     const NAME: &'static str = "segments";
 
@@ -243,7 +241,8 @@ mod tests {
 
     /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns as `turn_rad` says, seen to within `error`.
     fn runs(count: u32, turn_rad: f64, straight_rad: f64, error: f64) -> Vec<PoseMeasurements<'static>> {
-        let geometry_parameters = GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
+        let geometry_parameters =
+            GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
         (0..count)
             .map(|run| {
                 let start = Pose::new(0.1, 0.2, f64::from(run));
@@ -260,7 +259,10 @@ mod tests {
                         // No pattern that the geometry parameters could follow, and the same every time.
                         let off = |k: f64| error * (12.9898 * f64::from(7 * run + leg) + 78.233 * k).sin();
                         let Pose { x_m, y_m, theta_rad } = dead_reckoned.pose;
-                        PoseMeasurement { wheel_rad, pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)) }
+                        PoseMeasurement {
+                            wheel_rad,
+                            pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)),
+                        }
                     })
                     .collect();
                 PoseMeasurements { run: "run", start, later }

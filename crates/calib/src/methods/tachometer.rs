@@ -10,25 +10,20 @@
 //! would be drawn towards zero by the rounding of the counts, which enters its regressor.
 
 use dataset::{NominalRobot, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{Side, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
+use crate::settings::{MAX_ROW_INTERVAL_RATIO, MIN_WHEEL_TURN_RAD};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tachometer;
-
-/// A wheel that turned by less says nothing: its end is interpolated between two rows.
-const SMALLEST_TURN_RAD: f64 = 1.0;
-
-/// Rows of the log may be this many reference intervals apart.
-const COARSEST_LOG: f64 = 2.0;
 
 impl Tachometer {
     /// The method as the table of contents offers it.
@@ -45,7 +40,7 @@ fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'s
     for samples in run.run().wheel_reference.windows(2) {
         let (from_s, to_s) = (samples[0].t_s, samples[1].t_s);
         let Some(steps) = track.steps(from_s, to_s) else { continue };
-        if longest_gap_s(rows_s, from_s, to_s) > COARSEST_LOG * (to_s - from_s) {
+        if longest_gap_s(rows_s, from_s, to_s) > MAX_ROW_INTERVAL_RATIO * (to_s - from_s) {
             return Err("its odometry has rows too far apart for the tachometer's samples; log more often");
         }
         for side in Side::BOTH {
@@ -56,7 +51,7 @@ fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'s
             }
         }
     }
-    if turned_rad.left.min(turned_rad.right) < SMALLEST_TURN_RAD {
+    if turned_rad.left.min(turned_rad.right) < MIN_WHEEL_TURN_RAD {
         return Err("a wheel turned by less than a radian while the tachometer measured");
     }
     Ok(travel_m.zip_with(turned_rad, |travel_m, turned_rad| travel_m / turned_rad))

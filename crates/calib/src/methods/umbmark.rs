@@ -11,8 +11,8 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dataset::{Protocol, Session};
-use motion_programs::Schedule;
 use kinematics::{Pose, Rule, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
@@ -74,20 +74,24 @@ impl Method for Umbmark {
         let mut side_m = None;
         for session in sessions {
             for run in &session.runs {
-                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol)) else {
+                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol))
+                else {
                     continue;
                 };
                 // Marks are read at standstills, before and after the whole log; poses from the first measurement to the last, and what lies outside was not seen.
                 let by_marks = run.run().truth.is_empty();
                 let ends = if by_marks { None } else { ConvergenceCriterion::of(run, session.robot, &geometry) };
-                let observed = if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
+                let observed =
+                    if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
                 let Some((world_from_start, world_from_end)) = observed else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
                 // Settings, not measurements: compared exactly.
                 if *side_m.get_or_insert(run_side_m) != run_side_m {
-                    return Err(Self::not_applicable("its squares must all have the same side_m; calibrate them apart"));
+                    return Err(Self::not_applicable(
+                        "its squares must all have the same side_m; calibrate them apart",
+                    ));
                 }
                 // In the start's frame the odometry starts at the origin and the first leg points along +x.
                 let seen = world_from_start.to(world_from_end);
@@ -153,9 +157,10 @@ fn corner_errors(form: Form, side_m: f64, cw: Direction, ccw: Direction) -> Corn
         Form::Y => (cw.y_m, ccw.y_m, -1.0),
     };
     let four = -4.0 * side_m;
-    let variances = cw.mean_variance().zip(ccw.mean_variance()).map(|(cw_var, ccw_var)| {
-        ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four))
-    });
+    let variances = cw
+        .mean_variance()
+        .zip(ccw.mean_variance())
+        .map(|(cw_var, ccw_var)| ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four)));
     CornerErrors {
         alpha_rad: (cw.mean + sign * ccw.mean) / four,
         beta_rad: (cw.mean - sign * ccw.mean) / four,

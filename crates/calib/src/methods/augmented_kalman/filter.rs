@@ -8,7 +8,8 @@ use kinematics::{Count, DriveGeometry, GeometryError, OdometryCovariance, Pose, 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 use super::noise::{Expected, HEADING, NoiseFilter, POSITION, Variances, WHEELS};
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
+use crate::settings::{SETTLED_FACTOR_SIGMA, SETTLED_MOVE_SIGMA};
 
 /// When the factors count as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +21,8 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// A part in five hundred, which is 0.7° a turn; four standard deviations, which chance alone exceeds in one of 5000 constant robots.
-    pub const DEFAULT: Self = Self { factor_sigma: 2e-3, moved_sigmas: 4.0 };
+    /// What the method uses.
+    pub const DEFAULT: Self = Self { factor_sigma: SETTLED_FACTOR_SIGMA, moved_sigmas: SETTLED_MOVE_SIGMA };
 }
 
 /// The factors at an earlier look.
@@ -207,8 +208,11 @@ impl<C: Count> AugmentedFilter<C> {
         self.measurements += 1;
         if self.measurements >= 2 * self.next_half.measurements {
             self.half = self.next_half;
-            self.next_half =
-                Checkpoint { measurements: self.measurements, factors: self.factors, covariance: self.factor_covariance() };
+            self.next_half = Checkpoint {
+                measurements: self.measurements,
+                factors: self.factors,
+                covariance: self.factor_covariance(),
+            };
         }
         Innovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
     }

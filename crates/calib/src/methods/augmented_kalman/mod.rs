@@ -12,20 +12,22 @@ mod filter;
 mod follow;
 mod noise;
 
-use std::f64::consts::PI;
-
 use dataset::Session;
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 pub use filter::{AugmentedFilter, Innovation, Settling};
 pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
+use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
-use crate::dead_reckoning_jacobian::unobservable;
+use crate::settings::{
+    FACTOR_PRIOR_SIGMA, HEADING_SIGMA_GUESS_RAD, MAX_PASSES, MAX_POSTERIOR_TO_PRIOR_SIGMA, MEASUREMENT_SPACING_M,
+    MEASUREMENT_SPACING_RAD, PASS_NOISE_TOLERANCE, PASS_TOLERANCE, POSITION_SIGMA_GUESS_M, WHEEL_SIGMA_GUESS,
+};
 
 /// The method with its beliefs before any data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,15 +46,6 @@ pub struct AugmentedKalman {
     pub look_every_rad: f64,
 }
 
-/// A pass that changes no factor by more than this share of its sigma, and no variance by more than twice this, is the last.
-const STAYS: f64 = 0.01;
-
-/// Passes before it is given up.
-const MAX_PASSES: u32 = 60;
-
-/// A factor whose sigma is still this share of what it was before any data is not observable.
-const HARDLY_BETTER: f64 = 0.3;
-
 /// One pass over all runs.
 #[derive(Debug, Clone)]
 struct Pass {
@@ -65,17 +58,23 @@ struct Pass {
 impl AugmentedKalman {
     /// The method as the table of contents offers it.
     pub const DEFAULT: Self = Self {
-        factor_sigma: 0.05,
-        wheel_sigma_m_per_sqrt_m: 1e-3,
-        truth_sigma_m: 1e-3,
-        truth_sigma_rad: 2e-3,
-        look_every_m: 1.0,
-        look_every_rad: PI,
+        factor_sigma: FACTOR_PRIOR_SIGMA,
+        wheel_sigma_m_per_sqrt_m: WHEEL_SIGMA_GUESS,
+        truth_sigma_m: POSITION_SIGMA_GUESS_M,
+        truth_sigma_rad: HEADING_SIGMA_GUESS_RAD,
+        look_every_m: MEASUREMENT_SPACING_M,
+        look_every_rad: MEASUREMENT_SPACING_RAD,
     };
 
     const NAME: &'static str = "augmented_kalman";
 
-    fn pass(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, factors: Vector3<f64>, noise: NoiseFilter) -> Pass {
+    fn pass(
+        &self,
+        runs: &[PoseMeasurements<'_>],
+        nominal: &DriveGeometry,
+        factors: Vector3<f64>,
+        noise: NoiseFilter,
+    ) -> Pass {
         let m_per_rad = nominal.m_per_rad();
         let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);
         let mut turned = Wheels::both(0.0);
@@ -123,14 +122,15 @@ impl AugmentedKalman {
         for _ in 0..MAX_PASSES {
             // The same variances from where the factors came to, before they are compared with others from there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
-            let moved =
-                (0..3).all(|i| (again.factors[i] - best.factors[i]).abs() <= STAYS * again.covariance[(i, i)].sqrt());
+            let moved = (0..3).all(|i| {
+                (again.factors[i] - best.factors[i]).abs() <= PASS_TOLERANCE * again.covariance[(i, i)].sqrt()
+            });
             best = again;
             if !moved {
                 continue;
             }
             let step = best.noise.step() * share;
-            if step.amax() <= 2.0 * STAYS {
+            if step.amax() <= PASS_NOISE_TOLERANCE {
                 return (best, true);
             }
             let variances = best.noise.variances().zip_map(&step, |variance, step| variance * step.exp());
@@ -193,7 +193,7 @@ impl AugmentedKalman {
         let eigen = covariance.symmetric_eigen();
         let vague = eigen.eigenvalues.imax();
         let left = eigen.eigenvalues[vague].max(0.0).sqrt() / self.factor_sigma;
-        if left <= HARDLY_BETTER {
+        if left <= MAX_POSTERIOR_TO_PRIOR_SIGMA {
             return Ok(());
         }
         let (parameter, missing) = unobservable(&eigen.eigenvectors.column(vague).into_owned());

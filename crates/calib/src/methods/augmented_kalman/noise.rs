@@ -7,6 +7,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::settings::{MAX_NOISE_FACTOR, MAX_NOISE_STEP, NOISE_PRIOR_MEASUREMENTS};
+
 /// Noise variances, of which there are three: the wheels' (m, variance of travel a metre), the instrument's position (m²) and heading (rad²).
 pub type Variances = Vector3<f64>;
 
@@ -16,12 +18,6 @@ pub(super) const WHEELS: usize = 0;
 pub(super) const POSITION: usize = 1;
 /// The instrument's heading is the third.
 pub(super) const HEADING: usize = 2;
-
-/// How many looks the first guess is worth.
-const GUESS_WORTH: f64 = 1.0;
-
-/// Variances stay within this factor of the first guess, which keeps them positive.
-const WIDEST: f64 = 1e6;
 
 /// What is believed of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +101,7 @@ impl NoiseFilter {
         loop {
             let (mut information, mut evidence) = (self.information, self.evidence);
             for i in 0..3 {
-                let prior = 0.5 * GUESS_WORTH / (self.guess[i] * self.guess[i]);
+                let prior = 0.5 * NOISE_PRIOR_MEASUREMENTS / (self.guess[i] * self.guess[i]);
                 information[(i, i)] += prior;
                 evidence[i] += prior * self.guess[i];
             }
@@ -122,7 +118,7 @@ impl NoiseFilter {
             }
             let Some(variances) = information.lu().solve(&evidence) else { return };
             let outside = |i: usize| {
-                let (least, most) = (self.guess[i] / WIDEST, self.guess[i] * WIDEST);
+                let (least, most) = (self.guess[i] / MAX_NOISE_FACTOR, self.guess[i] * MAX_NOISE_FACTOR);
                 (!held[i] && !(least..=most).contains(&variances[i])).then(|| variances[i].clamp(least, most))
             };
             let beyond: Vec<(usize, f64)> = (0..3).filter_map(|i| Some((i, outside(i)?))).collect();
@@ -141,7 +137,7 @@ impl NoiseFilter {
     pub(super) fn log_posterior(&self) -> f64 {
         let prior = (0..3).filter(|i| !self.known[*i]).map(|i| {
             let ratio = self.guess[i] / self.variances[i];
-            0.5 * GUESS_WORTH * (ratio.ln() - ratio)
+            0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio.ln() - ratio)
         });
         self.log_likelihood + prior.sum::<f64>()
     }
@@ -154,11 +150,11 @@ impl NoiseFilter {
                 information[(i, j)] = self.information[(i, j)] * self.variances[i] * self.variances[j];
             }
             let ratio = self.guess[i] / self.variances[i];
-            information[(i, i)] += 0.5 * GUESS_WORTH * ratio.max(1.0);
-            gradient[i] = self.gradient[i] * self.variances[i] + 0.5 * GUESS_WORTH * (ratio - 1.0);
+            information[(i, i)] += 0.5 * NOISE_PRIOR_MEASUREMENTS * ratio.max(1.0);
+            gradient[i] = self.gradient[i] * self.variances[i] + 0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio - 1.0);
         }
         let step = information.lu().solve(&gradient).unwrap_or_default();
-        step.map(|step| step.clamp(-2.0, 2.0))
+        step.map(|step| step.clamp(-MAX_NOISE_STEP, MAX_NOISE_STEP))
     }
 }
 
@@ -221,8 +217,10 @@ mod tests {
         let found = scored(&measurements, [false; 3]);
         assert!(relative(found.variances()) < 0.01, "{}", found.variances());
         // What must not pass: without the part that does not depend on the noise, and with two variances taken for each other.
-        let blind: Vec<_> =
-            measurements.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
+        let blind: Vec<_> = measurements
+            .iter()
+            .map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected }))
+            .collect();
         assert!(relative(scored(&blind, [false; 3]).variances()) > 0.05);
         let swapped = |expected: &Expected| Expected {
             slopes: [expected.slopes[0], expected.slopes[2], expected.slopes[1]],
@@ -279,7 +277,7 @@ mod tests {
             };
             let difference = (moved(h) - moved(-h)) / (2.0 * h);
             let ratio = guess().guess[i] / point[i];
-            let gradient = filter.gradient[i] * point[i] + 0.5 * GUESS_WORTH * (ratio - 1.0);
+            let gradient = filter.gradient[i] * point[i] + 0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio - 1.0);
             // 2400 measurements: third derivatives in the logarithm stay under a few thousand, truncation 1e-8 of it; rounding 1e-16·4e4/1e-4.
             assert!((gradient - difference).abs() < 1e-3, "{i}: {gradient} {difference}");
             assert!((gradient * 1.001 + 2e-3 - difference).abs() > 1e-3);
