@@ -78,7 +78,7 @@ pub struct FittedModel {
 
 impl FittedModel {
     fn of(extended: &AugmentedModel<'_>) -> Self {
-        Self { model: extended.fit.fit.model.clone(), candidates: extended.candidates.clone() }
+        Self { model: extended.fit.solution.model.clone(), candidates: extended.candidates.clone() }
     }
 
     /// Its terms, at the start of their lives.
@@ -94,7 +94,7 @@ const MAX_REJECTED: f64 = 0.2;
 const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 
 fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
-    let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
     fit.records.measurements() as f64 / runs.max(1) as f64
 }
 
@@ -206,7 +206,7 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Op
 /// The calibration with what was found in the model.
 fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
     let fit = &extended.fit;
-    let model = &fit.fit.model;
+    let model = &fit.solution.model;
     let not_physical =
         |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
     let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
@@ -219,8 +219,8 @@ fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Ca
             .as_ref()
             .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * estimates[i] * estimates[j])),
         not_observable: calib::methods::joint::not_observable(fit),
-        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
-        converged: fit.fit.converged,
+        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        converged: fit.solution.converged,
         ..Calibration::new("joint", geometry, datasets[0].robot.ticks_per_rev)
     })
 }

@@ -191,7 +191,7 @@ fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
     let segments = &fit.records.segments;
     let since: Vec<Vec<(f64, Wheels<f64>)>> = segments.iter().map(Segment::since_previous_measurement).collect();
     let at_ramp: Vec<Vec<bool>> = segments.iter().map(Segment::changes_of_speed).collect();
-    let m_per_rad = fit.fit.model.m_per_rad;
+    let m_per_rad = fit.solution.model.m_per_rad;
     // Of each measurement, with the measurement before that is taken: its own error, and where it is.
     let mut measurements: Vec<(Large, (usize, bool))> = Vec::new();
     let mut before = None;
@@ -278,7 +278,7 @@ fn seen(model: &AugmentedModel<'_>, fit: &ModelFit<'_>, large: &[Large]) -> Vec<
         let run = runs.iter().find(|run| run.run == large.run)?;
         let own: Vec<usize> = (0..COLUMNS).map(|column| first + number * COLUMNS + column).collect();
         let of_run = projection.of_columns(run, &own);
-        let separation_m = fit.fit.model.separation_m;
+        let separation_m = fit.solution.model.separation_m;
         // The gradient is the cost's.
         Some(Measured { large: large.clone(), separation_m, information: of_run.information, score: -of_run.gradient })
     };

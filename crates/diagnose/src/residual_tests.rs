@@ -135,7 +135,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
 
 /// The innovations of the first phase: phases share their measurements' errors.
 fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovation> {
-    let first = fit.fit.pass.innovations.first();
+    let first = fit.solution.pass.innovations.first();
     first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
 }
 
@@ -153,7 +153,7 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
         let z = (mean - 1.0) / (variance.max(2.0) / n).sqrt();
         add(Check::InnovationSize(name), mean, p_of_z(z));
     }
-    let runs: Vec<_> = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let runs: Vec<_> = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let (sum, count) = runs.iter().fold((0.0, 0.0), |(sum, count), run| (sum + run.chi_square, count + run.count));
     if runs.len() > 2 && count > 0.0 {
         let mean = sum / count;
@@ -246,8 +246,8 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
 /// difference of two measurements, a measurement that errs spoils the displacement to it and the one from it, and both together are right.
 fn outliers(fit: &ModelFit<'_>) -> Outliers {
     let mut found = Outliers { measurements: innovations(fit, 0).len(), ..Outliers::default() };
-    let far = &fit.fit.pass.outliers;
-    let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
+    let far = &fit.solution.pass.outliers;
+    let phase = fit.solution.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     let mut undone_by = None;
     for (position, &(segment, measurement)) in far.iter().enumerate() {
         if fit.records.segments[segment].is_displacement() {
@@ -461,7 +461,7 @@ mod tests {
             });
         }
         let fit = fitted(&dataset);
-        assert_eq!(fit.fit.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
+        assert_eq!(fit.solution.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
         let found = outliers(&fit);
         assert_eq!((found.isolated, found.staying), (1, 1));
     }

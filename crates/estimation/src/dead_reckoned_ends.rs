@@ -12,7 +12,7 @@ use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
 use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
-use crate::optimizer::Fit;
+use crate::optimizer::Solution;
 use crate::pass::pass;
 use crate::propagation::{CarriedState, Propagator};
 use crate::records::{MeasuredPose, Segment};
@@ -52,7 +52,7 @@ impl ModelFit<'_> {
             .flat_map(|block| {
                 let part: Vec<_> =
                     self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
-                let Fit { model, noise, free_headings, .. } = &self.fit;
+                let Solution { model, noise, free_headings, .. } = &self.solution;
                 let found = pass(&self.records, &part, model, noise, free_headings, terms, pass_options);
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
@@ -66,7 +66,7 @@ impl ModelFit<'_> {
         let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
         let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
         let runs = coarse.scan_parts(terms, &[]);
-        let both = runs.iter().zip(&self.fit.pass.runs);
+        let both = runs.iter().zip(&self.solution.pass.runs);
         let same_looks = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
@@ -80,15 +80,15 @@ impl ModelFit<'_> {
         let (mut measured, mut dead_reckoned) = (None, Pose::IDENTITY);
         for segment in self.records.segments.get(segments)?.iter().filter(|segment| segment.is_displacement()) {
             let (_, _, (_, end)) = segment.ends()?;
-            let extrinsics = self.fit.model.instrument(segment.run).body_from_sensor;
+            let extrinsics = self.solution.model.instrument(segment.run).body_from_sensor;
             let turned =
-                |pose: Pose, interval: &WheelInterval| pose * self.fit.model.increment(interval.wheel_rad).arc();
+                |pose: Pose, interval: &WheelInterval| pose * self.solution.model.increment(interval.wheel_rad).arc();
             let moved = segment.intervals.iter().fold(Pose::IDENTITY, turned);
             measured = Some(measured.unwrap_or(Pose::IDENTITY) * end);
             dead_reckoned = dead_reckoned * (extrinsics.inverse() * moved * extrinsics);
         }
         let off = dead_reckoned.to(measured?);
-        let [_, _, xy, theta] = self.fit.noise.variance;
+        let [_, _, xy, theta] = self.solution.noise.variance;
         let off_rad = wrap_to_pi(off.theta_rad);
         Some(((off.x_m * off.x_m + off.y_m * off.y_m) / xy + off_rad * off_rad / theta).sqrt())
     }

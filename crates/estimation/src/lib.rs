@@ -48,7 +48,7 @@ pub use normal_equations::{
     ClusterRobust, Information, NormalEquations, Projected, SchurComplement, free_basis, inverse, total,
 };
 pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
-pub use optimizer::{ConvergenceCriterion, Fit, FitOptions, fit, pass_with_innovations};
+pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
 pub use pass::Pass;
 pub use records::{Records, Segment};
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};

@@ -11,7 +11,7 @@ use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
-use crate::optimizer::{ConvergenceCriterion, Fit, FitOptions, From, fit_from};
+use crate::optimizer::{ConvergenceCriterion, FitOptions, From, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::records::{Records, Segment};
 use crate::settings::{
@@ -33,8 +33,8 @@ pub struct ModelFit<'a> {
     pub nominal: Model,
     /// Where fits start: the nominal drive with its instrument turned as it seems to be.
     pub(crate) start: Model,
-    /// The fit.
-    pub fit: Fit,
+    /// The values found, with the pass at them.
+    pub solution: Solution,
     /// The free columns.
     pub columns: Vec<Column>,
     /// Directions of the three geometry parameters that the data do not determine, and that stay nominal: rows left, right, separation.
@@ -63,7 +63,7 @@ impl<'a> ModelFit<'a> {
         Self {
             selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
             thinning: Thinning::NONE,
-            fit: Fit::nothing(&nominal, &prior),
+            solution: Solution::nothing(&nominal, &prior),
             columns: Column::GEOMETRY.to_vec(),
             unobservable: Vec::new(),
             records: Arc::new(records),
@@ -81,8 +81,9 @@ impl<'a> ModelFit<'a> {
 impl ModelFit<'_> {
     /// The values found, with records that hold no measurements.
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
-        let Self { thinning, nominal, start, fit, columns, unobservable, prior, ends, parts, .. } = self;
-        let fit = Fit { pass: Pass { innovations: Vec::new(), outliers: Vec::new(), ..fit.pass }, ..fit };
+        let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
+        let pass = Pass { innovations: Vec::new(), outliers: Vec::new(), ..solution.pass };
+        let solution = Solution { pass, ..solution };
         let (displacements_follow, ungated) = (self.displacements_follow, self.ungated);
         ModelFit {
             records: Arc::new(records),
@@ -90,7 +91,7 @@ impl ModelFit<'_> {
             thinning,
             nominal,
             start,
-            fit,
+            solution,
             columns,
             unobservable,
             prior,
@@ -122,7 +123,7 @@ impl ModelFit<'_> {
         let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
         let Self { ends, ungated, .. } = *self;
         let options = FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) };
-        self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
         Ok(())
     }
 
@@ -140,7 +141,7 @@ impl ModelFit<'_> {
     }
 
     pub(crate) fn here(&self) -> From {
-        let Fit { model, noise, free_headings, .. } = &self.fit;
+        let Solution { model, noise, free_headings, .. } = &self.solution;
         From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }
 
@@ -181,7 +182,7 @@ impl ModelFit<'_> {
         (0..3)
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
-                for phase in &self.fit.pass.innovations {
+                for phase in &self.solution.pass.innovations {
                     let series: Vec<_> = phase.iter().filter(|innovation| innovation.component == component).collect();
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
@@ -210,24 +211,24 @@ impl ModelFit<'_> {
             let (sum, count) = times.fold((0, 0), |(sum, count), times| (sum + times, count + 1));
             sum as f64 / f64::max(f64::from(count), 1.0)
         } else {
-            self.fit.pass.innovations.len() as f64
+            self.solution.pass.innovations.len() as f64
         }
     }
 
     /// The normal equation in units that can be held out: runs, or blocks where runs are few.
     pub(crate) fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
-        if self.fit.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {
-            return self.fit.pass.runs.clone();
+        if self.solution.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {
+            return self.solution.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.solution.pass.runs.len().max(1)))
     }
 
     /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
-        let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
+        let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
         let held_before = !self.unobservable.is_empty();
         self.unobservable = unobservable(&information.matrix);
         if self.unobservable.is_empty() {
@@ -236,7 +237,7 @@ impl ModelFit<'_> {
         }
         // Back along what is not seen; what is seen stays as it was found.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
-        let mut model = self.fit.model.clone();
+        let mut model = self.solution.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
         let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));
         for direction in &self.unobservable {
@@ -255,9 +256,9 @@ impl ModelFit<'_> {
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         // Terms that are in the fit come first and keep their sizes.
-        let mut model = self.fit.model.clone();
+        let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
-        let Fit { noise, free_headings, .. } = &self.fit;
+        let Solution { noise, free_headings, .. } = &self.solution;
         let pass_options = PassOptions { innovations: true, gate: self.gate(), ..PassOptions::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
     }
@@ -298,9 +299,9 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        let mut model = self.fit.model.clone();
+        let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
-        let Fit { noise, free_headings, .. } = &self.fit;
+        let Solution { noise, free_headings, .. } = &self.solution;
         let pass_options = PassOptions { parts, gate: self.gate(), ..PassOptions::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
@@ -339,7 +340,7 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
-        let (_, inverse) = self.fit.information(&self.columns)?.along(&free).solve()?;
+        let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
         let units = self.units(terms);
         let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
         if units.len() < enough {

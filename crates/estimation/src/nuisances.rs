@@ -8,7 +8,7 @@ use crate::filter::OutlierGate;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
 use crate::model_fit::ModelFit;
 use crate::normal_equations::{NormalEquations, total};
-use crate::optimizer::Fit;
+use crate::optimizer::Solution;
 use crate::settings::{BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT};
 use crate::thinning::Thinning;
 
@@ -67,7 +67,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         &[Column::Latency],
         &[Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency],
     ];
-    let several = fit.fit.pass.runs.iter().any(|run| run.run.0 != fit.fit.pass.runs[0].run.0);
+    let several = fit.solution.pass.runs.iter().any(|run| run.run.0 != fit.solution.pass.runs[0].run.0);
     let mut groupings = vec![None];
     // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
     if gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white()) {
@@ -130,19 +130,19 @@ pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,
 ) -> Result<Explained<ModelFit<'a>>, EstimationError> {
-    if (fit.is_white() || !thin) && fit.fit.pass.outliers.is_empty() {
+    if (fit.is_white() || !thin) && fit.solution.pass.outliers.is_empty() {
         return Ok(Explained::NotTried);
     }
     let mut explained = fit.clone();
     add_nuisances(&mut explained, OutlierGate::Off)?;
-    if explained.columns == fit.columns && explained.fit.model.own.is_none() {
+    if explained.columns == fit.columns && explained.solution.model.own.is_none() {
         return Ok(Explained::NotTried);
     }
     let mut plain = fit.clone();
     if thin {
         plain.thin()?;
     }
-    let far = |found: &ModelFit<'_>| found.fit.pass.outliers.len();
+    let far = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
     let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * far(&explained) < far(&plain);
     let is_better = uses_more && !(thin && explained.is_to_be_thinned());
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
@@ -155,9 +155,9 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
     for fold in 0..FOLDS.min(units.len()) {
         let mut others: Vec<NormalEquations> =
             units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.equations.clone()).collect();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.fit.model));
+        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.solution.model));
         let (step, _) = total(&others)?.of(columns).solve()?;
-        let mut common = fit.fit.model.clone();
+        let mut common = fit.solution.model.clone();
         columns.iter().zip(step.iter()).for_each(|(column, by)| common.advance(*column, *by));
         for (k, unit) in units.iter().enumerate().filter(|(_, unit)| unit.fold == fold) {
             let NormalEquations { run, .. } = unit.equations;
@@ -183,7 +183,7 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
 
 /// Evidence to be held out, so that a group is not held out as a whole.
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
-    let runs = fit.fit.pass.runs.len().max(1);
+    let runs = fit.solution.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
         (Some(Grouping::Run), gate) => fit.blocks(&mut [], BLOCKS_PER_RUN, gate),
         (_, OutlierGate::On) => fit.units(&mut []),
@@ -213,13 +213,14 @@ fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -
 impl ModelFit<'_> {
     /// Is a column of the instrument in the model, for all or for groups?
     pub fn has(&self, column: Column) -> bool {
-        self.columns.contains(&column) || self.fit.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
+        self.columns.contains(&column)
+            || self.solution.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
     }
 
     /// The instrument that all share, or the mean of those that groups show to have.
     pub fn mean_instrument(&self) -> Instrument {
-        let common = self.fit.model.common_instrument();
-        let Some(own) = &self.fit.model.own else { return common };
+        let common = self.solution.model.common_instrument();
+        let Some(own) = &self.solution.model.own else { return common };
         let mean = |column: Column, common: f64, of: fn(&Instrument) -> f64| {
             let shown: Vec<f64> = own
                 .of
@@ -243,7 +244,7 @@ impl ModelFit<'_> {
     /// Does a group's data show a column of its own?
     #[must_use]
     pub fn shows(&self, group: (usize, usize), column: Column) -> bool {
-        let Fit { model, pass, .. } = &self.fit;
+        let Solution { model, pass, .. } = &self.solution;
         let follow = pass.own.iter().find(|follow| follow.group == group);
         model.own.as_ref().zip(follow).is_some_and(|(own, follow)| own.is_shown(follow, column))
     }

@@ -124,7 +124,7 @@ pub fn fit_large(
         let GatheredParts { parts, measurements } = found.gather(datasets, part_blocks, &mut notice)?;
         let is_near = found.step_over(parts)?;
         if is_near || passes == MAX_SCORING_STEPS {
-            found.fit.converged &= is_near;
+            found.solution.converged &= is_near;
             return Ok(LargeFit {
                 fit: found,
                 one_step: OneStep { measurements, first_measurements, passes },
@@ -183,7 +183,7 @@ impl ModelFit<'_> {
         part_blocks: usize,
         notice: &mut impl FnMut(usize, &Warning),
     ) -> Result<GatheredParts, OneStepError> {
-        let runs_stand_apart = self.fit.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
+        let runs_stand_apart = self.solution.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
@@ -231,7 +231,7 @@ impl ModelFit<'_> {
             }
         }
         Arc::make_mut(&mut self.records).unused = unused;
-        if let Some(own) = &mut self.fit.model.own {
+        if let Some(own) = &mut self.solution.model.own {
             let found = part_equations
                 .iter()
                 .filter_map(|part| Some((own.grouping.group(run_of(&parts[part.number])), part.own?)));
@@ -257,7 +257,7 @@ impl ModelFit<'_> {
             return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);
-        let (mut model, noise) = (self.fit.model.clone(), &self.fit.noise);
+        let (mut model, noise) = (self.solution.model.clone(), &self.solution.noise);
         let stands_apart = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         if stands_apart {
             model = pass_settled(&records, &selections, model, noise)?.0;
@@ -273,8 +273,8 @@ impl ModelFit<'_> {
 
     /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
     fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
-        let own = self.fit.model.own.clone();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.fit.model));
+        let own = self.solution.model.own.clone();
+        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));
         let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };
         let information = sum.of(&self.columns);
         self.unobservable = unobservable(&information.matrix);
@@ -285,19 +285,21 @@ impl ModelFit<'_> {
         let mut is_near = true;
         for (row, column) in self.columns.iter().enumerate() {
             moved[column.index()] = step[row];
-            self.fit.model.advance(*column, step[row]);
+            self.solution.model.advance(*column, step[row]);
             let bends = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
             is_near &= !bends || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
         }
-        follows.iter().for_each(|follow| self.fit.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
+        follows
+            .iter()
+            .for_each(|follow| self.solution.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
         // To first order the scores are those at the new values.
         for part in &mut parts {
             let by = &part.information * &moved;
             part.chi_square += 2.0 * part.gradient.dot(&moved) + by.dot(&moved);
             part.gradient += by;
         }
-        self.fit.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
-        self.fit.pass.own = follows;
+        self.solution.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
+        self.solution.pass.own = follows;
         self.parts = parts;
         Ok(is_near)
     }

@@ -63,9 +63,9 @@ impl FitOptions {
     }
 }
 
-/// A fitted model.
+/// What the optimizer found: the values of mean and noise, and the pass at them.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub struct Solution {
     /// The mean parameters.
     pub model: Model,
     /// The noise.
@@ -80,7 +80,7 @@ pub struct Fit {
     pub left_basin: bool,
 }
 
-impl Fit {
+impl Solution {
     /// Before anything is fitted.
     pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
         let pass = Pass::nothing();
@@ -120,7 +120,7 @@ pub fn fit(
     stated: dataset::TruthNoise,
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
-) -> Result<Fit, EstimationError> {
+) -> Result<Solution, EstimationError> {
     let from = From { model: nominal.clone(), noise: None, free_headings: None };
     fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
 }
@@ -132,7 +132,7 @@ pub(crate) fn fit_from(
     prior: &NoisePrior,
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
-) -> Result<Fit, EstimationError> {
+) -> Result<Solution, EstimationError> {
     if selections.iter().all(|selection| selection.propagations.iter().all(Vec::is_empty)) {
         return Err(EstimationError::NoMeasurements);
     }
@@ -219,7 +219,7 @@ pub(crate) fn fit_from(
     let pass_options =
         PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
-    Ok(Fit { model, noise, free_headings: headings, pass, converged, left_basin })
+    Ok(Solution { model, noise, free_headings: headings, pass, converged, left_basin })
 }
 
 /// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for

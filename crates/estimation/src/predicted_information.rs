@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::noise::Noise;
-use crate::optimizer::{ConvergenceCriterion, Fit, start_heading};
+use crate::optimizer::{ConvergenceCriterion, Solution, start_heading};
 use crate::pass::Pass;
 use crate::settings::NOISE_STEP_TOLERANCE;
 use crate::thinning::Selection;
@@ -25,8 +25,9 @@ impl<'a> ModelFit<'a> {
             false,
         );
         let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
-        let reused = Fit { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
-        Self { fit: reused, ..fit }
+        let reused =
+            Solution { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
+        Self { solution: reused, ..fit }
     }
 }
 
@@ -34,9 +35,12 @@ impl ModelFit<'_> {
     /// The same model on records of other runs, its further terms without size: their measurements are taken as this fit takes its own.
     #[must_use]
     pub fn on_planned_runs<'b>(&self, sessions: &[Session<'b>]) -> ModelFit<'b> {
-        let model =
-            Model { term_values: vec![0.0; self.fit.model.term_values.len()], own: None, ..self.fit.model.clone() };
-        let mut foreseen = ModelFit::from_parameters(model, self.fit.noise, sessions);
+        let model = Model {
+            term_values: vec![0.0; self.solution.model.term_values.len()],
+            own: None,
+            ..self.solution.model.clone()
+        };
+        let mut foreseen = ModelFit::from_parameters(model, self.solution.noise, sessions);
         foreseen.selections = Selection::of(&foreseen.records, self.thinning, &self.nominal).into();
         foreseen.thinning = self.thinning;
         foreseen.nominal = self.nominal.clone();
@@ -49,7 +53,7 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn end_variances(&self) -> Vec<Vector3<f64>> {
         let Some(selection) = self.selections.first() else { return Vec::new() };
-        let [wheel, turn, xy, theta] = self.fit.noise.variance;
+        let [wheel, turn, xy, theta] = self.solution.noise.variance;
         let measurements = Vector3::new(xy, xy, theta);
         selection
             .propagations

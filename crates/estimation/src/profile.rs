@@ -19,7 +19,7 @@ impl ModelFit<'_> {
     /// [`EstimationError`] when the column is not free, or a refit diverges.
     pub fn profile(&self, column: Column, rise: f64) -> Result<(f64, f64), EstimationError> {
         let position = self.columns.iter().position(|of| *of == column);
-        let sigma = position.zip(self.fit.information(&self.columns)).and_then(|(position, information)| {
+        let sigma = position.zip(self.solution.information(&self.columns)).and_then(|(position, information)| {
             let (_, covariance) = information.solve()?;
             Some(covariance[(position, position)].sqrt())
         });
@@ -34,7 +34,7 @@ impl ModelFit<'_> {
     }
 
     fn cost(&self) -> f64 {
-        self.fit.pass.runs.iter().map(NormalEquations::cost).sum()
+        self.solution.pass.runs.iter().map(NormalEquations::cost).sum()
     }
 
     /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the parabola through the last step.

@@ -478,7 +478,7 @@ fn rows_of_one_speed_taken_together_say_what_they_say_one_by_one() {
     let finer = logged_finer(&dataset(true), 10);
     let session = [finer.session()];
     let mut fit = ModelFit::from_parameters(MODEL, NOISE, &session);
-    fit.fit.pass = fit.scan(&mut []);
+    fit.solution.pass = fit.scan(&mut []);
     let coarse = fit.decimated(&mut [], 0.5).expect("a fifth of the pieces");
     let intervals =
         |fit: &ModelFit<'_>| fit.records.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>();
@@ -497,7 +497,7 @@ fn rows_of_one_speed_taken_together_say_what_they_say_one_by_one() {
     assert!(fit.decimated(&mut [], 0.15).is_none(), "nothing to put together");
     // A fit with what goes by single rows is another one by longer ones.
     let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(OfRows)];
-    fit.fit.model.term_values = vec![0.01];
-    fit.fit.pass = fit.scan(&mut by_rows);
+    fit.solution.model.term_values = vec![0.01];
+    fit.solution.pass = fit.scan(&mut by_rows);
     assert!(fit.decimated(&mut by_rows, 0.5).is_none());
 }

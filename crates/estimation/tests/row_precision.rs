@@ -56,9 +56,9 @@ fn dataset(error_m: impl Fn(usize) -> f64, sigma_m: impl Fn(usize) -> Option<f64
 /// Left diameter over nominal, and its standard deviation.
 fn left(dataset: &Dataset) -> (f64, f64) {
     let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
-    let information = fit.fit.information(&fit.columns).expect("runs");
+    let information = fit.solution.information(&fit.columns).expect("runs");
     let (_, covariance) = information.solve().expect("determined");
-    (fit.fit.model.m_per_rad.left / RADIUS_M, covariance[(0, 0)].sqrt())
+    (fit.solution.model.m_per_rad.left / RADIUS_M, covariance[(0, 0)].sqrt())
 }
 
 #[test]

@@ -91,7 +91,7 @@ impl Method for Joint {
 
 /// The fit as a calibration of sessions with these names.
 fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
-    let Model { m_per_rad, separation_m, .. } = fit.fit.model;
+    let Model { m_per_rad, separation_m, .. } = fit.solution.model;
     let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
     let covariance = fit.covariance(&mut []);
     let diameter_m = geometry.wheel_diameter_m();
@@ -114,9 +114,9 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
         not_observable: not_observable(fit),
-        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         runs_rejected: rejected(fit),
-        converged: fit.fit.converged,
+        converged: fit.solution.converged,
         ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
     })
 }
@@ -140,7 +140,7 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
         run: id(*run),
         why: "it has no wheels, or fewer than two measurements of the instrument within its log".to_owned(),
     });
-    let far = fit.fit.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
+    let far = fit.solution.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
         run: id(run.run),
         why: "what the instrument measured lies far outside of what wheels and noise explain".to_owned(),
     });
@@ -149,7 +149,7 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
 
 /// The instruments of groups, by the sessions' names.
 fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
-    let Some(own) = &fit.fit.model.own else { return Vec::new() };
+    let Some(own) = &fit.solution.model.own else { return Vec::new() };
     let name = |(session, run): (usize, usize)| {
         let session_name = names[session].to_owned();
         match own.grouping {
