@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use crate::support::{real_data, succeed};
+use crate::support::real_data::real_data;
+use crate::support::succeed;
 use calib::methods::joint::Joint;
 use calib::{Calibration, Method, Parameter, compare};
 use dataset::import::importer;

@@ -6,7 +6,7 @@ use motion_programs::Schedule;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
-use estimation::{EstimationError, OneStep};
+use estimation::{EstimationError, OneStep, WrappedCounter};
 
 use crate::settings::{MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO};
 
@@ -255,17 +255,8 @@ pub enum CalibError {
         why: String,
     },
     /// The counters wrap and nobody said at how many bits.
-    #[error(
-        "run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml"
-    )]
-    CounterWraps {
-        /// The run.
-        run: String,
-        /// `left` or `right`.
-        side: &'static str,
-        /// The width that the jumps show.
-        bits: u8,
-    },
+    #[error(transparent)]
+    CounterWraps(WrappedCounter),
     /// The estimate is no drive.
     #[error("{method}: the estimate is not a drive: {source}")]
     NotADrive {
@@ -281,7 +272,7 @@ impl CalibError {
     pub(crate) fn of_fit(method: &'static str, error: EstimationError) -> Self {
         match error {
             EstimationError::NotADrive(source) => Self::NotADrive { method, source },
-            EstimationError::CounterWraps { run, side, bits } => Self::CounterWraps { run, side, bits },
+            EstimationError::CounterWraps(wrapped) => Self::CounterWraps(wrapped),
             other => Self::NotApplicable { method, why: other.to_string() },
         }
     }
@@ -315,6 +306,11 @@ pub(crate) fn nominal(
     };
     let geometry = first.robot.geometry().map_err(|source| CalibError::NotADrive { method, source })?;
     Ok((*first.robot, geometry))
+}
+
+/// Covariance of diameters and separation (m²) from that of their relative changes, which it is given by row and column.
+pub(crate) fn covariance_of_lengths(relative: impl Fn(usize, usize) -> f64, lengths_m: [f64; 3]) -> Covariance {
+    Covariance::from_fn(3, 3, |row, column| relative(row, column) * lengths_m[row] * lengths_m[column])
 }
 
 /// A drive from its estimated lengths.

@@ -1,11 +1,10 @@
 //! The order of work.
 
+use calib::methods::joint::calibrated_drive;
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
 use estimation::{EstimationError, FitSettings, ModelFit};
-use kinematics::DriveGeometry;
-use nalgebra::DMatrix;
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
@@ -205,22 +204,6 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Op
 
 /// The calibration with what was found in the model.
 fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
-    let fit = &extended.fit;
-    let model = &fit.solution.model;
-    let not_physical =
-        |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
-    let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
-        .map_err(not_physical)?;
-    let diameter_m = geometry.wheel_diameter_m();
-    let estimates = [diameter_m.left, diameter_m.right, model.separation_m];
-    let covariance = fit.covariance(&mut crate::candidate::terms(&extended.candidates));
-    Ok(Calibration {
-        covariance: covariance
-            .as_ref()
-            .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * estimates[i] * estimates[j])),
-        not_observable: calib::methods::joint::not_observable(fit),
-        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
-        converged: fit.solution.converged,
-        ..Calibration::new("joint", geometry, datasets[0].robot.ticks_per_rev)
-    })
+    let covariance = extended.fit.covariance(&mut crate::candidate::terms(&extended.candidates));
+    calibrated_drive(&extended.fit, covariance.as_ref(), datasets[0].robot.ticks_per_rev)
 }

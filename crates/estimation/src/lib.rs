@@ -38,7 +38,7 @@ mod thinning;
 mod wheel_angles;
 
 pub use dead_reckoned_ends::EndError;
-pub use error::{EstimationError, refuse_wrapped_counters};
+pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
 pub use filter::{Innovation, OutlierGate};
 pub use maximum_likelihood::FitSettings;
 pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};

@@ -15,7 +15,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, Rejected, drive, nominal,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, Rejected,
+    covariance_of_lengths, drive, nominal,
 };
 
 /// The method with the settings of its fit.
@@ -89,13 +90,32 @@ impl Method for Joint {
     }
 }
 
-/// The fit as a calibration of sessions with these names.
-fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
+/// The drive of a fit, with what the measurements do not determine of it; `covariance` is [`ModelFit::covariance`].
+///
+/// # Errors
+/// [`CalibError::NotADrive`] where the values of the fit are none.
+pub fn calibrated_drive(
+    fit: &ModelFit<'_>,
+    covariance: Option<&Covariance>,
+    ticks_per_rev: Option<f64>,
+) -> Result<Calibration, CalibError> {
     let Model { m_per_rad, separation_m, .. } = fit.solution.model;
     let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
-    let covariance = fit.covariance(&mut []);
     let diameter_m = geometry.wheel_diameter_m();
-    let sizes = [diameter_m.left, diameter_m.right, separation_m];
+    let lengths_m = [diameter_m.left, diameter_m.right, separation_m];
+    Ok(Calibration {
+        covariance: covariance
+            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m)),
+        not_observable: not_observable(fit),
+        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        converged: fit.solution.converged,
+        ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
+    })
+}
+
+/// The fit as a calibration of sessions with these names.
+fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
+    let covariance = fit.covariance(&mut []);
     let at = |column: Column| fit.columns.iter().position(|of| *of == column);
     let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
     let instrument = fit.mean_instrument();
@@ -107,23 +127,16 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
     });
     let latency_sigma_s = at(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
     Ok(Calibration {
-        covariance: covariance
-            .as_ref()
-            .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
         extrinsics,
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
-        not_observable: not_observable(fit),
-        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         runs_rejected: rejected(fit),
-        converged: fit.solution.converged,
-        ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
+        ..calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?
     })
 }
 
 /// What the measurements do not determine of the geometry.
-#[must_use]
-pub fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
+fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
     fit.unobservable
         .iter()
         .map(|direction| {

@@ -14,7 +14,7 @@ use motion_programs::Schedule;
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
 use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters, unobservable};
-use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{HEADING_WEIGHT_M, MIN_SENSITIVITY, SEGMENT_M};
 
@@ -213,11 +213,9 @@ impl Method for Segments {
         let normal: Matrix3<f64> = shares.iter().map(|share| share.normal).sum();
         observable(&normal)?;
 
-        let to_lengths = Matrix3::from_diagonal(&nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)));
-        let covariance = covariance(&shares, &normal).map(|covariance| {
-            let covariance = to_lengths * covariance * to_lengths;
-            Covariance::from_column_slice(3, 3, covariance.as_slice())
-        });
+        let lengths_m = nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)).into();
+        let covariance = covariance(&shares, &normal)
+            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m));
         let GeometryParameters { m_per_rad, separation_m } = errors.geometry_parameters();
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
         Ok(Calibration {

@@ -22,7 +22,7 @@ pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{
     FACTOR_PRIOR_SIGMA, HEADING_SIGMA_GUESS_RAD, MAX_PASSES, MAX_POSTERIOR_TO_PRIOR_SIGMA, MEASUREMENT_SPACING_M,
@@ -174,11 +174,9 @@ impl Method for AugmentedKalman {
             geometry.wheel_diameter_m().zip_with(Wheels { left, right }, |nominal_m, factor| nominal_m * factor);
         let found = drive(Self::NAME, diameter_m, geometry.wheel_separation_m() * separation)?;
         let nominal_m = geometry.wheel_diameter_m();
-        let scale =
-            Matrix3::from_diagonal(&Vector3::new(nominal_m.left, nominal_m.right, geometry.wheel_separation_m()));
-        let covariance = scale * pass.covariance * scale;
+        let lengths_m = [nominal_m.left, nominal_m.right, geometry.wheel_separation_m()];
         Ok(Calibration {
-            covariance: Some(Covariance::from_column_slice(3, 3, covariance.as_slice())),
+            covariance: Some(covariance_of_lengths(|row, column| pass.covariance[(row, column)], lengths_m)),
             runs_used: runs.len(),
             runs_rejected,
             converged: stays && pass.stopped,
