@@ -99,14 +99,14 @@ mod tests {
     use super::*;
     use kinematics::DriveGeometry;
 
-    const LENGTHS: GeometryParameters =
+    const GEOMETRY: GeometryParameters =
         GeometryParameters { m_per_rad: Wheels { left: 0.0811, right: 0.0797 }, separation_m: 0.363 };
 
     /// Straights, arcs, spins and standing, forward and backward; 20 rad of turn of a wheel and 2 m in all.
     const PATH: [(f64, f64); 8] =
         [(3.0, 3.0), (0.0, 0.0), (-2.0, 2.5), (4.0, 3.0), (-3.0, -1.0), (1e-7, 0.0), (5.0, 5.01), (-1.0, 3.0)];
 
-    fn reckon(geometry_parameters: &GeometryParameters, steps: &[(f64, f64)]) -> DeadReckoned {
+    fn dead_reckon(geometry_parameters: &GeometryParameters, steps: &[(f64, f64)]) -> DeadReckoned {
         let mut dead_reckoned = DeadReckoned::at(Pose::new(0.3, -0.2, 0.7));
         for &(left, right) in steps {
             dead_reckoned.advance(geometry_parameters, Wheels { left, right });
@@ -118,16 +118,16 @@ mod tests {
     fn the_jacobian_is_the_derivative_and_would_not_pass_wrong() {
         let h = 1e-6;
         for end in 1..=PATH.len() {
-            let dead_reckoned = reckon(&LENGTHS, &PATH[..end]);
+            let dead_reckoned = dead_reckon(&GEOMETRY, &PATH[..end]);
             for column in 0..3 {
                 let moved = |by: f64| {
-                    let mut geometry_parameters = LENGTHS;
+                    let mut geometry_parameters = GEOMETRY;
                     *[
                         &mut geometry_parameters.m_per_rad.left,
                         &mut geometry_parameters.m_per_rad.right,
                         &mut geometry_parameters.separation_m,
                     ][column] += by;
-                    let Pose { x_m, y_m, theta_rad } = reckon(&geometry_parameters, &PATH[..end]).pose;
+                    let Pose { x_m, y_m, theta_rad } = dead_reckon(&geometry_parameters, &PATH[..end]).pose;
                     [x_m, y_m, theta_rad]
                 };
                 let (plus, minus) = (moved(h), moved(-h));
@@ -145,12 +145,12 @@ mod tests {
 
     #[test]
     fn poses_are_those_of_exact_arcs() {
-        let diameter_m = LENGTHS.m_per_rad.map(|radius_m| 2.0 * radius_m);
-        let geometry = DriveGeometry::new(diameter_m, LENGTHS.separation_m).expect("valid");
+        let diameter_m = GEOMETRY.m_per_rad.map(|radius_m| 2.0 * radius_m);
+        let geometry = DriveGeometry::new(diameter_m, GEOMETRY.separation_m).expect("valid");
         let product = PATH.iter().fold(Pose::new(0.3, -0.2, 0.7), |pose, &(left, right)| {
             pose * geometry.increment(Wheels { left: 0.0811 * left, right: 0.0797 * right }).arc()
         });
-        let dead_reckoned = reckon(&LENGTHS, &PATH).pose;
+        let dead_reckoned = dead_reckon(&GEOMETRY, &PATH).pose;
         // Eight steps of half a metre at most: a few roundings each.
         assert!(dead_reckoned.position().distance_m(product.position()) < 1e-14);
         assert!((dead_reckoned.theta_rad - product.theta_rad).abs() < 1e-14);

@@ -141,9 +141,9 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     for (t_s, world_from_sensor) in &observed {
         let Some(dead_reckoned) = at(&log, *t_s, &mut row) else { continue };
         let dead_reckoned = if identity { dead_reckoned } else { moved * dead_reckoned };
-        let seen = *world_from_sensor * body_from_sensor.inverse();
-        let position_m = dead_reckoned.position().distance_m(seen.position());
-        let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - seen.theta_rad).abs();
+        let measured = *world_from_sensor * body_from_sensor.inverse();
+        let position_m = dead_reckoned.position().distance_m(measured.position());
+        let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - measured.theta_rad).abs();
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
         largest = Some((position_m.max(max_position_m), heading_rad.max(max_heading_rad)));
         last = Some((position_m, heading_rad));

@@ -58,7 +58,7 @@ impl<'a> PoseMeasurements<'a> {
         let (mut from_s, start) = poses[begins];
         let (mut last_s, mut theta_rad) = (from_s, start.theta_rad);
         let (mut distance_m, mut turn_rad, mut later) = (0.0, 0.0, Vec::new());
-        for (number, &(t_s, seen)) in poses[begins..begins + within].iter().enumerate().skip(1) {
+        for (number, &(t_s, measured)) in poses[begins..begins + within].iter().enumerate().skip(1) {
             let mut turned_rad = 0.0;
             for rad in track.steps(last_s, t_s)? {
                 let step = nominal.increment(nominal.m_per_rad().zip_with(rad, |m_per_rad, rad| m_per_rad * rad));
@@ -68,9 +68,12 @@ impl<'a> PoseMeasurements<'a> {
             }
             last_s = t_s;
             // Whole turns come from the wheels, a pose at a time.
-            theta_rad = unwrap_near(seen.theta_rad, theta_rad + turned_rad);
+            theta_rad = unwrap_near(measured.theta_rad, theta_rad + turned_rad);
             if distance_m >= spacing.every_m || turn_rad >= spacing.every_rad || number + 1 == within {
-                later.push(PoseMeasurement { wheel_rad: track.steps(from_s, t_s)?, pose: Pose { theta_rad, ..seen } });
+                later.push(PoseMeasurement {
+                    wheel_rad: track.steps(from_s, t_s)?,
+                    pose: Pose { theta_rad, ..measured },
+                });
                 (from_s, distance_m, turn_rad) = (t_s, 0.0, 0.0);
             }
         }
@@ -93,7 +96,7 @@ impl<'a> PoseMeasurements<'a> {
                 let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
                 match Self::at(run, &track, &nominal, spacing) {
                     Some(found) => measurements.push(found),
-                    None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_LOOKS.to_owned() }),
+                    None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_MEASUREMENTS.to_owned() }),
                 }
             }
         }
@@ -108,14 +111,14 @@ impl<'a> PoseMeasurements<'a> {
 
 /// Where a run was first and last seen, and how the wheels turned in between.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ConvergenceCriterion {
+pub(crate) struct EndPoses {
     pub(crate) start: Pose,
     /// Whole turns since the start are counted.
     pub(crate) end: Pose,
     wheel_rad: Vec<Wheels<f64>>,
 }
 
-impl ConvergenceCriterion {
+impl EndPoses {
     /// The first and the last measurement within the log; `None` as for [`PoseMeasurements::at`].
     pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
         let PoseMeasurements { start, mut later, .. } =
@@ -138,7 +141,7 @@ impl ConvergenceCriterion {
 }
 
 const NO_POSES: &str = "no run has the robot's pose at two instants (truth.csv with headings, or two marked points) and wheels that are logged";
-const NO_LOOKS: &str = "its log has gaps, or does not span two of its poses";
+const NO_MEASUREMENTS: &str = "its log has gaps, or does not span two of its poses";
 
 #[cfg(test)]
 mod tests {
@@ -182,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_are_spaced_end_with_the_log_and_count_whole_turns() {
+    fn measurements_are_spaced_end_with_the_log_and_count_whole_turns() {
         let dataset = dataset(true);
         let spacing = Spacing { every_m: 0.5, every_rad: 4.0 };
         let (measurements, rejected) = PoseMeasurements::of_all("test", &[dataset.session()], spacing).expect("poses");

@@ -10,7 +10,7 @@
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
 use effects::IsolatedError;
-use estimation::{Column, Innovation, ModelFit, NormalEquations, Segment, total};
+use estimation::{Column, InnovationComponent, ModelFit, NormalEquations, Segment, total};
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -186,7 +186,7 @@ fn log_mean(logs: &[f64]) -> f64 {
 }
 
 /// The large errors, from the innovations on every measurement.
-fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
+fn large(fit: &ModelFit<'_>, innovations: &[Vec<InnovationComponent>]) -> Vec<Large> {
     let Some(phase) = innovations.first() else { return Vec::new() };
     let segments = &fit.records.segments;
     let since: Vec<Vec<(f64, Wheels<f64>)>> = segments.iter().map(Segment::since_previous_measurement).collect();

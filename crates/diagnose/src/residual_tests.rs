@@ -5,7 +5,7 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::{Innovation, ModelFit, Projected, Segment, WHITENESS_Z};
+use estimation::{InnovationComponent, ModelFit, Projected, Segment, WHITENESS_Z};
 use kinematics::Side;
 
 use crate::augmented_model::AugmentedModel;
@@ -134,7 +134,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
 }
 
 /// The innovations of the first phase: phases share their measurements' errors.
-fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovation> {
+fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f InnovationComponent> {
     let first = fit.solution.pass.innovations.first();
     first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
 }
@@ -184,7 +184,8 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
         let (mut resembles, mut weights) = (0.0, 0.0_f64);
         for lag in 1..=LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
-            let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
+            let follows =
+                |pair: &&[&InnovationComponent]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
             for pair in series.windows(lag + 1).filter(follows) {
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
@@ -293,7 +294,7 @@ fn undo(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
 /// anew, there is nothing to stay: the same says that errors last, and not whose they are.
 pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
-    let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
+    let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > LARGE;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));

@@ -14,7 +14,7 @@ use crate::settings::{
 
 /// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
+pub(super) struct StepSize {
     pub(super) mean: f64,
     pub(super) noise: f64,
 }
@@ -32,7 +32,7 @@ pub(super) struct Acceleration {
 
 impl Acceleration {
     /// Whether to go by the last steps at all, the next one being so large.
-    pub(super) fn engages(&mut self, step: Size) -> bool {
+    pub(super) fn engages(&mut self, step: StepSize) -> bool {
         if self.engaged && (step.mean > ANDERSON_DIVERGED_MEAN_STEP || step.noise > ANDERSON_DIVERGED_NOISE_STEP) {
             (self.engaged, self.last) = (false, None);
             self.differences.clear();
@@ -45,7 +45,7 @@ impl Acceleration {
     }
 
     /// What to move by instead of a step that is proposed. `metric` is the information on what is moved: lengths are in standard deviations.
-    pub(super) fn instead_of(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
+    pub(super) fn mixed(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
         let squared = |of: &DVector<f64>| of.dot(&(metric * of));
         if let Some((before, moved)) = self.last.take() {
             self.differences.push_back((step - before, moved));
@@ -63,15 +63,15 @@ impl Acceleration {
         let along = DVector::from_fn(n, |i, _| part_equations[i].dot(step));
         let least = ANDERSON_SINGULAR_VALUE * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
-        let mixed = self
+        let combined = self
             .differences
             .iter()
             .zip(shares.iter())
             .fold(step.clone(), |sum, ((difference, moved), share)| sum - (difference + moved) * *share);
-        if mixed.iter().all(|by| by.is_finite())
-            && squared(&mixed) <= MAX_ANDERSON_STEP_RATIO * MAX_ANDERSON_STEP_RATIO * squared(step)
+        if combined.iter().all(|by| by.is_finite())
+            && squared(&combined) <= MAX_ANDERSON_STEP_RATIO * MAX_ANDERSON_STEP_RATIO * squared(step)
         {
-            mixed
+            combined
         } else {
             self.differences.clear();
             step.clone()
@@ -90,14 +90,14 @@ mod tests {
 
     /// A map that draws nearer by a constant share in each direction is solved in as many steps as it has directions, and one to see it by.
     #[test]
-    fn a_linear_iteration_ends_once_its_shares_have_been_seen() {
+    fn a_linear_iteration_ends_once_its_rates_are_known() {
         let shares = DVector::from_vec(vec![0.9, -0.5, 0.3]);
         let metric = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 1e4, 1.0]));
         let mut acceleration = Acceleration::default();
         let mut x = DVector::from_vec(vec![1.0, -2.0, 3.0]);
         for _ in 0..5 {
             let step = shares.component_mul(&x) - &x;
-            let by = acceleration.instead_of(&step, &metric);
+            let by = acceleration.mixed(&step, &metric);
             x += &by;
             acceleration.moved(step, by);
         }

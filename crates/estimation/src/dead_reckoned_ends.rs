@@ -64,13 +64,13 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn decimated(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
         let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
-        let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
-        let runs = coarse.scan_parts(terms, &[]);
+        let decimated = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
+        let runs = decimated.scan_parts(terms, &[]);
         let both = runs.iter().zip(&self.solution.pass.runs);
-        let same_looks = both.clone().all(|(run, own)| run.count == own.count);
+        let same_measurements = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
-        (same_looks && squares < MAX_DECIMATION_NONCENTRALITY).then_some(coarse)
+        (same_measurements && squares < MAX_DECIMATION_NONCENTRALITY).then_some(decimated)
     }
 
     /// How far displacements that follow each other, taken together, lie from dead reckoning with the geometry parameters found, in standard deviations of a measurement; `None` where
@@ -103,7 +103,7 @@ impl ModelFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<Self, EstimationError> {
         let mut without = Self { prior: self.prior.without(component), ..self.clone() };
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.noise = from.noise.map(|mut noise| {
             noise.variance[component as usize] = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
             noise
@@ -124,9 +124,9 @@ impl ModelFit<'_> {
         &self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
-        asked: impl Fn((usize, usize)) -> bool,
+        selected: impl Fn((usize, usize)) -> bool,
     ) -> Vec<EndError> {
-        self.dead_reckoned_to(model, terms, asked, |segment| &segment.measurements[segment.measurements.len() - 1..])
+        self.dead_reckoned_to(model, terms, selected, |segment| &segment.measurements[segment.measurements.len() - 1..])
     }
 
     /// Dead reckoning of every segment from its first measurement to each one after it.
@@ -144,13 +144,13 @@ impl ModelFit<'_> {
         &'b self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
-        asked: impl Fn((usize, usize)) -> bool,
+        selected: impl Fn((usize, usize)) -> bool,
         measurements: impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose],
     ) -> Vec<EndError> {
         let mut found = Vec::new();
         // Where the displacements of a run have led.
         let mut carried: Option<CarriedState> = None;
-        for segment in self.records.segments.iter().filter(|segment| asked(segment.run)) {
+        for segment in self.records.segments.iter().filter(|segment| selected(segment.run)) {
             let Some((start, first, _)) = segment.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
             let mut propagator = Propagator::new(segment, model, terms);

@@ -22,7 +22,7 @@ const NOISES: usize = 4;
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
+pub struct InnovationComponent {
     /// Which segment.
     pub segment: usize,
     /// Which look of the segment.
@@ -103,7 +103,7 @@ pub(super) struct Filter<'f, 'a> {
     /// Derivatives of the measurement by the terms' parameters, in the room.
     by_measurement: Derivatives,
     pub(super) sums: Sums<'f>,
-    pub(super) innovations: Vec<Innovation>,
+    pub(super) innovations: Vec<InnovationComponent>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
     /// What a component of a measurement sees of each column directly, and in all.
@@ -179,7 +179,9 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     /// What the segment said, and its propagation intervals where they were to be kept.
-    pub(super) fn into_parts(self) -> (Sums<'f>, Vec<usize>, Vec<Innovation>, NoiseScore, Option<SegmentCache>) {
+    pub(super) fn into_parts(
+        self,
+    ) -> (Sums<'f>, Vec<usize>, Vec<InnovationComponent>, NoiseScore, Option<SegmentCache>) {
         (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.propagations.into_cached())
     }
 
@@ -414,7 +416,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.sums.add(&self.j, v, s);
             if self.pass_options.innovations {
                 let sigma = s.sqrt();
-                self.innovations.push(Innovation {
+                self.innovations.push(InnovationComponent {
                     segment: self.number,
                     measurement: propagation.measurement,
                     component,

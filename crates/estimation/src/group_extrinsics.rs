@@ -68,9 +68,9 @@ impl GroupExtrinsics {
     }
 
     /// Is a column of a group known better than before any data?
-    pub(crate) fn is_shown(&self, follow: &GroupResponse, column: Column) -> bool {
+    pub(crate) fn is_shown(&self, response: &GroupResponse, column: Column) -> bool {
         let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
-        let Some(inverse) = follow.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
+        let Some(inverse) = response.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return false;
         };
         inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * plausible_sd(column)

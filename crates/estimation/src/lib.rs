@@ -39,7 +39,7 @@ mod wheel_angles;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
-pub use filter::{Innovation, OutlierGate};
+pub use filter::{InnovationComponent, OutlierGate};
 pub use maximum_likelihood::FitSettings;
 pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
 pub use model_fit::ModelFit;

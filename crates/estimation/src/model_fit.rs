@@ -11,7 +11,7 @@ use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
-use crate::optimizer::{ConvergenceCriterion, FitOptions, From, Solution, fit_from};
+use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::records::{Records, Segment};
 use crate::settings::{
@@ -45,7 +45,7 @@ pub struct ModelFit<'a> {
     /// The normal equation of parts, where there are no records to make it of.
     pub(crate) parts: Vec<NormalEquations>,
     /// Displacements count as neighbours when it is asked whether measurements are white.
-    pub(crate) displacements_follow: bool,
+    pub(crate) displacements_in_series: bool,
     /// Measurements that lie far off are taken like the others.
     pub(crate) ungated: bool,
 }
@@ -56,7 +56,7 @@ impl<'a> ModelFit<'a> {
         sessions: &[Session<'a>],
         nominal: Model,
         ends: ConvergenceCriterion,
-        displacements_follow: bool,
+        displacements_in_series: bool,
     ) -> Self {
         let records = Records::of(sessions);
         let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
@@ -72,7 +72,7 @@ impl<'a> ModelFit<'a> {
             prior,
             ends,
             parts: Vec::new(),
-            displacements_follow,
+            displacements_in_series,
             ungated: false,
         }
     }
@@ -84,7 +84,7 @@ impl ModelFit<'_> {
         let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
         let pass = Pass { innovations: Vec::new(), outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
-        let (displacements_follow, ungated) = (self.displacements_follow, self.ungated);
+        let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {
             records: Arc::new(records),
             selections: Arc::default(),
@@ -97,7 +97,7 @@ impl ModelFit<'_> {
             prior,
             ends,
             parts,
-            displacements_follow,
+            displacements_in_series,
             ungated,
         }
     }
@@ -111,16 +111,17 @@ impl ModelFit<'_> {
         }
     }
 
-    pub(crate) fn refit(&mut self, from: Option<From>) -> Result<(), EstimationError> {
+    pub(crate) fn refit(&mut self, from: Option<InitialValues>) -> Result<(), EstimationError> {
         self.refit_with(from, &mut [])
     }
 
     pub(crate) fn refit_with(
         &mut self,
-        from: Option<From>,
+        from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
-        let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
+        let from =
+            from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
         let Self { ends, ungated, .. } = *self;
         let options = FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) };
         self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
@@ -140,9 +141,9 @@ impl ModelFit<'_> {
         self.unobservable.iter().map(of).collect()
     }
 
-    pub(crate) fn here(&self) -> From {
+    pub(crate) fn current_values(&self) -> InitialValues {
         let Solution { model, noise, free_headings, .. } = &self.solution;
-        From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
+        InitialValues { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }
 
     /// Takes measurements farther apart until their innovations are white, or a run has too few left.
@@ -153,7 +154,7 @@ impl ModelFit<'_> {
             every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit(Some(self.here()))?;
+            self.refit(Some(self.current_values()))?;
         }
         Ok(())
     }
@@ -189,7 +190,7 @@ impl ModelFit<'_> {
                         count += 1.0;
                         for (lag, before) in (1..=MAX_AUTOCORRELATION_LAG).zip(series[..number].iter().rev()) {
                             let weight = self.records.weight_of_pair(before.segment, innovation.segment, lag);
-                            let counts = self.displacements_follow || before.segment == innovation.segment;
+                            let counts = self.displacements_in_series || before.segment == innovation.segment;
                             if counts && weight > 0.0 {
                                 products += weight * before.z * innovation.z;
                                 pairs += weight * weight;
@@ -229,11 +230,11 @@ impl ModelFit<'_> {
     /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
-        let held_before = !self.unobservable.is_empty();
+        let was_fixed = !self.unobservable.is_empty();
         self.unobservable = unobservable(&information.matrix);
         if self.unobservable.is_empty() {
             // What has come to be seen since is free again.
-            return if held_before { self.refit(Some(self.here())) } else { Ok(()) };
+            return if was_fixed { self.refit(Some(self.current_values())) } else { Ok(()) };
         }
         // Back along what is not seen; what is seen stays as it was found.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
@@ -246,7 +247,7 @@ impl ModelFit<'_> {
                 model.advance(column, -along * share);
             }
         }
-        let from = From { model, noise: None, free_headings: None };
+        let from = InitialValues { model, noise: None, free_headings: None };
         self.refit(Some(from))
     }
 
@@ -273,9 +274,9 @@ impl ModelFit<'_> {
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
-        let mut open = Self { ungated: true, ..self.clone() };
-        open.refit(None)?;
-        Ok(open)
+        let mut ungated_fit = Self { ungated: true, ..self.clone() };
+        ungated_fit.refit(None)?;
+        Ok(ungated_fit)
     }
 
     /// The values found, on every measurement of the first phase, those that lie far off too; nothing is fitted again.
@@ -290,9 +291,9 @@ impl ModelFit<'_> {
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_gated(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
-        let mut shut = Self { ungated: false, ..self.clone() };
-        shut.refit_with(Some(self.here()), terms)?;
-        Ok(shut)
+        let mut gated = Self { ungated: false, ..self.clone() };
+        gated.refit_with(Some(self.current_values()), terms)?;
+        Ok(gated)
     }
 
     /// The normal equation of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
@@ -327,7 +328,7 @@ impl ModelFit<'_> {
         let mut columns = self.columns.clone();
         columns.retain(|column| !matches!(column, Column::Term(_)));
         columns.extend((0..term_values.len()).map(Column::Term));
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
@@ -358,9 +359,9 @@ impl ModelFit<'_> {
 
     /// The Schur complement of the free columns, but for some that are asked for.
     #[must_use]
-    pub fn eliminated(&self, equations: &NormalEquations, asked: &[usize]) -> Option<SchurComplement> {
+    pub fn eliminated(&self, equations: &NormalEquations, others: &[usize]) -> Option<SchurComplement> {
         let columns: Vec<Column> =
-            self.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
+            self.columns.iter().copied().filter(|column| !others.contains(&column.index())).collect();
         let basis = free_basis(columns.len(), &self.fixed_along(&columns));
         SchurComplement::of(equations, &columns, basis)
     }

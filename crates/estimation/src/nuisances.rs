@@ -30,7 +30,7 @@ struct HeldOut {
 }
 
 /// A set of the instrument's columns that earned its place.
-struct Earned {
+struct AcceptedNuisances {
     /// Over none of them, on what was held out.
     gain: f64,
     columns: Vec<Column>,
@@ -76,12 +76,12 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     if several {
         groupings.push(Some(Grouping::Session));
     }
-    let mut best: Option<Earned> = None;
+    let mut best: Option<AcceptedNuisances> = None;
     for grouping in groupings {
         let units = units_of(fit, grouping, gate);
         let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
         // What a larger set gains over a smaller one, it must gain by as much as that over nothing.
-        let mut of_grouping: Option<Earned> = None;
+        let mut of_grouping: Option<AcceptedNuisances> = None;
         for set in sets {
             let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
             let (columns, own): (Vec<Column>, _) = match grouping {
@@ -89,34 +89,36 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
                 Some(grouping) => (others().collect(), Some(GroupExtrinsics::new(grouping, set.to_vec()))),
             };
             let Some(found) = held_out(fit, &units, &columns, own.as_ref()) else { continue };
-            let before = of_grouping.as_ref().map_or(&base, |earned| &earned.held_out);
+            let before = of_grouping.as_ref().map_or(&base, |accepted| &accepted.held_out);
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
             if mean > MIN_HELD_OUT_GAIN_SIGMA * error && !drifts {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
-                of_grouping = Some(Earned { gain, columns, own, held_out: found });
+                of_grouping = Some(AcceptedNuisances { gain, columns, own, held_out: found });
             }
         }
-        if let Some(earned) = of_grouping
-            && best.as_ref().is_none_or(|best| earned.gain > best.gain)
+        if let Some(accepted) = of_grouping
+            && best.as_ref().is_none_or(|best| accepted.gain > best.gain)
         {
-            best = Some(earned);
+            best = Some(accepted);
         }
     }
-    if let Some(Earned { columns, own, .. }) = best {
-        let mut from = fit.here();
+    if let Some(AcceptedNuisances { columns, own, .. }) = best {
+        let mut from = fit.current_values();
         // From where these measurements put them, and with every measurement until they fit: from nothing, a gate may hide what they would explain.
         if gate == OutlierGate::Off {
             from.noise = None;
         }
         let mut all: Vec<NormalEquations> =
             units_of(fit, own.as_ref().map(|own| own.grouping), gate).into_iter().map(|unit| unit.equations).collect();
-        let follows = own.as_ref().map_or_else(Vec::new, |own| own.eliminate(&mut all, &from.model));
+        let responses = own.as_ref().map_or_else(Vec::new, |own| own.eliminate(&mut all, &from.model));
         from.model.own = own;
         if let Some((step, _)) = total(&all).and_then(|sum| sum.of(&columns).solve()) {
             columns.iter().zip(step.iter()).for_each(|(column, by)| from.model.advance(*column, *by));
-            follows.iter().for_each(|follow| from.model.advance_own(follow.group, &follow.step(&columns, &step)));
+            responses
+                .iter()
+                .for_each(|response| from.model.advance_own(response.group, &response.step(&columns, &step)));
         }
         fit.columns = columns;
         fit.refit(Some(from))?;
@@ -142,8 +144,8 @@ pub(crate) fn explained_by_nuisances<'a>(
     if thin {
         plain.thin()?;
     }
-    let far = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
-    let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * far(&explained) < far(&plain);
+    let outliers = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
+    let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
     let is_better = uses_more && !(thin && explained.is_to_be_thinned());
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
@@ -155,7 +157,7 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
     for fold in 0..FOLDS.min(units.len()) {
         let mut others: Vec<NormalEquations> =
             units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.equations.clone()).collect();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.solution.model));
+        let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.solution.model));
         let (step, _) = total(&others)?.of(columns).solve()?;
         let mut common = fit.solution.model.clone();
         columns.iter().zip(step.iter()).for_each(|(column, by)| common.advance(*column, *by));
@@ -164,9 +166,9 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
             let (mut columns, mut step, mut model) = (columns.to_vec(), step.clone(), common.clone());
             // A group of which nothing else is known has what is common.
             if let Some(own) = own
-                && let Some(follow) = follows.iter().find(|follow| follow.group == own.grouping.group(run))
+                && let Some(response) = responses.iter().find(|response| response.group == own.grouping.group(run))
             {
-                let by = follow.step(&columns, &step);
+                let by = response.step(&columns, &step);
                 own.columns.iter().zip(by.iter()).for_each(|(column, by)| model.advance(*column, *by));
                 columns.extend(&own.columns);
                 step = DVector::from_iterator(columns.len(), step.iter().chain(by.iter()).copied());
@@ -245,7 +247,7 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn shows(&self, group: (usize, usize), column: Column) -> bool {
         let Solution { model, pass, .. } = &self.solution;
-        let follow = pass.own.iter().find(|follow| follow.group == group);
-        model.own.as_ref().zip(follow).is_some_and(|(own, follow)| own.is_shown(follow, column))
+        let response = pass.own.iter().find(|response| response.group == group);
+        model.own.as_ref().zip(response).is_some_and(|(own, response)| own.is_shown(response, column))
     }
 }

@@ -53,11 +53,11 @@ pub enum OneStepError {
 /// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500 rows at least.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
-    let (rows, measurements) = rows_and_looks(datasets);
+    let (rows, measurements) = rows_and_measurements(datasets);
     rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
 }
 
-fn rows_and_looks(datasets: &[Blocks]) -> (usize, usize) {
+fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
     let of = |blocks: &Blocks, count: fn(&Blocks, usize) -> usize| -> usize {
         (0..blocks.infos().len()).map(|run| count(blocks, run)).sum()
     };
@@ -106,11 +106,11 @@ pub fn fit_large(
     datasets: &mut [Blocks],
     mut notice: impl FnMut(usize, &Warning),
 ) -> Result<LargeFit, OneStepError> {
-    let pieces = pieces(datasets)?;
-    let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
+    let subsamples = subsamples(datasets)?;
+    let sessions: Vec<Session<'_>> = subsamples.iter().map(Dataset::session).collect();
     let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(PRELIMINARY_NOISE_TOLERANCE), &sessions)?;
     first.ends = ConvergenceCriterion::NoiseShare(SUBSAMPLE_NOISE_TOLERANCE);
-    first.refit(Some(first.here()))?;
+    first.refit(Some(first.current_values()))?;
     let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
@@ -136,16 +136,16 @@ pub fn fit_large(
 }
 
 /// The pieces, a dataset of them from each dataset.
-fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
-    let (rows, measurements) = rows_and_looks(datasets);
+fn subsamples(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
+    let (rows, measurements) = rows_and_measurements(datasets);
     let wanted = (SUBSAMPLE_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(MAX_SUBSAMPLE_ROWS);
     // Every so many rows a piece, in the middle of these.
     let stride = (rows / SUBSAMPLES).max(1);
     let within = stride.saturating_sub(wanted / SUBSAMPLES) / 2..(stride + wanted / SUBSAMPLES) / 2;
     let mut before = 0;
-    let mut pieces = Vec::with_capacity(datasets.len());
+    let mut subsamples = Vec::with_capacity(datasets.len());
     for blocks in datasets {
-        let mut piece = blocks.header().clone();
+        let mut subsample = blocks.header().clone();
         for run in 0..blocks.infos().len() {
             let count = blocks.blocks(run);
             let start = before;
@@ -155,24 +155,24 @@ fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
             while block < count {
                 let end = block + (block..count).take_while(|block| is_taken(*block)).count();
                 if end > block {
-                    piece.runs.extend(blocks.read(run, block..end)?.dataset.runs);
+                    subsample.runs.extend(blocks.read(run, block..end)?.dataset.runs);
                 }
                 block = end + 1;
             }
         }
-        pieces.push(piece);
+        subsamples.push(subsample);
     }
-    Ok(pieces)
+    Ok(subsamples)
 }
 
 /// How many blocks of a run are held at a time.
 fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
-    let (rows, measurements) = rows_and_looks(datasets);
+    let (rows, measurements) = rows_and_measurements(datasets);
     let propagations: usize =
         first.selections.first().map_or(0, |selection| selection.propagations.iter().map(Vec::len).sum::<usize>());
-    let looks_a_leg = first.records.measurements().div_ceil(propagations.max(1));
-    let wanted_looks = MIN_PART_MEASUREMENTS.max(MIN_PART_PROPAGATIONS * looks_a_leg);
-    MIN_PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
+    let measurements_per_propagation = first.records.measurements().div_ceil(propagations.max(1));
+    let wanted_measurements = MIN_PART_MEASUREMENTS.max(MIN_PART_PROPAGATIONS * measurements_per_propagation);
+    MIN_PART_BLOCKS.max(wanted_measurements.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
 }
 
 impl ModelFit<'_> {
@@ -183,14 +183,14 @@ impl ModelFit<'_> {
         part_blocks: usize,
         notice: &mut impl FnMut(usize, &Warning),
     ) -> Result<GatheredParts, OneStepError> {
-        let runs_stand_apart = self.solution.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
+        let is_grouped_by_run = self.solution.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
             .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| (dataset, run, blocks.blocks(run))))
             .flat_map(|(dataset, run, count)| {
                 // What a run has for itself is found from all of it.
-                let cuts = if runs_stand_apart { 1 } else { count.div_ceil(part_blocks) };
+                let cuts = if is_grouped_by_run { 1 } else { count.div_ceil(part_blocks) };
                 (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
             })
             .collect();
@@ -258,8 +258,8 @@ impl ModelFit<'_> {
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);
         let (mut model, noise) = (self.solution.model.clone(), &self.solution.noise);
-        let stands_apart = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
-        if stands_apart {
+        let is_grouped_by_run = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
+        if is_grouped_by_run {
             model = pass_settled(&records, &selections, model, noise)?.0;
         }
         let instrument = model.instrument(run);
@@ -267,14 +267,14 @@ impl ModelFit<'_> {
         // The columns that stand apart are still in the evidence: they are taken out of a group's sum.
         let model = Model { body_from_sensor, latency_s, own: None, ..model };
         let (_, pass) = pass_settled(&records, &selections, model, noise)?;
-        let own = stands_apart.then_some(instrument);
+        let own = is_grouped_by_run.then_some(instrument);
         Ok(PartEquations { number, equations: total(&pass.runs), own, measurements: records.measurements() })
     }
 
     /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
     fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
         let own = self.solution.model.own.clone();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));
+        let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));
         let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };
         let information = sum.of(&self.columns);
         self.unobservable = unobservable(&information.matrix);
@@ -286,12 +286,12 @@ impl ModelFit<'_> {
         for (row, column) in self.columns.iter().enumerate() {
             moved[column.index()] = step[row];
             self.solution.model.advance(*column, step[row]);
-            let bends = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
-            is_near &= !bends || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
+            let is_nonlinear = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
+            is_near &= !is_nonlinear || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
         }
-        follows
+        responses
             .iter()
-            .for_each(|follow| self.solution.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
+            .for_each(|response| self.solution.model.advance_own(response.group, &response.step(&self.columns, &step)));
         // To first order the scores are those at the new values.
         for part in &mut parts {
             let by = &part.information * &moved;
@@ -299,7 +299,7 @@ impl ModelFit<'_> {
             part.gradient += by;
         }
         self.solution.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
-        self.solution.pass.own = follows;
+        self.solution.pass.own = responses;
         self.parts = parts;
         Ok(is_near)
     }

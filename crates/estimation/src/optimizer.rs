@@ -4,7 +4,7 @@ use kinematics::{Pose, unwrap_near};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use crate::acceleration::{Acceleration, Size};
+use crate::acceleration::{Acceleration, StepSize};
 use crate::error::EstimationError;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
@@ -103,7 +103,7 @@ impl Solution {
 
 /// Where to start.
 #[derive(Debug, Clone)]
-pub(crate) struct From {
+pub(crate) struct InitialValues {
     pub(crate) model: Model,
     pub(crate) noise: Option<Noise>,
     pub(crate) free_headings: Option<Vec<f64>>,
@@ -121,14 +121,14 @@ pub fn fit(
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
 ) -> Result<Solution, EstimationError> {
-    let from = From { model: nominal.clone(), noise: None, free_headings: None };
+    let from = InitialValues { model: nominal.clone(), noise: None, free_headings: None };
     fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
 }
 
 pub(crate) fn fit_from(
     records: &Records<'_>,
     selections: &[Selection],
-    from: From,
+    from: InitialValues,
     prior: &NoisePrior,
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
@@ -174,7 +174,7 @@ pub(crate) fn fit_from(
     };
     let (mut converged, mut left_basin, mut first) = (false, false, None);
     let (mut damping, mut acceleration) = (StepDamping::default(), Acceleration::default());
-    let keep = Selection::has_long_legs(selections);
+    let keep = Selection::has_long_propagations(selections);
     let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
     // How far the model has come from where propagation intervals were kept: squares of its steps.
     let mut moved_since_cached = 0.0;
@@ -184,16 +184,16 @@ pub(crate) fn fit_from(
         let mean = MeanStep::of(&found, options, &basis)?;
         let of_noise = if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
         let columns = options.columns.len();
-        let tamed = damping.tamed(of_noise.by);
-        let own = if acceleration.engages(Size { mean: mean.squared, noise: of_noise.by.amax() }) {
+        let damped = damping.damped(of_noise.by);
+        let own = if acceleration.engages(StepSize { mean: mean.squared, noise: of_noise.by.amax() }) {
             let proposed = stacked(&mean.by, &of_noise.by);
-            let by = acceleration.instead_of(&proposed, &block_diagonal(&mean.information, &of_noise.information));
+            let by = acceleration.mixed(&proposed, &block_diagonal(&mean.information, &of_noise.information));
             let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
             let (moved, own) = take_step(&mut model, &mut headings, &found, options, by.rows(0, columns).into_owned())?;
             acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut noise, by_noise)));
             own
         } else {
-            take_noise_step(&mut noise, tamed);
+            take_noise_step(&mut noise, damped);
             take_step(&mut model, &mut headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
@@ -312,25 +312,26 @@ fn take_step(
         model.advance(*column, *by);
         moved[column.index()] = *by;
     }
-    let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
+    let own_steps: Vec<DVector<f64>> =
+        found.own.iter().map(|response| response.step(&options.columns, &step)).collect();
     for FreeHeading { segment, run, rest, by } in &found.headings {
-        let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+        let mut shift: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
         if let Some(own) = &model.own
-            && let Some(at) = found.own.iter().position(|follow| follow.group == own.grouping.group(*run))
+            && let Some(at) = found.own.iter().position(|response| response.group == own.grouping.group(*run))
         {
-            follows += own
+            shift += own
                 .columns
                 .iter()
                 .zip(own_steps[at].iter())
                 .map(|(column, step)| by[column.index()] * step)
                 .sum::<f64>();
         }
-        headings[*segment] += rest + follows;
+        headings[*segment] += rest + shift;
     }
     let mut size = 0.0;
-    for (follow, by) in found.own.iter().zip(&own_steps) {
-        size += follow.squared(by);
-        model.advance_own(follow.group, by);
+    for (response, by) in found.own.iter().zip(&own_steps) {
+        size += response.squared(by);
+        model.advance_own(response.group, by);
     }
     Ok((step, size))
 }
@@ -384,7 +385,7 @@ impl Default for StepDamping {
 
 impl StepDamping {
     /// The step to take instead of `step`.
-    fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
+    fn damped(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
             self.share[k] = if step[k] * self.last[k] < 0.0 {
                 STEP_DECREASE * self.share[k]

@@ -5,7 +5,7 @@ use std::ops::Range;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, Innovation, NoiseScore, PassOptions};
+use crate::filter::{Filter, InnovationComponent, NoiseScore, PassOptions};
 use crate::group_extrinsics::GroupResponse;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
@@ -22,7 +22,7 @@ pub struct Pass {
     /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
     pub runs: Vec<NormalEquations>,
     /// The whitened innovations, phase by phase, in the order of segments and measurements.
-    pub innovations: Vec<Vec<Innovation>>,
+    pub innovations: Vec<Vec<InnovationComponent>>,
     /// Measurements left out as outliers in the first phase: segment and look.
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
@@ -190,7 +190,7 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
 struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,
-    innovations: Vec<Innovation>,
+    innovations: Vec<InnovationComponent>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
     cached: Option<SegmentCache>,

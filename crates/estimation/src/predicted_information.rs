@@ -40,12 +40,12 @@ impl ModelFit<'_> {
             own: None,
             ..self.solution.model.clone()
         };
-        let mut foreseen = ModelFit::from_parameters(model, self.solution.noise, sessions);
-        foreseen.selections = Selection::of(&foreseen.records, self.thinning, &self.nominal).into();
-        foreseen.thinning = self.thinning;
-        foreseen.nominal = self.nominal.clone();
-        foreseen.columns = self.columns.clone();
-        foreseen
+        let mut planned = ModelFit::from_parameters(model, self.solution.noise, sessions);
+        planned.selections = Selection::of(&planned.records, self.thinning, &self.nominal).into();
+        planned.thinning = self.thinning;
+        planned.nominal = self.nominal.clone();
+        planned.columns = self.columns.clone();
+        planned
     }
 
     /// For each segment of two measurements, how dead reckoning from the first scatters about the second by the noise alone: variances along, across (m²) and of the

@@ -55,7 +55,7 @@ impl ModelFit<'_> {
 
     /// The least cost with one column moved and held there.
     fn cost_with(&self, column: Column, position: usize, by: f64) -> Result<f64, EstimationError> {
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.model.advance(column, by);
         let mut fixed = self.fixed();
         fixed.push(DVector::from_fn(self.columns.len(), |row, _| f64::from(u8::from(row == position))));

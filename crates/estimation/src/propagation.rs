@@ -83,17 +83,17 @@ pub(crate) struct CachedPropagation {
 #[derive(Debug, Clone)]
 pub(crate) struct Change {
     /// Of the geometry parameters, relative: left, right, separation.
-    lengths: [f64; 3],
+    geometry: [f64; 3],
     term_values: Vec<f64>,
 }
 
 impl CachedPropagation {
     /// How a model differs from theirs.
     pub(crate) fn change_to(&self, model: &Model) -> Change {
-        let lengths = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
-        let (from, to) = (lengths(&self.model), lengths(model));
+        let geometry = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
+        let (from, to) = (geometry(&self.model), geometry(model));
         Change {
-            lengths: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
+            geometry: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
             term_values: model.term_values.iter().zip(&self.model.term_values).map(|(to, from)| to - from).collect(),
         }
     }
@@ -226,7 +226,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             motion.y_m += by.y * change;
             motion.theta_rad += by.z * change;
         };
-        by_geometry.iter().zip(change.lengths).for_each(|(by, change)| add(*by, change));
+        by_geometry.iter().zip(change.geometry).for_each(|(by, change)| add(*by, change));
         let by_terms = &cached.by_terms[number * cached.parameters..][..cached.parameters];
         for (column, (by, change)) in by_terms.iter().zip(&change.term_values).enumerate() {
             add(*by, *change);

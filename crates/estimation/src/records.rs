@@ -279,11 +279,11 @@ impl<'a> Records<'a> {
                     (Start::MeasuredPose, Some(first)) => (first.x_m, first.y_m),
                     _ => (0.0, 0.0),
                 };
-                let far = segment
+                let squared_m2 = segment
                     .measurements
                     .iter()
                     .map(|measurement| (measurement.x_m - x_m).powi(2) + (measurement.y_m - y_m).powi(2));
-                far.fold(0.0, f64::max)
+                squared_m2.fold(0.0, f64::max)
             })
             .sum();
         let segments = self.segments.len().max(1) as f64;

@@ -88,7 +88,7 @@ impl Selection {
 
     /// Whether driving the propagation intervals takes long, and longer than all else in a pass. So many intervals leave errors so small that propagation intervals follow a step of that size to first
     /// order; where few measurements are followed over a few intervals, they need not.
-    pub(crate) fn has_long_legs(all: &[Self]) -> bool {
+    pub(crate) fn has_long_propagations(all: &[Self]) -> bool {
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
         intervals >= MIN_CACHED_INTERVALS && intervals >= MIN_INTERVALS_PER_CACHED_PROPAGATION * propagations().count()

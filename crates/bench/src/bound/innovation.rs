@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 
 /// What one look adds to what all before it told, in the frame of the run's true start pose; poses are ordered x, y, θ (m, m, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
+pub struct LinearizedInnovation {
     /// When, seconds from the run's start.
     pub t_s: f64,
     /// Slope of the predicted pose in the left diameter, the right diameter and the wheel separation (columns), all in metres.
@@ -15,7 +15,7 @@ pub struct Innovation {
     pub precision: Matrix3<f64>,
 }
 
-impl Innovation {
+impl LinearizedInnovation {
     /// Hᵀ S⁻¹ H, 1/m².
     #[must_use]
     pub fn information(&self) -> Matrix3<f64> {

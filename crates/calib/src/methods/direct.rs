@@ -13,7 +13,7 @@ use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
 use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::{MedianMad, Summary, mean};
 use crate::settings::{MAD_CUT, MAX_MARK_OFFSET_M, MIN_SPIN_RAD};
 
@@ -90,7 +90,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         let readings = &run.run().point_readings;
         if readings.is_empty() {
             // Poses: the contacts themselves are the marks. What the wheels turned before and after was not seen.
-            return Ok(ConvergenceCriterion::of(run, self.session.robot, &self.geometry).map(|ends| {
+            return Ok(EndPoses::of(run, self.session.robot, &self.geometry).map(|ends| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
                 let (start, end) = (contacts.map(|p| ends.start * p), contacts.map(|p| ends.end * p));
                 (ends.turned_rad(), Marks { start, end, outside_m: Wheels::both(0.0) })
@@ -199,13 +199,13 @@ impl Direct {
             let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
             rejected.push(Rejected { run: value.run.to_owned(), why });
         }
-        let summary = Summary::of(kept(numbers.iter().copied(), &keep));
+        let summary = Summary::of(retained(numbers.iter().copied(), &keep));
         (keep, summary)
     }
 }
 
 /// The values that are kept.
-fn kept<'v>(
+fn retained<'v>(
     values: impl Iterator<Item = f64> + Clone + 'v,
     keep: &'v [bool],
 ) -> impl Iterator<Item = f64> + Clone + 'v {
@@ -259,7 +259,7 @@ impl Method for Direct {
         };
 
         let slope =
-            Wheels::from_sides(|side| mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
+            Wheels::from_sides(|side| mean(retained(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
         Ok(Calibration {

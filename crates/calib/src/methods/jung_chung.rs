@@ -17,7 +17,7 @@ use kinematics::{Wheels, wrap_to_pi};
 use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::Summary;
 
 /// The method; it has nothing to choose.
@@ -55,9 +55,9 @@ impl Method for JungChung {
         let mut side_m = None;
         for session in sessions {
             for run in &session.runs {
-                let of_way = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
-                let Some((_, errors_rad)) = of_way else { continue };
-                let Some(ends) = ConvergenceCriterion::of(run, session.robot, &geometry) else { continue };
+                let of_direction = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
+                let Some((_, errors_rad)) = of_direction else { continue };
+                let Some(ends) = EndPoses::of(run, session.robot, &geometry) else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
@@ -69,8 +69,8 @@ impl Method for JungChung {
                 }
                 // The wheels at the measurements' instants: what they turned after the last one was not seen.
                 let turned_m = ends.turned_rad().zip_with(geometry.m_per_rad(), |rad, m_per_rad| m_per_rad * rad);
-                let reckoned_rad = geometry.increment(turned_m).turn_rad;
-                errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - reckoned_rad));
+                let dead_reckoned_rad = geometry.increment(turned_m).turn_rad;
+                errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - dead_reckoned_rad));
             }
         }
         let [cw, ccw] = errors_rad.map(|(_, errors_rad)| Summary::of(errors_rad.iter().copied()));

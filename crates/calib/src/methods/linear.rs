@@ -33,7 +33,7 @@ pub enum Form {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Readings {
     /// Its last pose seen from its first, where the robot stands: the papers' form.
-    ConvergenceCriterion,
+    EndPoses,
     /// Every pose seen from the first: for single long runs, and to see the scale on closed paths. Clocks that differ then enter the headings.
     All,
 }
@@ -60,7 +60,7 @@ pub struct Gains {
 
 impl Linear {
     /// The method as the table of contents offers it: the physical form on the runs' ends.
-    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::ConvergenceCriterion };
+    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::EndPoses };
 
     const NAME: &'static str = "linear";
 
@@ -92,11 +92,11 @@ impl Driven {
     fn of(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry, readings: Readings) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, robot)?;
         // Poses outside of the log have no odometry to be compared with.
-        let mut seen: Vec<(f64, Pose)> = run.observed_poses();
-        seen.retain(|(t_s, _)| track.steps(*t_s, *t_s).is_some());
-        let ((start_s, start), after) = seen.split_first()?;
+        let mut poses: Vec<(f64, Pose)> = run.observed_poses();
+        poses.retain(|(t_s, _)| track.steps(*t_s, *t_s).is_some());
+        let ((start_s, start), after) = poses.split_first()?;
         let chosen = match readings {
-            Readings::ConvergenceCriterion => &after[after.len().checked_sub(1)?..],
+            Readings::EndPoses => &after[after.len().checked_sub(1)?..],
             Readings::All => after,
         };
         let (mut last_s, mut wheel_rad, mut rolled_rad) = (*start_s, Wheels::both(0.0), Wheels::both(0.0));

@@ -61,10 +61,11 @@ impl PathErrors<'_> {
         let weight = Vector3::new(1.0, 1.0, self.heading_m);
         for (number, path) in self.paths.iter().enumerate() {
             let mut dead_reckoned = DeadReckoned::at(path.start);
-            for PoseMeasurement { wheel_rad, pose: seen } in &path.later {
+            for PoseMeasurement { wheel_rad, pose: measured } in &path.later {
                 wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
                 let DeadReckoned { pose, by_geometry } = dead_reckoned;
-                let error = Vector3::new(pose.x_m - seen.x_m, pose.y_m - seen.y_m, pose.theta_rad - seen.theta_rad);
+                let error =
+                    Vector3::new(pose.x_m - measured.x_m, pose.y_m - measured.y_m, pose.theta_rad - measured.theta_rad);
                 let by_factors = by_geometry * Matrix3::from_diagonal(&self.nominal);
                 visit(number, error.component_mul(&weight), Matrix3::from_diagonal(&weight) * by_factors);
             }
@@ -246,16 +247,16 @@ mod tests {
                 let start = Pose::new(0.1, 0.2, f64::from(run));
                 let mut dead_reckoned = DeadReckoned::at(start);
                 let later = (0..6_u32)
-                    .map(|leg| {
-                        let way = if run % 2 == 0 { turn_rad } else { -turn_rad };
-                        let wheel_rad = if leg % 2 == 0 {
+                    .map(|interval| {
+                        let turn_rad_of_run = if run % 2 == 0 { turn_rad } else { -turn_rad };
+                        let wheel_rad = if interval % 2 == 0 {
                             vec![Wheels::both(straight_rad); 3]
                         } else {
-                            vec![Wheels { left: -way, right: way }; 2]
+                            vec![Wheels { left: -turn_rad_of_run, right: turn_rad_of_run }; 2]
                         };
                         wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
                         // No pattern that the geometry parameters could follow, and the same every time.
-                        let off = |k: f64| error * (12.9898 * f64::from(7 * run + leg) + 78.233 * k).sin();
+                        let off = |k: f64| error * (12.9898 * f64::from(7 * run + interval) + 78.233 * k).sin();
                         let Pose { x_m, y_m, theta_rad } = dead_reckoned.pose;
                         PoseMeasurement {
                             wheel_rad,
@@ -298,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn without_errors_the_lengths_come_back() {
+    fn without_errors_the_geometry_comes_back() {
         let factors = found(&runs(4, 2.0, 3.0, 0.0));
         let truth = Vector3::from(TRUTH).component_div(&Vector3::from(NOMINAL));
         // Residuals of a few roundings of a metre, on derivatives of a metre and more.

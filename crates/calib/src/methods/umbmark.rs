@@ -16,7 +16,7 @@ use motion_programs::Schedule;
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::Summary;
 
 /// Which coordinate of the end errors α and β are taken from.
@@ -80,7 +80,7 @@ impl Method for Umbmark {
                 };
                 // Marks are read at standstills, before and after the whole log; poses from the first measurement to the last, and what lies outside was not seen.
                 let by_marks = run.run().truth.is_empty();
-                let ends = if by_marks { None } else { ConvergenceCriterion::of(run, session.robot, &geometry) };
+                let ends = if by_marks { None } else { EndPoses::of(run, session.robot, &geometry) };
                 let observed =
                     if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
                 let Some((world_from_start, world_from_end)) = observed else { continue };
@@ -94,14 +94,14 @@ impl Method for Umbmark {
                     ));
                 }
                 // In the start's frame the odometry starts at the origin and the first leg points along +x.
-                let seen = world_from_start.to(world_from_end);
+                let measured = world_from_start.to(world_from_end);
                 let mut dead_reckoned = ends.map(|ends| ends.dead_reckoned(&geometry));
                 if by_marks {
                     let visit = |_, pose| dead_reckoned = Some(pose);
                     run.dead_reckon(session.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, visit);
                 }
                 if let Some(dead_reckoned) = dead_reckoned {
-                    errors.push((seen.x_m - dead_reckoned.x_m, seen.y_m - dead_reckoned.y_m));
+                    errors.push((measured.x_m - dead_reckoned.x_m, measured.y_m - dead_reckoned.y_m));
                 }
             }
         }

@@ -57,7 +57,7 @@ pub struct AugmentedFilter<C> {
     counts: Wheels<C>,
     /// P₀ and what multiplies the three variances, at the last measurement.
     spread: [Matrix6<f64>; 4],
-    leg: PropagationInterval,
+    propagation: PropagationInterval,
     noise: NoiseFilter,
     settling: Settling,
     measurements: u64,
@@ -81,7 +81,7 @@ impl PropagationInterval {
 
 /// What a measurement said.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
+pub struct PoseInnovation {
     /// Seen minus predicted: x, y in metres, heading in radians.
     pub residual: Vector3<f64>,
     /// Its covariance as the filter expected it.
@@ -116,7 +116,7 @@ impl<C: Count> AugmentedFilter<C> {
             factors: half.factors,
             counts,
             spread,
-            leg: PropagationInterval::at(world_from_body),
+            propagation: PropagationInterval::at(world_from_body),
             noise,
             settling: Settling::DEFAULT,
             measurements: 0,
@@ -139,7 +139,7 @@ impl<C: Count> AugmentedFilter<C> {
     /// Puts the robot elsewhere, at a pose that the instrument saw: the next run begins. What is known of the factors stays.
     pub fn restart(&mut self, world_from_body: Pose, counts: Wheels<C>) {
         self.counts = counts;
-        self.leg = PropagationInterval::at(world_from_body);
+        self.propagation = PropagationInterval::at(world_from_body);
         for part in &mut self.spread {
             part.fixed_rows_mut::<3>(0).fill(0.0);
             part.fixed_columns_mut::<3>(0).fill(0.0);
@@ -161,25 +161,30 @@ impl<C: Count> AugmentedFilter<C> {
         let geometry_parameters = self.geometry_parameters();
         let travel_m = geometry_parameters.m_per_rad.zip_with(turned, |m_per_count, counts| m_per_count * counts);
         let one = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(1.0) };
-        self.leg.wheels.propagate(self.leg.dead_reckoned.pose, travel_m, geometry_parameters.separation_m, &one);
-        self.leg.dead_reckoned.advance(&geometry_parameters, turned);
-        self.leg.dead_reckoned.pose
+        self.propagation.wheels.propagate(
+            self.propagation.dead_reckoned.pose,
+            travel_m,
+            geometry_parameters.separation_m,
+            &one,
+        );
+        self.propagation.dead_reckoned.advance(&geometry_parameters, turned);
+        self.propagation.dead_reckoned.pose
     }
 
     /// Takes a pose that the instrument saw, and corrects pose, factors and noise.
-    pub fn update(&mut self, world_from_body: Pose) -> Innovation {
+    pub fn update(&mut self, world_from_body: Pose) -> PoseInnovation {
         self.spread = self.spread_now();
-        let predicted = self.leg.dead_reckoned.pose;
+        let predicted = self.propagation.dead_reckoned.pose;
         let residual = Vector3::new(
             world_from_body.x_m - predicted.x_m,
             world_from_body.y_m - predicted.y_m,
             wrap_to_pi(world_from_body.theta_rad - predicted.theta_rad),
         );
         let of_pose = |part: &Matrix6<f64>| part.fixed_view::<3, 3>(0, 0).into_owned();
-        let noise_of_look = instrument();
+        let measurement_noise = instrument();
         let expected = Expected {
             fixed: of_pose(&self.spread[0]),
-            slopes: std::array::from_fn(|i| of_pose(&self.spread[i + 1]) + noise_of_look[i]),
+            slopes: std::array::from_fn(|i| of_pose(&self.spread[i + 1]) + measurement_noise[i]),
         };
         let variances = *self.noise.variances();
         let covariance = expected.at(&variances);
@@ -188,14 +193,14 @@ impl<C: Count> AugmentedFilter<C> {
         let inverse = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gain: Matrix6x3<f64> = whole.fixed_columns::<3>(0) * inverse;
         let correction: Vector6<f64> = gain * residual;
-        let mut kept = Matrix6::identity();
-        let mut corrected = kept.fixed_columns_mut::<3>(0);
+        let mut joseph = Matrix6::identity();
+        let mut corrected = joseph.fixed_columns_mut::<3>(0);
         corrected -= gain;
         for part in &mut self.spread {
-            *part = kept * *part * kept.transpose();
+            *part = joseph * *part * joseph.transpose();
         }
-        for (part, of_look) in self.spread[1..].iter_mut().zip(noise_of_look) {
-            *part += gain * of_look * gain.transpose();
+        for (part, of_measurement) in self.spread[1..].iter_mut().zip(measurement_noise) {
+            *part += gain * of_measurement * gain.transpose();
         }
         self.factors += correction.fixed_rows::<3>(3);
         let pose = Pose::new(
@@ -203,7 +208,7 @@ impl<C: Count> AugmentedFilter<C> {
             predicted.y_m + correction[1],
             predicted.theta_rad + correction[2],
         );
-        self.leg = PropagationInterval::at(pose);
+        self.propagation = PropagationInterval::at(pose);
         self.noise.measurement(&residual, &expected);
         self.measurements += 1;
         if self.measurements >= 2 * self.next_half.measurements {
@@ -214,13 +219,13 @@ impl<C: Count> AugmentedFilter<C> {
                 covariance: self.factor_covariance(),
             };
         }
-        Innovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
+        PoseInnovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
     }
 
     /// Where the robot is believed to be.
     #[must_use]
     pub const fn world_from_body(&self) -> Pose {
-        self.leg.dead_reckoned.pose
+        self.propagation.dead_reckoned.pose
     }
 
     /// The three factors: left wheel, right wheel, separation.
@@ -297,7 +302,7 @@ impl<C: Count> AugmentedFilter<C> {
 
     /// ∂(state now)/∂(state at the last measurement).
     fn transition(&self) -> Matrix6<f64> {
-        let PropagationInterval { start, dead_reckoned, .. } = &self.leg;
+        let PropagationInterval { start, dead_reckoned, .. } = &self.propagation;
         let mut transition = Matrix6::identity();
         // Turned by its heading's error, the whole leg swings round its start.
         transition[(0, 2)] = -(dead_reckoned.pose.y_m - start.y_m);
@@ -312,7 +317,7 @@ impl<C: Count> AugmentedFilter<C> {
         let transition = self.transition();
         let mut spread = self.spread.map(|part| transition * part * transition.transpose());
         let mut of_pose = spread[1].fixed_view_mut::<3, 3>(0, 0);
-        of_pose += self.leg.wheels.matrix();
+        of_pose += self.propagation.wheels.matrix();
         spread
     }
 }
@@ -408,8 +413,8 @@ mod tests {
             whole = transition * whole * transition.transpose();
             let mut block = whole.fixed_view_mut::<3, 3>(0, 0);
             block += of_pose.matrix();
-            let seen = predicted * Pose::new(1e-3, -2e-3, 3e-3);
-            let innovation = parts.update(seen);
+            let measured = predicted * Pose::new(1e-3, -2e-3, 3e-3);
+            let innovation = parts.update(measured);
             let mean = whole.fixed_view::<3, 3>(0, 0) + measurement;
             assert!((innovation.covariance - mean).norm() < 1e-12 * mean.norm());
             let gain = whole.fixed_columns::<3>(0) * mean.try_inverse().expect("regular");
@@ -423,12 +428,12 @@ mod tests {
     }
 
     /// Legs of half a metre with half a radian of turn to either side, seen without error; the robot has these lengths.
-    fn wander(filter: &mut AugmentedFilter<f64>, geometry_parameters: GeometryParameters, legs: u32) {
+    fn wander(filter: &mut AugmentedFilter<f64>, geometry_parameters: GeometryParameters, intervals: u32) {
         let mut truth = DeadReckoned::at(filter.world_from_body());
         let mut wheel_rad = filter.counts;
         filter.restart(truth.pose, wheel_rad);
-        for leg in 0..legs {
-            let turn = if leg % 4 < 2 { 1.0 } else { -1.0 };
+        for propagation in 0..intervals {
+            let turn = if propagation % 4 < 2 { 1.0 } else { -1.0 };
             let step = Wheels { left: 6.0 - turn, right: 6.0 + turn };
             truth.advance(&geometry_parameters, step);
             wheel_rad = wheel_rad.zip_with(step, |sum, step| sum + step);
@@ -438,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_are_found_settle_and_are_seen_to_change() {
+    fn factors_are_found_settle_and_their_change_is_detected() {
         let robot = |left: f64| GeometryParameters {
             m_per_rad: Wheels { left: 0.08 * left, right: 0.085 * 0.99 },
             separation_m: 0.363 * 1.03,

@@ -34,7 +34,7 @@ impl AugmentedKalman {
     /// [`CalibError`] when the sessions hold no poses, or a factor leaves what is a drive.
     pub fn follow(&self, sessions: &[Session<'_>]) -> Result<Vec<Followed>, CalibError> {
         let (_, geometry) = nominal(Self::NAME, sessions)?;
-        let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
+        let spacing = Spacing { every_m: self.measurement_every_m, every_rad: self.measurement_every_rad };
         let (runs, _) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
         let mut turned = Wheels::both(0.0);
         let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);

@@ -4,7 +4,7 @@
 //! noise of variance k²|s|; poses of the instrument correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that is one
 //! pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until factors and noise stay: the linearisation is then at the answer.
 //! Assumptions: the instrument sees the drive's centre, its errors are normal and independent from measurement to measurement, factors are constant. Looks are therefore
-//! taken apart by [`AugmentedKalman::look_every_m`]: twenty a second of one clock that is off are not independent.
+//! taken apart by [`AugmentedKalman::measurement_every_m`]: twenty a second of one clock that is off are not independent.
 //! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly better known afterwards is refused.
 //! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the augmented filter); Mehra 1970 for the innovations.
 
@@ -17,7 +17,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
-pub use filter::{AugmentedFilter, Innovation, Settling};
+pub use filter::{AugmentedFilter, PoseInnovation, Settling};
 pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
@@ -41,9 +41,9 @@ pub struct AugmentedKalman {
     /// First guess of its error in heading where the dataset does not state it, radians.
     pub truth_sigma_rad: f64,
     /// Measurements are taken after so much travel by the nominal robot, metres, …
-    pub look_every_m: f64,
+    pub measurement_every_m: f64,
     /// … or so much turn, radians, and at a run's end.
-    pub look_every_rad: f64,
+    pub measurement_every_rad: f64,
 }
 
 /// One pass over all runs.
@@ -62,8 +62,8 @@ impl AugmentedKalman {
         wheel_sigma_m_per_sqrt_m: WHEEL_SIGMA_GUESS,
         truth_sigma_m: POSITION_SIGMA_GUESS_M,
         truth_sigma_rad: HEADING_SIGMA_GUESS_RAD,
-        look_every_m: MEASUREMENT_SPACING_M,
-        look_every_rad: MEASUREMENT_SPACING_RAD,
+        measurement_every_m: MEASUREMENT_SPACING_M,
+        measurement_every_rad: MEASUREMENT_SPACING_RAD,
     };
 
     const NAME: &'static str = "augmented_kalman";
@@ -122,11 +122,11 @@ impl AugmentedKalman {
         for _ in 0..MAX_PASSES {
             // The same variances from where the factors came to, before they are compared with others from there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
-            let moved = (0..3).all(|i| {
+            let settled = (0..3).all(|i| {
                 (again.factors[i] - best.factors[i]).abs() <= PASS_TOLERANCE * again.covariance[(i, i)].sqrt()
             });
             best = again;
-            if !moved {
+            if !settled {
                 continue;
             }
             let step = best.noise.step() * share;
@@ -165,9 +165,9 @@ impl Method for AugmentedKalman {
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
-        let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
+        let spacing = Spacing { every_m: self.measurement_every_m, every_rad: self.measurement_every_rad };
         let (runs, runs_rejected) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
-        let (pass, stays) = self.iterate(&runs, &geometry, self.first_guess(sessions));
+        let (pass, settles) = self.iterate(&runs, &geometry, self.first_guess(sessions));
         self.observable(&pass.covariance)?;
         let [left, right, separation] = pass.factors.into();
         let diameter_m =
@@ -179,7 +179,7 @@ impl Method for AugmentedKalman {
             covariance: Some(covariance_of_lengths(|row, column| pass.covariance[(row, column)], lengths_m)),
             runs_used: runs.len(),
             runs_rejected,
-            converged: stays && pass.stopped,
+            converged: settles && pass.stopped,
             ..Calibration::new(Self::NAME, found, robot.ticks_per_rev)
         })
     }

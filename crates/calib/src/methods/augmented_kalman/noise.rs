@@ -169,8 +169,8 @@ mod tests {
     /// Measurements after legs of different lengths, whose innovations have the covariance of [`TRUTH`] exactly: ±√3 times the columns of its root.
     fn measurements() -> Vec<(Vector3<f64>, Expected)> {
         let mut measurements = Vec::new();
-        for leg in 1..=400_u32 {
-            let length_m = 0.01 * f64::from(leg);
+        for interval in 1..=400_u32 {
+            let length_m = 0.01 * f64::from(interval);
             let wheels = Matrix3::from_diagonal(&Vector3::new(0.5, length_m * length_m, 15.0)) * length_m;
             let expected = Expected {
                 fixed: Matrix3::from_diagonal_element(1e-7),

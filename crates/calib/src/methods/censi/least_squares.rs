@@ -73,11 +73,11 @@ impl CensiFit {
     /// Predicted minus seen, in the instrument's earlier frame: x, y in metres, heading in radians.
     #[must_use]
     pub fn residual(&self, sample: &DisplacementSample) -> Vector3<f64> {
-        let (predicted, seen) = (self.predicted(sample), sample.sensor_from_later);
+        let (predicted, measured) = (self.predicted(sample), sample.sensor_from_later);
         Vector3::new(
-            predicted.x_m - seen.x_m,
-            predicted.y_m - seen.y_m,
-            wrap_to_pi(predicted.theta_rad - seen.theta_rad),
+            predicted.x_m - measured.x_m,
+            predicted.y_m - measured.y_m,
+            wrap_to_pi(predicted.theta_rad - measured.theta_rad),
         )
     }
 
@@ -148,9 +148,9 @@ pub fn solutions<'e>(
             pose * Increment::from_travel(travel, unit.separation_m).arc()
         });
         let (sin, cos) = by_separation.theta_rad.sin_cos();
-        let seen = sample.sensor_from_later;
+        let measured = sample.sensor_from_later;
         let rows = Matrix2x3::new(-by_separation.x_m, 1.0 - cos, sin, -by_separation.y_m, -sin, 1.0 - cos);
-        let turned = Matrix2::new(seen.x_m, -seen.y_m, seen.y_m, seen.x_m);
+        let turned = Matrix2::new(measured.x_m, -measured.y_m, measured.y_m, measured.x_m);
         place += rows.transpose() * rows;
         mixed += rows.transpose() * turned;
         heading += turned.transpose() * turned;
@@ -186,8 +186,8 @@ pub fn solutions<'e>(
             cost_m2: eigen.eigenvalues[column],
         }
     };
-    let (cheap, dear) = if eigen.eigenvalues[0] <= eigen.eigenvalues[1] { (0, 1) } else { (1, 0) };
-    Ok([solution(cheap), solution(dear)])
+    let (best, other) = if eigen.eigenvalues[0] <= eigen.eigenvalues[1] { (0, 1) } else { (1, 0) };
+    Ok([solution(best), solution(other)])
 }
 
 /// Refuses wheel turns that are all in one proportion.
@@ -230,7 +230,7 @@ pub(super) mod tests {
     };
 
     /// What the instrument sees of these wheel turns, row by row.
-    fn seen(fit: &CensiFit, wheel_rad: &[(f64, f64)]) -> DisplacementSample {
+    fn measured(fit: &CensiFit, wheel_rad: &[(f64, f64)]) -> DisplacementSample {
         let wheel_rad = wheel_rad.iter().map(|&(left, right)| Wheels { left, right }).collect();
         let mut sample = DisplacementSample { run: "run".to_owned(), wheel_rad, sensor_from_later: Pose::IDENTITY };
         sample.sensor_from_later = fit.predicted(&sample);
@@ -247,7 +247,7 @@ pub(super) mod tests {
             &[(-3.0, -3.0), (1.0, 2.0)],
             &[(2.0, 5.0)],
         ];
-        turns.iter().map(|wheel_rad| seen(fit, wheel_rad)).collect()
+        turns.iter().map(|wheel_rad| measured(fit, wheel_rad)).collect()
     }
 
     pub(in super::super) fn off(found: &CensiFit, truth: &CensiFit) -> f64 {
@@ -269,10 +269,10 @@ pub(super) mod tests {
     fn without_errors_the_cheaper_solution_is_the_robot_and_the_other_one_is_not() {
         for theta_rad in [0.4, -1.6, 3.1] {
             let truth = CensiFit { body_from_sensor: Pose::new(0.12, -0.05, theta_rad), ..TRUTH };
-            let [cheap, dear] = solutions(&mut samples(&truth).iter()).expect("excited");
+            let [best, other] = solutions(&mut samples(&truth).iter()).expect("excited");
             // Normal equations of a condition of about 10 twice over: a hundred roundings.
-            assert!(off(&cheap.fit, &truth) < 1e-13, "{cheap:?}");
-            assert!(off(&dear.fit, &truth) > 0.1 && dear.cost_m2 > 1e-2 && cheap.cost_m2 < 1e-12, "{dear:?}");
+            assert!(off(&best.fit, &truth) < 1e-13, "{best:?}");
+            assert!(off(&other.fit, &truth) > 0.1 && other.cost_m2 > 1e-2 && best.cost_m2 < 1e-12, "{other:?}");
         }
     }
 
@@ -283,8 +283,8 @@ pub(super) mod tests {
             let sum = sample.whole_rad();
             sample.wheel_rad = vec![Wheels { left: sum.x, right: sum.y }];
         }
-        let [cheap, _] = solutions(&mut whole.iter()).expect("excited");
-        assert!(off(&cheap.fit, &TRUTH) > 1e-2);
+        let [best, _] = solutions(&mut whole.iter()).expect("excited");
+        assert!(off(&best.fit, &TRUTH) > 1e-2);
     }
 
     #[test]
@@ -322,14 +322,14 @@ pub(super) mod tests {
 
     #[test]
     fn what_does_not_excite_is_refused_with_what_is_missing() {
-        let all = |wheel_rad: &[(f64, f64)]| [seen(&TRUTH, wheel_rad), seen(&TRUTH, wheel_rad)];
+        let all = |wheel_rad: &[(f64, f64)]| [measured(&TRUTH, wheel_rad), measured(&TRUTH, wheel_rad)];
         assert!(message(&all(&[(4.0, 4.01)])).contains("drives straight: add spins"));
         assert!(message(&all(&[(-2.0, 2.01)])).contains("spins: add straight runs"));
         assert!(message(&all(&[(1.0, 3.0)])).contains("drives one arc"));
         assert!(message(&all(&[(0.0, 0.0)])).contains("do not turn"));
         // Straights, and spins by whole turns: where the instrument sits does not show.
         let whole_rad = std::f64::consts::TAU * 0.363 / (0.0811 + 0.0797);
-        let whole = [seen(&TRUTH, &[(4.0, 4.0)]), seen(&TRUTH, &[(-whole_rad, whole_rad)])];
+        let whole = [measured(&TRUTH, &[(4.0, 4.0)]), measured(&TRUTH, &[(-whole_rad, whole_rad)])];
         assert!(message(&whole).contains("whole turns only"), "{}", message(&whole));
         // The limit itself, from both sides.
         let normal = |ratio: f64| Matrix2::from_diagonal(&Vector2::new(1.0, ratio));

@@ -48,7 +48,7 @@ pub struct Trimmed {
     /// The six parameters.
     pub fit: CensiFit,
     /// Which excursions were kept, in their order.
-    pub kept: Vec<bool>,
+    pub retained: Vec<bool>,
     /// Shares that were dropped for their position and for their heading.
     pub dropped: (f64, f64),
 }
@@ -86,14 +86,14 @@ impl Censi {
                     let Some(measurements) = PoseMeasurements::at(run, &track, &geometry, spacing) else { continue };
                     let mut before = measurements.start;
                     samples.extend(measurements.later.into_iter().filter_map(|PoseMeasurement { wheel_rad, pose }| {
-                        let seen = before.to(pose);
+                        let measured = before.to(pose);
                         before = pose;
-                        sample(run, &nominal, wheel_rad, seen)
+                        sample(run, &nominal, wheel_rad, measured)
                     }));
                 } else {
-                    samples.extend(run.run().displacements.iter().filter_map(|seen| {
-                        let later = Pose::new(seen.dx_m, seen.dy_m, seen.dtheta_rad);
-                        sample(run, &nominal, track.steps(seen.t0_s, seen.t1_s)?, later)
+                    samples.extend(run.run().displacements.iter().filter_map(|measured| {
+                        let later = Pose::new(measured.dx_m, measured.dy_m, measured.dtheta_rad);
+                        sample(run, &nominal, track.steps(measured.t0_s, measured.t1_s)?, later)
                     }));
                 }
             }
@@ -106,11 +106,12 @@ impl Censi {
     /// # Errors
     /// [`CalibError`] when the excursions do not determine the parameters.
     pub fn trimmed(&self, samples: &[DisplacementSample]) -> Result<Trimmed, CalibError> {
-        let mut kept = vec![true; samples.len()];
+        let mut retained = vec![true; samples.len()];
         let mut dropped = (0, 0);
         for _ in 0..self.rounds {
-            let [StationarySolution { fit, .. }, _] = solutions(&mut among(samples, &kept).map(|(_, sample)| sample))?;
-            let errors: Vec<(usize, f64, f64)> = among(samples, &kept)
+            let [StationarySolution { fit, .. }, _] =
+                solutions(&mut retained_samples(samples, &retained).map(|(_, sample)| sample))?;
+            let errors: Vec<(usize, f64, f64)> = retained_samples(samples, &retained)
                 .map(|(index, sample)| {
                     let residual = fit.residual(sample);
                     (index, residual.x.hypot(residual.y), residual.z.abs())
@@ -124,13 +125,13 @@ impl Censi {
             };
             let (limit_m, limit_rad) = (limit(|error| error.1), limit(|error| error.2));
             for (index, error_m, error_rad) in errors {
-                kept[index] = error_m <= limit_m && error_rad <= limit_rad;
+                retained[index] = error_m <= limit_m && error_rad <= limit_rad;
                 dropped.0 += usize::from(error_m > limit_m);
                 dropped.1 += usize::from(error_rad > limit_rad);
             }
         }
-        let [cheap, dear] = solutions(&mut among(samples, &kept).map(|(_, sample)| sample))?;
-        if dear.cost_m2 <= MIN_COST_RATIO * cheap.cost_m2.max(0.0) {
+        let [best, other] = solutions(&mut retained_samples(samples, &retained).map(|(_, sample)| sample))?;
+        if other.cost_m2 <= MIN_COST_RATIO * best.cost_m2.max(0.0) {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::SensorTheta,
@@ -138,7 +139,7 @@ impl Censi {
             });
         }
         let share = |count: usize| count as f64 / samples.len() as f64;
-        Ok(Trimmed { fit: cheap.fit, kept, dropped: (share(dropped.0), share(dropped.1)) })
+        Ok(Trimmed { fit: best.fit, retained, dropped: (share(dropped.0), share(dropped.1)) })
     }
 }
 
@@ -146,24 +147,24 @@ fn sample(
     run: &RunView<'_>,
     nominal: &CensiFit,
     wheel_rad: Vec<Wheels<f64>>,
-    seen: Pose,
+    measured: Pose,
 ) -> Option<DisplacementSample> {
-    let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: seen };
+    let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: measured };
     // Standing still says nothing, and its small errors would make those of motion look like outliers.
     if sample.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
         return None;
     }
     // Whole turns come from the wheels.
     let about_rad = nominal.dead_reckon(&sample).pose.theta_rad;
-    sample.sensor_from_later.theta_rad = unwrap_near(seen.theta_rad, about_rad);
+    sample.sensor_from_later.theta_rad = unwrap_near(measured.theta_rad, about_rad);
     Some(sample)
 }
 
-fn among<'e>(
+fn retained_samples<'e>(
     samples: &'e [DisplacementSample],
-    kept: &'e [bool],
+    retained: &'e [bool],
 ) -> impl Iterator<Item = (usize, &'e DisplacementSample)> {
-    samples.iter().enumerate().filter(|(index, _)| kept[*index])
+    samples.iter().enumerate().filter(|(index, _)| retained[*index])
 }
 
 impl Method for Censi {
@@ -188,12 +189,12 @@ impl Method for Censi {
                 "no run has displacements (displacement.csv) or two poses (truth.csv with headings, or two marked points) while the wheels turn",
             ));
         }
-        let Trimmed { fit, kept, dropped } = self.trimmed(&samples)?;
+        let Trimmed { fit, retained, dropped } = self.trimmed(&samples)?;
         let mut by_run: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
-        for (sample, kept) in samples.iter().zip(&kept) {
+        for (sample, retained) in samples.iter().zip(&retained) {
             let (all, lost) = by_run.entry(&sample.run).or_default();
             *all += 1;
-            *lost += usize::from(!kept);
+            *lost += usize::from(!retained);
         }
         let runs_rejected = by_run
             .iter()
@@ -204,7 +205,7 @@ impl Method for Censi {
             })
             .collect();
 
-        let covariance = covariance(&fit, &samples, &kept, dropped);
+        let covariance = covariance(&fit, &samples, &retained, dropped);
         let block = |covariance: &Matrix6<f64>| {
             let mut scale = Matrix3::identity();
             scale[(0, 0)] = 2.0; // radii to diameters
@@ -230,13 +231,14 @@ impl Method for Censi {
 fn covariance(
     fit: &CensiFit,
     samples: &[DisplacementSample],
-    kept: &[bool],
+    retained: &[bool],
     dropped: (f64, f64),
 ) -> Option<Matrix6<f64>> {
-    let (sum, count) = among(samples, kept).fold((Vector3::zeros(), 0.0), |(sum, count), (_, sample)| {
-        let residual = fit.residual(sample);
-        (sum + residual.component_mul(&residual), count + 1.0)
-    });
+    let (sum, count) =
+        retained_samples(samples, retained).fold((Vector3::zeros(), 0.0), |(sum, count), (_, sample)| {
+            let residual = fit.residual(sample);
+            (sum + residual.component_mul(&residual), count + 1.0)
+        });
     // Three readings an excursion, six parameters.
     let degrees_of_freedom = count - 2.0;
     if degrees_of_freedom < 1.0 {
@@ -245,7 +247,7 @@ fn covariance(
     let (plane, axis) = left_of_variance(dropped);
     let var = (sum / degrees_of_freedom).component_div(&Vector3::new(plane, plane, axis));
     let sigma = var.map(|var| var.sqrt().max(MIN_DISPLACEMENT_SIGMA));
-    fit.information(among(samples, kept).map(|(_, sample)| sample), sigma).try_inverse()
+    fit.information(retained_samples(samples, retained).map(|(_, sample)| sample), sigma).try_inverse()
 }
 
 #[cfg(test)]
@@ -259,9 +261,9 @@ mod tests {
         all[7].sensor_from_later.x_m += 0.3;
         all[11].sensor_from_later.theta_rad += 0.3;
         let trimmed = Censi::DEFAULT.trimmed(&all).expect("excited");
-        assert!(!trimmed.kept[7] && !trimmed.kept[11]);
+        assert!(!trimmed.retained[7] && !trimmed.retained[11]);
         assert!(off(&trimmed.fit, &TRUTH) < 1e-12, "{:?}", trimmed.fit);
         let untrimmed = Censi { rounds: 0, ..Censi::DEFAULT }.trimmed(&all).expect("excited");
-        assert!(untrimmed.kept.iter().all(|kept| *kept) && off(&untrimmed.fit, &TRUTH) > 1e-4);
+        assert!(untrimmed.retained.iter().all(|retained| *retained) && off(&untrimmed.fit, &TRUTH) > 1e-4);
     }
 }
