@@ -1,5 +1,5 @@
-//! Anderson's acceleration of the fit's steps. Mean and noise step side by side, each as if the other stayed: what one moves, the other follows in the next step, and
-//! steps shrink by a constant share. The last few of them show that share, and where it leads.
+//! Anderson acceleration of the fit's steps. Mean and noise step side by side, each as if the other stayed,
+//! so that steps converge linearly. The last of them give the rates, and the fixed point.
 //!
 //! Reference: Anderson 1965; Walker & Ni 2011 (the mixing as least squares over differences of steps).
 
@@ -12,7 +12,7 @@ use crate::settings::{
     ANDERSON_SINGULAR_VALUE, MAX_ANDERSON_DIVERGENCES, MAX_ANDERSON_STEP_RATIO,
 };
 
-/// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
+/// Size of a step: of the mean squared over its variance, and of the noise in the logarithm of a variance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StepSize {
     pub(super) mean: f64,
@@ -22,16 +22,16 @@ pub(super) struct StepSize {
 /// The steps so far.
 #[derive(Debug, Default)]
 pub(super) struct Acceleration {
-    /// The last step that was proposed, and what was moved by instead.
+    /// The last step that was proposed, and the one that was taken.
     last: Option<(DVector<f64>, DVector<f64>)>,
-    /// How proposed steps differed from those before, and what had been moved by in between; the newest last.
+    /// Differences of consecutive proposed steps, and the steps taken in between; the newest last.
     differences: VecDeque<(DVector<f64>, DVector<f64>)>,
     engaged: bool,
     diverged: u32,
 }
 
 impl Acceleration {
-    /// Whether to go by the last steps at all, the next one being so large.
+    /// Whether the next step, of this size, is to be mixed.
     pub(super) fn engages(&mut self, step: StepSize) -> bool {
         if self.engaged && (step.mean > ANDERSON_DIVERGED_MEAN_STEP || step.noise > ANDERSON_DIVERGED_NOISE_STEP) {
             (self.engaged, self.last) = (false, None);
@@ -44,7 +44,8 @@ impl Acceleration {
         self.engaged
     }
 
-    /// What to move by instead of a step that is proposed. `metric` is the information on what is moved: lengths are in standard deviations.
+    /// The mixed step in the place of a proposed one. `metric` is the information, so that lengths are in
+    /// standard deviations.
     pub(super) fn mixed(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
         let squared = |of: &DVector<f64>| of.dot(&(metric * of));
         if let Some((before, moved)) = self.last.take() {
@@ -78,7 +79,7 @@ impl Acceleration {
         }
     }
 
-    /// What was moved by in the end, for a step that had been proposed.
+    /// Records the step that was taken for a proposed one.
     pub(super) fn moved(&mut self, proposed: DVector<f64>, by: DVector<f64>) {
         self.last = Some((proposed, by));
     }
@@ -88,7 +89,7 @@ impl Acceleration {
 mod tests {
     use super::*;
 
-    /// A map that draws nearer by a constant share in each direction is solved in as many steps as it has directions, and one to see it by.
+    /// A linear map of three rates is solved after three differences.
     #[test]
     fn a_linear_iteration_ends_once_its_rates_are_known() {
         let shares = DVector::from_vec(vec![0.9, -0.5, 0.3]);

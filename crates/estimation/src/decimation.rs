@@ -1,7 +1,8 @@
-//! Records in longer intervals, for whoever asks what hardly changes from one row of a fast log to the next.
+//! Records with longer intervals, for covariates that hardly change from one row of a fast log to the next.
 //!
-//! Rows a hundred times a second are ten to a measurement that comes ten times a second. A covariate that is a matter of tenths of a second is as well asked of five of
-//! them together; wheels that turn on, each at its own speed, go the same arc but for the square of what their speeds change by in the meantime.
+//! Between two measurements at 10 Hz a log at 100 Hz has ten rows. A covariate that varies within tenths of a
+//! second may be evaluated for five of them together. The arc of joined rows differs from theirs by the
+//! square of the change of the wheels' speeds.
 
 use kinematics::Wheels;
 
@@ -10,14 +11,15 @@ use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;
 
-/// Records whose intervals have been put together, and the same measurements taken of them.
+/// Records with joined intervals, and the same measurements taken of them.
 pub(crate) struct Decimated<'a> {
     pub(crate) records: Records<'a>,
     pub(crate) selections: Vec<Selection>,
 }
 
 impl<'a> Decimated<'a> {
-    /// Pieces of one way of turning put together, up to so long; measurements stay where they are. `None` where that leaves more than half of them.
+    /// Joins intervals in which both wheels keep turning, up to `longest_s` seconds; measurements stay where
+    /// they are. `None` where more than half of the intervals would be left.
     pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
         let (segments, ends): (Vec<_>, Vec<_>) =
             records.segments.iter().map(|segment| join_intervals(segment, longest_s)).unzip();
@@ -42,7 +44,8 @@ impl<'a> Decimated<'a> {
     }
 }
 
-/// A segment with its intervals put together between its measurements, and how many there are now for each number of them before: it is told where a measurement is, and means nothing elsewhere.
+/// A segment with its intervals joined between measurements, and for each number of intervals before the
+/// number now; the latter holds at measurements only.
 fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<usize>) {
     let mut ends = Vec::with_capacity(segment.intervals.len() + 1);
     let mut joined: Vec<WheelInterval> = Vec::new();
@@ -73,7 +76,7 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
     (Segment { intervals: joined, measurements, ..*segment }, ends)
 }
 
-/// Whether both wheels turn on as they did: neither turns back, begins or stands still.
+/// Do both wheels keep their direction: neither turns back, begins or stops?
 fn keeps_turning(last: Wheels<f64>, next: Wheels<f64>) -> bool {
     let as_before = last.zip_with(next, |last, next| last * next > 0.0 || (last == 0.0 && next == 0.0));
     as_before.left && as_before.right

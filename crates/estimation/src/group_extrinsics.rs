@@ -1,9 +1,11 @@
-//! Instruments of their own: the extrinsics or a latency that each session, or each run, has for itself.
+//! Extrinsics and latency of groups: of each session, or of each run.
 //!
-//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on n). A run's normal equation with that put in is
-//! I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹ of its group: whoever reads normal equations need not know that o exists.
-//! A weak prior keeps a group that shows nothing of o at what is common to all.
-//! Reference: Schur complement; Neyman & Scott 1948 for what many nuisances of few data do to a variance, and why they must gain on what was held out.
+//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on
+//! n). A run's normal equation with that put in is I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹
+//! of its group: the users of normal equations need not know of o. A weak prior keeps o at its common value
+//! where a group does not determine it.
+//! Reference: Neyman & Scott 1948: many nuisances of few data each bias a variance, so that they must gain on
+//! held-out data.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +15,7 @@ use crate::settings::{
     EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S, MAX_POSTERIOR_TO_PRIOR_SIGMA,
 };
 
-/// How a group's own columns follow a step of the others: at rest, and by each column of the normal equation.
+/// Response of a group's own columns: their own step, and that by each column of the normal equation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GroupResponse {
     pub(crate) group: (usize, usize),
@@ -38,7 +40,8 @@ impl GroupResponse {
 }
 
 impl GroupExtrinsics {
-    /// Takes the own columns out of the normal equations of runs or parts of runs; the model is the one in force.
+    /// Takes the own columns out of the normal equations of runs or parts of runs; the model is the one in
+    /// force.
     pub(crate) fn eliminate(&self, equations: &mut [NormalEquations], model: &Model) -> Vec<GroupResponse> {
         let at: Vec<usize> = self.columns.iter().map(|column| column.index()).collect();
         let mut groups: Vec<(usize, usize)> =
@@ -67,7 +70,7 @@ impl GroupExtrinsics {
             .collect()
     }
 
-    /// Is a column of a group known better than before any data?
+    /// Is a column of a group determined better than by its prior?
     pub(crate) fn is_shown(&self, response: &GroupResponse, column: Column) -> bool {
         let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
         let Some(inverse) = response.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
@@ -76,7 +79,7 @@ impl GroupExtrinsics {
         inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * plausible_sd(column)
     }
 
-    /// Gradient and curvature of what is plausible of each own column's distance from the common value.
+    /// Gradient and curvature of −log prior of each own column about the common value.
     fn pull(&self, model: &Model, group: (usize, usize)) -> Vec<(f64, f64)> {
         let common = model.common_instrument();
         let own = self.of.get(&group).copied().unwrap_or(common);
@@ -104,7 +107,8 @@ const fn plausible_sd(column: Column) -> f64 {
     }
 }
 
-/// Puts own columns that follow the others by `by` into an normal equation; their own rows and columns are empty afterwards.
+/// Eliminates own columns, whose response to the others is `by`, from a normal equation; their rows and
+/// columns are zero afterwards.
 fn substitute(equations: &mut NormalEquations, at: &[usize], by: &DMatrix<f64>) {
     let n = equations.gradient.len();
     let own = DMatrix::from_fn(at.len(), at.len(), |i, j| equations.information[(at[i], at[j])]);

@@ -1,13 +1,18 @@
-//! Maximum-likelihood estimation of a differential drive from whole runs: the likelihood, the fit, augmented models and predicted information.
+//! Maximum-likelihood estimation of a differential drive from whole runs: the likelihood, the fit, augmented
+//! models and predicted information.
 //!
-//! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the geometry in force, plus mean terms; noise k² per metre that
-//! a wheel rolls and a variance per radian turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white noise. Start poses are
-//! free: a run begins at its first measurement. The innovations' derivatives by every mean parameter give, run by run, a normal equation ([`NormalEquations`]): estimates,
-//! score tests, refits and held-out scores are linear algebra on these.
+//! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the
+//! geometry in force, plus mean terms; noise k² per metre that a wheel rolls and a variance per radian
+//! turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white
+//! noise. Start poses are free: a run begins at its first measurement. The innovations' derivatives by every
+//! mean parameter give, run by run, a normal equation ([`NormalEquations`]): estimates, score tests, refits
+//! and held-out scores are linear algebra on these.
 //!
-//! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry is never moved to make a covariance fit
-//! (mean-only information). A wrong noise model on 10⁵ measurements would outvote the mean.
-//! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974 (scoring); Chong & Kleeman 1997 (k²|s|).
+//! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry
+//! is never moved to make a covariance fit (mean-only information). A wrong noise model on 10⁵ measurements
+//! would outvote the mean.
+//! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974
+//! (scoring); Chong & Kleeman 1997 (k²|s|).
 
 mod acceleration;
 mod covariances;

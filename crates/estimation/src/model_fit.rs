@@ -1,4 +1,5 @@
-//! The maximum-likelihood fit of whole runs: records, the measurements taken of them, free columns, and the operations on a fit that is there.
+//! The maximum-likelihood fit of whole runs: its records, the measurements taken of them, its free columns,
+//! and what can be done with a fit.
 
 use std::sync::Arc;
 
@@ -31,22 +32,23 @@ pub struct ModelFit<'a> {
     pub selections: Arc<Vec<Selection>>,
     /// The nominal drive.
     pub nominal: Model,
-    /// Where fits start: the nominal drive with its instrument turned as it seems to be.
+    /// Where fits start: the nominal drive, with the approximate heading of its sensor.
     pub(crate) start: Model,
     /// The values found, with the pass at them.
     pub solution: Solution,
     /// The free columns.
     pub columns: Vec<Column>,
-    /// Directions of the three geometry parameters that the data do not determine, and that stay nominal: rows left, right, separation.
+    /// Directions of the three geometry parameters that the data do not determine, and that stay nominal:
+    /// rows left, right, separation.
     pub unobservable: Vec<DVector<f64>>,
     pub(crate) prior: NoisePrior,
-    /// Where steps of its fits end.
+    /// When the steps of its fits have converged.
     pub(crate) ends: ConvergenceCriterion,
-    /// The normal equation of parts, where there are no records to make it of.
+    /// Normal equations of parts, for a fit whose records have no measurements.
     pub(crate) parts: Vec<NormalEquations>,
-    /// Displacements count as neighbours when it is asked whether measurements are white.
+    /// Displacements of a run count as a series when autocorrelation is tested.
     pub(crate) displacements_in_series: bool,
-    /// Measurements that lie far off are taken like the others.
+    /// Measurements are not gated: outliers are taken too.
     pub(crate) ungated: bool,
 }
 
@@ -102,7 +104,7 @@ impl ModelFit<'_> {
         }
     }
 
-    /// An instrument that looks to the side cannot be left out of the first fit.
+    /// Frees the extrinsics of a rotated sensor, which the first fit cannot do without.
     pub(crate) fn free_extrinsics_if_rotated(&mut self) {
         let heading_rad = self.records.sensor_heading_rad(&self.nominal);
         if heading_rad.abs() > ROTATED_SENSOR_RAD {
@@ -146,7 +148,7 @@ impl ModelFit<'_> {
         InitialValues { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }
 
-    /// Takes measurements farther apart until their innovations are white, or a run has too few left.
+    /// Thins measurements until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
@@ -159,14 +161,14 @@ impl ModelFit<'_> {
         Ok(())
     }
 
-    /// Measurements so far apart; `None` when a run has too few left.
+    /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
         let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
         let selections = Selection::of(&self.records, thinning, &self.nominal);
         (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
     }
 
-    /// Does [`Self::thin`] take measurements farther apart than all of them?
+    /// Does [`Self::thin`] leave measurements out?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
         let between_s = median_between(&self.records).filter(|_| !self.is_white());
         between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
@@ -176,7 +178,8 @@ impl ModelFit<'_> {
         self.correlation() <= WHITENESS_Z
     }
 
-    /// The largest correlation of an innovation with the one before, of displacements (where they are to be thinned) with several before, over the components, in standard errors.
+    /// The largest autocorrelation of the innovations over the components, in standard errors: at lag 1, and
+    /// at several lags for displacements where these are to be thinned.
     #[must_use]
     pub fn correlation(&self) -> f64 {
         let times_taken = self.times_taken();
@@ -203,7 +206,8 @@ impl ModelFit<'_> {
             .fold(0.0, |largest: f64, z| largest.max(z.abs()))
     }
 
-    /// In how many phases the errors of a measurement are, on average: those of poses in all, as the propagation intervals between them overlap; those of a displacement where it is taken.
+    /// Mean number of phases in which the errors of a measurement are: all of them for poses, as their
+    /// propagation intervals overlap; those that take it for a displacement.
     fn times_taken(&self) -> f64 {
         let taken =
             |segment: usize| self.selections.iter().filter(|phase| !phase.propagations[segment].is_empty()).count();
@@ -227,16 +231,17 @@ impl ModelFit<'_> {
         self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.solution.pass.runs.len().max(1)))
     }
 
-    /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
+    /// Finds the directions of the geometry parameters that the measurements do not determine, and fixes them
+    /// at their nominal values.
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
         let was_fixed = !self.unobservable.is_empty();
         self.unobservable = unobservable(&information.matrix);
         if self.unobservable.is_empty() {
-            // What has come to be seen since is free again.
+            // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values())) } else { Ok(()) };
         }
-        // Back along what is not seen; what is seen stays as it was found.
+        // The model goes back to nominal along unobservable directions only.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
         let mut model = self.solution.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
@@ -251,12 +256,12 @@ impl ModelFit<'_> {
         self.refit(Some(from))
     }
 
-    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of. The terms of the fit come
-    /// first.
+    /// One pass at the values found, with the sensitivities of further terms at zero: what score tests are
+    /// made of. The terms of the fit come first.
     #[must_use]
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        // Terms that are in the fit come first and keep their sizes.
+        // Terms of the fit come first and keep their values.
         let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
         let Solution { noise, free_headings, .. } = &self.solution;
@@ -268,8 +273,9 @@ impl ModelFit<'_> {
         OutlierGate::of(self.ungated)
     }
 
-    /// The fit to every measurement, those that lie far off too: a large effect that shows in few measurements makes them lie far off, and without them it is not seen. Where some
-    /// err by themselves, it is a worse fit.
+    /// The fit to every measurement, outliers too. A large effect that shows in few measurements makes
+    /// outliers of these, and is lost without them. Where measurements have gross errors of their own, it is
+    /// a worse fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -279,14 +285,15 @@ impl ModelFit<'_> {
         Ok(ungated_fit)
     }
 
-    /// The values found, on every measurement of the first phase, those that lie far off too; nothing is fitted again.
+    /// The values found, evaluated on every measurement of the first phase, outliers too; nothing is fitted
+    /// again.
     #[must_use]
     pub fn evaluated_ungated(&self) -> Self {
         let first = self.selections.iter().take(1).cloned().collect();
         Self { ungated: true, selections: Arc::new(first), ..self.clone() }
     }
 
-    /// The same fit, measurements that lie far off by it left out. `terms` are those of the fit.
+    /// The same fit with outliers rejected. `terms` are those of the fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -296,7 +303,8 @@ impl ModelFit<'_> {
         Ok(gated)
     }
 
-    /// The normal equation of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
+    /// The normal equations of the same pass for terms that are tested one by one: the last parameters come
+    /// in parts of these sizes, and columns of two parts have no products.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
@@ -307,7 +315,8 @@ impl ModelFit<'_> {
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
 
-    /// The fit with further terms, their sizes free beside what is free already, on the same measurements.
+    /// The fit with further terms, whose values are free beside the columns that are free already, on the
+    /// same measurements.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -316,7 +325,7 @@ impl ModelFit<'_> {
         self.extended_from(vec![0.0; parameters], terms)
     }
 
-    /// The same, begun with given sizes: those of the terms that are in this fit already, say. The terms are those of `terms` only.
+    /// The same from given values of all `terms`, which replace those of this fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -336,8 +345,9 @@ impl ModelFit<'_> {
         Ok(extended)
     }
 
-    /// Covariance of the free columns: from the observed information where runs are few and innovations white, else corrected for what the model gets wrong by the
-    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account). `terms` are those of the fit.
+    /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
+    /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
+    /// & McCaffrey 2002). `terms` are those of the fit.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
@@ -357,7 +367,7 @@ impl ModelFit<'_> {
         free_basis(self.columns.len(), &self.fixed())
     }
 
-    /// The Schur complement of the free columns, but for some that are asked for.
+    /// The Schur complement of the free columns, without some.
     #[must_use]
     pub fn eliminated(&self, equations: &NormalEquations, others: &[usize]) -> Option<SchurComplement> {
         let columns: Vec<Column> =
@@ -366,7 +376,8 @@ impl ModelFit<'_> {
         SchurComplement::of(equations, &columns, basis)
     }
 }
-/// The directions of the three geometry parameters that a normal equation, which begins with them, does not determine.
+/// The directions of the three geometry parameters that a normal equation, which begins with them, does not
+/// determine.
 pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
     (0..3)
@@ -375,7 +386,7 @@ pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// Information on the three geometry parameters with the other columns at their best.
+/// Information on the three geometry parameters with the other columns eliminated.
 fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
     let n = matrix.nrows();
     let own = matrix.view((0, 0), (3, 3)).into_owned();

@@ -1,4 +1,4 @@
-//! Noise of the wheels and of the instrument: four variances, each with what is known of it before any data.
+//! Noise of the wheels and of the instrument: four variances and their priors.
 
 use dataset::TruthNoise;
 
@@ -12,7 +12,7 @@ use crate::settings::{
 pub enum NoiseComponent {
     /// Of a wheel's travel, m² per metre rolled (k²).
     Wheel,
-    /// Of the heading, rad² per radian turned: the wheelbase that scatters.
+    /// Of the heading, rad² per radian turned: a wheelbase that varies.
     Turn,
     /// Of each of a measurement's two coordinates, m².
     MeasurementPosition,
@@ -25,14 +25,14 @@ impl NoiseComponent {
     pub const ALL: [Self; 4] = [Self::Wheel, Self::Turn, Self::MeasurementPosition, Self::MeasurementHeading];
 }
 
-/// Sizes of the four variances.
+/// Values of the four variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// The variances in the order of [`NoiseComponent::ALL`].
     pub variance: [f64; 4],
 }
 
-/// What is plausible of a standard deviation before any data: it is within a factor e^`log_sd` of `centre` with two chances in three.
+/// Prior of the standard deviations: ln σ is normal about ln `centre` with the standard deviation `log_sd`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoisePrior {
     pub(crate) centre: [f64; 4],
@@ -56,7 +56,7 @@ impl NoisePrior {
         }
     }
 
-    /// Plausible standard deviations of a measurement's position, metres, and heading, radians.
+    /// Prior standard deviations of a measurement's position, metres, and heading, radians.
     pub(crate) const fn measurement_sigma(&self) -> [f64; 2] {
         [
             self.centre[NoiseComponent::MeasurementPosition as usize],
@@ -64,7 +64,7 @@ impl NoisePrior {
         ]
     }
 
-    /// The same with one standard deviation held at next to nothing.
+    /// The same with one standard deviation fixed at its lower bound.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
         (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_NOISE_SIGMA, FIXED_NOISE_LOG_SIGMA);
         self
@@ -91,7 +91,7 @@ impl Noise {
         self.variance[component as usize].sqrt()
     }
 
-    /// All larger by a factor, and none less than `least`.
+    /// All times a factor, and none below `least`.
     pub(crate) fn scaled(&self, factor: f64, least: f64) -> Self {
         Self { variance: self.variance.map(|variance| (variance * factor).max(least)) }
     }

@@ -1,4 +1,5 @@
-//! The instrument's extrinsics and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
+//! The instrument's extrinsics and latency, common to all or for each session or run: they join the model
+//! when they predict held-out runs.
 
 use kinematics::Pose;
 use nalgebra::DVector;
@@ -18,7 +19,7 @@ struct Unit {
     equations: NormalEquations,
 }
 
-/// What was predicted of runs by fits to other runs.
+/// Held-out prediction: of units by fits to the other folds.
 #[derive(Debug, Clone, PartialEq)]
 struct HeldOut {
     /// Each unit's cost.
@@ -29,22 +30,22 @@ struct HeldOut {
     end_rad: f64,
 }
 
-/// A set of the instrument's columns that earned its place.
+/// A set of the instrument's columns that predicts held-out units.
 struct AcceptedNuisances {
-    /// Over none of them, on what was held out.
+    /// Gain in held-out log-likelihood over none of them.
     gain: f64,
     columns: Vec<Column>,
     own: Option<GroupExtrinsics>,
     held_out: HeldOut,
 }
 
-/// Whether nuisances explain what is not white or lies far off.
+/// Whether nuisances explain autocorrelation or outliers.
 pub(crate) enum Explained<T> {
     /// The fit with them.
     Yes(T),
     /// The fit without them, thinned as far as it has to be.
     No { thinned: T },
-    /// There was nothing to explain, or nothing to do it.
+    /// There was nothing to explain, or no nuisance was accepted.
     NotTried,
 }
 
@@ -58,9 +59,10 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
     Some((mean, (variance / n).sqrt()))
 }
 
-/// Lets the extrinsics and the latency of the instrument in, common to all or for each session or run, where they predict runs that they were not fitted to: the
-/// measurements by their likelihood, and the ends of the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a
-/// calibration is for. What a run has for itself is fitted to one part of it and judged by another.
+/// Adds extrinsics and latency, common to all or for each session or run, where they predict held-out units:
+/// the measurements by their likelihood, and the ends of the runs by dead reckoning. The second condition
+/// keeps out terms that lower the cost and worsen the calibration. What each run has for itself is fitted to
+/// some blocks of it and judged on the others.
 pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
     let sets: [&[Column]; 3] = [
         &Column::EXTRINSICS,
@@ -69,7 +71,8 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     ];
     let several = fit.solution.pass.runs.iter().any(|run| run.run.0 != fit.solution.pass.runs[0].run.0);
     let mut groupings = vec![None];
-    // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
+    // Autocorrelated errors are common to the blocks of a run, so that blocks are no held-out data for each
+    // other.
     if gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white()) {
         groupings.push(Some(Grouping::Run));
     }
@@ -80,7 +83,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     for grouping in groupings {
         let units = units_of(fit, grouping, gate);
         let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
-        // What a larger set gains over a smaller one, it must gain by as much as that over nothing.
+        // A larger set must gain over the smaller one as significantly as that over none.
         let mut of_grouping: Option<AcceptedNuisances> = None;
         for set in sets {
             let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
@@ -106,7 +109,8 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     }
     if let Some(AcceptedNuisances { columns, own, .. }) = best {
         let mut from = fit.current_values();
-        // From where these measurements put them, and with every measurement until they fit: from nothing, a gate may hide what they would explain.
+        // The refit starts at the step that all measurements ask for: from zero, the gate could reject what
+        // it explains.
         if gate == OutlierGate::Off {
             from.noise = None;
         }
@@ -126,8 +130,9 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     Ok(())
 }
 
-/// Measurements that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all measurements, if
-/// they are then white, and were not before or less than half as many lie far off. If they are not, their number says little for what they seem to show.
+/// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
+/// thinning and without the gate. The fit is accepted if its innovations need no thinning, and if the fit
+/// without nuisances needs thinning or has more than twice as many outliers.
 pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,
@@ -150,8 +155,8 @@ pub(crate) fn explained_by_nuisances<'a>(
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
 
-/// Fits some columns, and what is own to groups, to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not
-/// determine the columns.
+/// Cross-validation of some columns and of the groups' own: for each fold, one step on the other folds,
+/// judged on it. `None` when the others of some fold do not determine the columns.
 fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<&GroupExtrinsics>) -> Option<HeldOut> {
     let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
     for fold in 0..FOLDS.min(units.len()) {
@@ -164,7 +169,7 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
         for (k, unit) in units.iter().enumerate().filter(|(_, unit)| unit.fold == fold) {
             let NormalEquations { run, .. } = unit.equations;
             let (mut columns, mut step, mut model) = (columns.to_vec(), step.clone(), common.clone());
-            // A group of which nothing else is known has what is common.
+            // A group without data in the other folds has the common instrument.
             if let Some(own) = own
                 && let Some(response) = responses.iter().find(|response| response.group == own.grouping.group(run))
             {
@@ -183,7 +188,7 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
     Some(found)
 }
 
-/// Evidence to be held out, so that a group is not held out as a whole.
+/// Normal equations of the units that are held out; no group is held out as a whole.
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
     let runs = fit.solution.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
@@ -191,7 +196,8 @@ fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -
         (_, OutlierGate::On) => fit.units(&mut []),
         (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS_TO_HOLD_OUT.div_ceil(runs), gate),
     };
-    // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
+    // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different
+    // folds.
     let mut measured: Vec<((usize, usize), usize)> = Vec::new();
     parts
         .into_iter()
@@ -219,7 +225,7 @@ impl ModelFit<'_> {
             || self.solution.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
     }
 
-    /// The instrument that all share, or the mean of those that groups show to have.
+    /// The common instrument, or the mean over groups of their own where these are observable.
     pub fn mean_instrument(&self) -> Instrument {
         let common = self.solution.model.common_instrument();
         let Some(own) = &self.solution.model.own else { return common };
@@ -243,7 +249,7 @@ impl ModelFit<'_> {
         }
     }
 
-    /// Does a group's data show a column of its own?
+    /// Is a column of a group's own instrument observable in its data?
     #[must_use]
     pub fn shows(&self, group: (usize, usize), column: Column) -> bool {
         let Solution { model, pass, .. } = &self.solution;

@@ -1,8 +1,10 @@
-//! Datasets too large to be held: the whole fit of pieces that are spread over them, then one scoring step over all, a part at a time.
+//! Datasets too large for memory: a fit of subsamples that are spread over them, then one scoring step over
+//! all, part by part.
 //!
-//! With the normal equation Σ I, Σ g of everything at the pieces' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is asymptotically as good as the fit of everything, as θ₀ is
-//! within O(1/√n): what it misses is of the order of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
-//! whether the instrument has the extrinsics or a latency are those of the pieces.
+//! With the normal equation Σ I, Σ g of everything at the subsamples' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is
+//! asymptotically as good as the fit of everything, as θ₀ is within O(1/√n): what it misses is of the order
+//! of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
+//! whether the instrument has the extrinsics or a latency are those of the subsamples.
 
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, channel, sync_channel};
@@ -26,16 +28,16 @@ use crate::settings::{
 };
 use crate::thinning::Selection;
 
-/// How a calibration of large datasets was made.
+/// How large datasets were calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OneStep {
     /// Measurements of all runs.
     #[serde(rename = "looks")]
     pub measurements: usize,
-    /// Measurements of the pieces that were fitted as a whole first.
+    /// Measurements of the subsamples that were fitted first.
     #[serde(rename = "first_looks")]
     pub first_measurements: usize,
-    /// Passes over everything: one, unless the first fit was far off.
+    /// Scoring steps over all measurements: one, unless the first fit was far off.
     pub passes: usize,
 }
 
@@ -50,7 +52,8 @@ pub enum OneStepError {
     Estimation(#[from] EstimationError),
 }
 
-/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500 rows at least.
+/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500
+/// rows at least.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
     let (rows, measurements) = rows_and_measurements(datasets);
@@ -69,7 +72,7 @@ fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
 /// Blocks of one run: dataset, run, blocks.
 type Part = (usize, usize, Range<usize>);
 
-/// One part's evidence, and what else it said.
+/// The normal equation of a part, and what else it gives.
 struct PartEquations {
     number: usize,
     equations: Option<NormalEquations>,
@@ -77,13 +80,13 @@ struct PartEquations {
     measurements: usize,
 }
 
-/// Everything at the values of a fit.
+/// The normal equations of all parts at the values of a fit.
 struct GatheredParts {
     parts: Vec<NormalEquations>,
     measurements: usize,
 }
 
-/// The fit of datasets of any size; its records hold no measurements, only the runs' ids.
+/// The fit of datasets of any size; its records have the runs' ids and no measurements.
 #[derive(Debug, Clone)]
 pub struct LargeFit {
     /// The fit.
@@ -96,11 +99,13 @@ pub struct LargeFit {
     pub names: Vec<String>,
 }
 
-/// Fits datasets of any size in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where [`is_large`] says no,
-/// [`FitSettings::fit`] does better: it takes all measurements for every choice.
+/// Fits datasets of any size in the memory of a part of them; `notice` gets each dataset's index and
+/// warnings. Where [`is_large`] is false, [`FitSettings::fit`] is better: it bases every choice on all
+/// measurements.
 ///
 /// # Errors
-/// [`OneStepError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+/// [`OneStepError`] when the datasets cannot be read, hold no measurements, or the fit of the subsamples
+/// diverges.
 pub fn fit_large(
     settings: FitSettings,
     datasets: &mut [Blocks],
@@ -116,7 +121,7 @@ pub fn fit_large(
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
     let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
-    // What the pieces hold is needed no more.
+    // The subsamples are needed no more.
     let mut found = first.with_records(Records { segments: Vec::new(), unused: Vec::new(), ids });
     let mut passes = 0;
     loop {
@@ -135,11 +140,11 @@ pub fn fit_large(
     }
 }
 
-/// The pieces, a dataset of them from each dataset.
+/// The subsamples: a dataset of them from each dataset.
 fn subsamples(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
     let (rows, measurements) = rows_and_measurements(datasets);
     let wanted = (SUBSAMPLE_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(MAX_SUBSAMPLE_ROWS);
-    // Every so many rows a piece, in the middle of these.
+    // A subsample is in the middle of each stride of rows.
     let stride = (rows / SUBSAMPLES).max(1);
     let within = stride.saturating_sub(wanted / SUBSAMPLES) / 2..(stride + wanted / SUBSAMPLES) / 2;
     let mut before = 0;
@@ -176,7 +181,8 @@ fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
 }
 
 impl ModelFit<'_> {
-    /// The evidence of everything at the values in force, part by part. This thread reads, others compute; sums are taken in the order of the parts.
+    /// The normal equations of all parts at the values in force. This thread reads, others compute; sums are
+    /// taken in the order of the parts.
     fn gather(
         &mut self,
         datasets: &mut [Blocks],
@@ -189,14 +195,14 @@ impl ModelFit<'_> {
             .enumerate()
             .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| (dataset, run, blocks.blocks(run))))
             .flat_map(|(dataset, run, count)| {
-                // What a run has for itself is found from all of it.
+                // The instrument of a run is found from all of it.
                 let cuts = if is_grouped_by_run { 1 } else { count.div_ceil(part_blocks) };
                 (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
             })
             .collect();
         let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_PART_THREADS);
         let mut part_equations = std::thread::scope(|scope| -> Result<Vec<PartEquations>, OneStepError> {
-            // No part waits: the thread that reads waits for one that has time.
+            // No part waits in memory: the reading thread waits for a worker.
             let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
             let take = Arc::new(Mutex::new(take));
             let (hand_in, collect) = channel();
@@ -214,7 +220,7 @@ impl ModelFit<'_> {
             for (number, (dataset, run, blocks)) in parts.iter().enumerate() {
                 let loaded = datasets[*dataset].read(*run, blocks.clone())?;
                 loaded.warnings.iter().for_each(|warning| notice(*dataset, warning));
-                // Nobody takes any more: what was handed in says why.
+                // The workers have stopped; what they handed in has the reason.
                 if give.send((number, (*dataset, *run), loaded.dataset)).is_err() {
                     break;
                 }
@@ -243,7 +249,7 @@ impl ModelFit<'_> {
         })
     }
 
-    /// What a part says at the values in force.
+    /// The normal equation of a part at the values in force.
     fn part_equations(
         &self,
         number: usize,
@@ -264,14 +270,15 @@ impl ModelFit<'_> {
         }
         let instrument = model.instrument(run);
         let Instrument { body_from_sensor, latency_s } = instrument;
-        // The columns that stand apart are still in the evidence: they are taken out of a group's sum.
+        // The groups' own columns are still in the normal equation: they are eliminated from a group's sum.
         let model = Model { body_from_sensor, latency_s, own: None, ..model };
         let (_, pass) = pass_settled(&records, &selections, model, noise)?;
         let own = is_grouped_by_run.then_some(instrument);
         Ok(PartEquations { number, equations: total(&pass.runs), own, measurements: records.measurements() })
     }
 
-    /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
+    /// Takes the scoring step of the parts' sum. Returns whether it was small enough for one step to be
+    /// efficient.
     fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
         let own = self.solution.model.own.clone();
         let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));

@@ -22,12 +22,12 @@ use crate::settings::{
 };
 use crate::thinning::Selection;
 
-/// Where the steps of a fit end.
+/// When the steps of a fit have converged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ConvergenceCriterion {
-    /// Where they are less than 1e-4 of a standard deviation of the mean, and this share of each variance.
+    /// Steps are below 1e-4 of a standard deviation of the mean, and below this share of each variance.
     NoiseShare(f64),
-    /// Where they change the log of the likelihood by less than 0.005: a variance that hardly matters may be anything.
+    /// Steps change the log-likelihood by less than 0.005: variances that hardly matter need not converge.
     Likelihood,
 }
 
@@ -40,11 +40,11 @@ pub struct FitOptions {
     pub fixed: Vec<DVector<f64>>,
     /// The noise stays as it is.
     pub noise_fixed: bool,
-    /// Where steps end.
+    /// When the steps have converged.
     pub ends: ConvergenceCriterion,
     /// Most steps.
     pub max_steps: usize,
-    /// Measurements that lie far off are taken like the others.
+    /// Take every measurement, outliers too.
     pub ungated: bool,
 }
 
@@ -70,13 +70,13 @@ pub struct Solution {
     pub model: Model,
     /// The noise.
     pub noise: Noise,
-    /// Start headings of segments whose instrument sees none, radians; 0 for others.
+    /// Start headings of segments without measured headings, radians; 0 for others.
     pub(crate) free_headings: Vec<f64>,
     /// The last pass, at the values above.
     pub pass: Pass,
-    /// Did the steps die out?
+    /// Did the steps converge?
     pub converged: bool,
-    /// Did a step go far, and farther than the first? What it ends at may be one of several minima.
+    /// Was a step long, and longer than the first? The minimum may then be one of several.
     pub left_basin: bool,
 }
 
@@ -101,7 +101,7 @@ impl Solution {
     }
 }
 
-/// Where to start.
+/// Where a fit starts.
 #[derive(Debug, Clone)]
 pub(crate) struct InitialValues {
     pub(crate) model: Model,
@@ -143,7 +143,7 @@ pub(crate) fn fit_from(
     let basis = free_basis(options.columns.len(), &options.fixed);
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
-        // Sizes first, by medians, which outliers do not move; then outliers can be told.
+        // The noise is scaled to the median, which is robust to outliers, before these are rejected.
         for round in 1..=MAX_UNGATED_STEPS {
             let pass_options = PassOptions { innovations: true, gate: OutlierGate::Off, ..PassOptions::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
@@ -161,7 +161,7 @@ pub(crate) fn fit_from(
                 (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
                 MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
             );
-            // A long way with few measurements bends the path: while steps are large, every measurement would be taken for an outlier.
+            // Where steps are large, a long path with few measurements makes all of them look like outliers.
             if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
                 break;
             }
@@ -176,7 +176,7 @@ pub(crate) fn fit_from(
     let (mut damping, mut acceleration) = (StepDamping::default(), Acceleration::default());
     let keep = Selection::has_long_propagations(selections);
     let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
-    // How far the model has come from where propagation intervals were kept: squares of its steps.
+    // Squared distance of the model from that of the cached propagations.
     let mut moved_since_cached = 0.0;
     for _ in 0..options.max_steps {
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
@@ -198,7 +198,8 @@ pub(crate) fn fit_from(
         };
         let moved = mean.squared + own;
         left_basin |= moved > LEFT_BASIN_STEP.max(*first.get_or_insert(moved));
-        // By kept propagation intervals steps only seem to settle: driven ones have the last word, where the model has gone on since.
+        // Convergence with cached propagations is confirmed by integrated ones, unless the model has hardly
+        // moved since.
         moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
         let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
         let settles = match options.ends {
@@ -214,7 +215,7 @@ pub(crate) fn fit_from(
         cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < CACHED_STEP) };
         confirms = settles;
     }
-    // The last step was so small that propagation intervals follow it as if they were driven.
+    // After so small a step cached propagations are as good as integrated ones.
     let by = cached.as_ref().filter(|_| converged);
     let pass_options =
         PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
@@ -222,8 +223,8 @@ pub(crate) fn fit_from(
     Ok(Solution { model, noise, free_headings: headings, pass, converged, left_basin })
 }
 
-/// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for
-/// themselves, are followed until they settle; nothing else moves.
+/// A pass at given common values, and its model: start headings that are not measured, and the instruments of
+/// single runs, are iterated until they converge; nothing else moves.
 pub(crate) fn pass_settled(
     records: &Records<'_>,
     selections: &[Selection],
@@ -245,7 +246,8 @@ pub(crate) fn pass_settled(
     Err(EstimationError::Diverges)
 }
 
-/// A pass at given values, with its innovations; free headings are those of segments whose instrument sees none, one for each segment.
+/// A pass at given values, with its innovations. `free_headings` has one start heading for each segment,
+/// radians; it is used where headings are not measured.
 #[must_use]
 pub fn pass_with_innovations(
     records: &Records<'_>,
@@ -293,8 +295,8 @@ impl MeanStep {
     }
 }
 
-/// Moves the mean by a step, and the start headings and instruments that follow it; returns what was moved by in the end, and the squared length, over its variance,
-/// of what groups' own instruments moved by.
+/// Moves the mean by a step, with the start headings and the groups' instruments. Returns the step as it was
+/// taken, and the squared step of the groups' instruments over its variance.
 fn take_step(
     model: &mut Model,
     headings: &mut [f64],
@@ -304,7 +306,7 @@ fn take_step(
 ) -> Result<(DVector<f64>, f64), EstimationError> {
     let mut moved = vec![0.0; found.runs.first().ok_or(EstimationError::NoMeasurements)?.gradient.len()];
     for (column, by) in options.columns.iter().zip(step.iter_mut()) {
-        // A drive that a step makes a half or twice as large is none; the next step goes on.
+        // The next step goes on where this one is cut.
         *by = if Column::GEOMETRY.contains(column) { by.clamp(-MAX_GEOMETRY_STEP, MAX_GEOMETRY_STEP) } else { *by };
         if !by.is_finite() {
             return Err(EstimationError::Diverges);
@@ -355,7 +357,7 @@ impl NoiseStep {
         let Some(mut by) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else {
             return Self::none();
         };
-        // What stands at its floor does not move.
+        // A variance at its lower bound does not fall.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
             if variance <= MIN_NOISE_SIGMA * MIN_NOISE_SIGMA {
                 *by = by.max(0.0);
@@ -370,7 +372,8 @@ impl NoiseStep {
     }
 }
 
-/// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
+/// Share of its scoring step that the logarithm of each variance takes: scoring overshoots where the model is
+/// wrong, and shorter steps converge.
 #[derive(Debug, Clone, Copy)]
 struct StepDamping {
     last: Vector4<f64>,
@@ -421,7 +424,8 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all
 }
 
-/// The heading with which a segment that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
+/// Approximate start heading of a segment without measured headings, radians: the rotation of its
+/// dead-reckoned path onto the measured one.
 pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
     let Some(first) = segment
         .measurements
@@ -441,7 +445,7 @@ pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
         dot += pose.x_m * x_m + pose.y_m * y_m;
         cross += pose.x_m * y_m - pose.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));
-        // Reckoning is good at the start; half a metre of way shows the heading to a degree.
+        // Dead reckoning is best near the start.
         if longest_m > START_HEADING_BASELINE_M || heading_rad == 0.0 {
             heading_rad = unwrap_near(cross.atan2(dot), 0.0);
         }

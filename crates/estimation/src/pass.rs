@@ -23,26 +23,26 @@ pub struct Pass {
     pub runs: Vec<NormalEquations>,
     /// The whitened innovations, phase by phase, in the order of segments and measurements.
     pub innovations: Vec<Vec<InnovationComponent>>,
-    /// Measurements left out as outliers in the first phase: segment and look.
+    /// Outliers of the first phase: segment and measurement.
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
     pub(crate) noise: NoiseScore,
-    /// How the free headings of segments without one follow a step of the parameters.
+    /// Response of the free start headings to a step of the parameters.
     pub(crate) headings: Vec<FreeHeading>,
-    /// How the instruments that groups have for themselves follow one.
+    /// Response of the groups' own instruments to one.
     pub(crate) own: Vec<GroupResponse>,
-    /// The propagation intervals, where they are to be kept.
+    /// The propagations, where they were recorded.
     pub(crate) cached: Option<CachedPropagation>,
 }
 
-/// How the free start heading of a segment follows a step of the parameters.
+/// Response of a segment's free start heading to a step of the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct FreeHeading {
     pub(crate) segment: usize,
     pub(crate) run: (usize, usize),
-    /// Without one.
+    /// Its own step, radians.
     pub(crate) rest: f64,
-    /// By each column.
+    /// Its step by each column.
     pub(crate) by: Vec<f64>,
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn pass(
             let mut found = Vec::with_capacity(segments.len());
             for number in segments.clone() {
                 let unobservable = propagations[number].is_empty();
-                // Terms remember what was driven on the way to the next displacement, seen or not.
+                // The state of terms goes on over displacements that are not taken.
                 let remember = !terms.is_empty() && pass_options.by.is_none();
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
@@ -137,7 +137,7 @@ pub(crate) fn pass(
             };
             runs.iter().zip(&mut result.runs).map(in_run).collect()
         } else if at_once {
-            // Chains of a run follow each other, and terms remember; each run starts anew.
+            // Segments of a run follow each other, as terms have a state; each run starts anew.
             let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>,
                           (segments, equations): (&Range<usize>, &mut NormalEquations)| {
                 of_run(segments, equations, terms)
@@ -175,7 +175,7 @@ pub(crate) fn pass(
     result
 }
 
-/// The segments of each run, which follow each other.
+/// The segments of each run, which are consecutive.
 fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
     let mut start = 0;
     let of = |segments: &[Segment<'_>]| {
@@ -186,7 +186,7 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
     segments.chunk_by(|a, b| a.run == b.run).map(of).collect()
 }
 
-/// What one segment says in one phase, beside its normal equation.
+/// What one segment gives in one phase, beside its normal equation.
 struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,

@@ -1,12 +1,12 @@
-//! The sums of a segment's innovations, and the elimination of a start heading that nobody saw.
+//! The sums of a segment's innovations, and the elimination of a start heading that is not measured.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::normal_equations::NormalEquations;
 use crate::settings::MIN_VARIANCE_PRODUCT;
 
-/// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
-/// each other.
+/// Which columns' products a normal equation has. Outer products grow with the square of the columns;
+/// candidates that are tested one by one need none with each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Products {
     /// So many columns come first, which have products with all.
@@ -16,7 +16,8 @@ pub(crate) struct Products {
 }
 
 impl Products {
-    /// Of so many columns, the last of which come in parts: those of a part have products with what comes before all parts, and with each other.
+    /// Of so many columns, the last of which come in parts: those of a part have products with what comes
+    /// before all parts, and with each other.
     pub(crate) fn of(columns: usize, parts: &[usize]) -> Self {
         let common = columns - parts.iter().sum::<usize>();
         let mut first = Vec::new();
@@ -37,7 +38,8 @@ pub(crate) struct Sums<'p> {
     own: Vec<f64>,
     gradient: Vec<f64>,
     chi_square: f64,
-    /// Logarithms of variances, and a product of some that is still to be taken: a logarithm of many costs no more than one of one.
+    /// Sum of the logarithms of variances, and a product whose logarithm is still to be added: one logarithm
+    /// serves many.
     log_det: f64,
     det: f64,
     count: f64,
@@ -123,7 +125,8 @@ impl<'p> Sums<'p> {
         information
     }
 
-    /// The normal equation with the free heading at its best, and how that follows the others: at rest, and by each column.
+    /// The normal equation with the free heading eliminated, and the heading's response: its own step, and
+    /// that by each column.
     pub(crate) fn eliminated(&self, run: (usize, usize), columns: usize) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
         let mut equations = NormalEquations {
             run,

@@ -1,7 +1,10 @@
-//! Profile intervals: how far a parameter can be moved, with everything else at its best, before the likelihood falls by what chance explains.
+//! Profile-likelihood intervals: the values of a parameter at which the likelihood, maximised over all
+//! others, falls by a given amount.
 //!
-//! Where the cost is no parabola (few measurements, an instrument whose place trades against the wheels) they lie lopsided about the estimate, as they should.
-//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an interval by less than a part in the number of measurements.
+//! Where the cost is no parabola (few measurements, a sensor position that is correlated with the wheels)
+//! they are asymmetric about the estimate.
+//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an
+//! interval by less than a part in the number of measurements.
 
 use nalgebra::DVector;
 
@@ -13,7 +16,8 @@ use crate::optimizer::{FitOptions, fit_from};
 use crate::settings::{MAX_PROFILE_STEPS, MIN_PROFILE_RISE, PROFILE_RISE_TOLERANCE};
 
 impl ModelFit<'_> {
-    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by `rise` ([`crate::RISE_95`]).
+    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by
+    /// `rise` ([`crate::RISE_95`]).
     ///
     /// # Errors
     /// [`EstimationError`] when the column is not free, or a refit diverges.
@@ -37,7 +41,8 @@ impl ModelFit<'_> {
         self.solution.pass.runs.iter().map(NormalEquations::cost).sum()
     }
 
-    /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the parabola through the last step.
+    /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the
+    /// parabola through the last step.
     fn end(&self, column: Column, position: usize, first: f64, level: f64) -> Result<f64, EstimationError> {
         let best = self.cost();
         let mut by = first;
@@ -47,7 +52,7 @@ impl ModelFit<'_> {
             if (risen - wanted).abs() < PROFILE_RISE_TOLERANCE * wanted {
                 break;
             }
-            // A cost that hardly rises is followed outwards by no more than a factor of two at a time.
+            // A cost that rises little moves the end outwards by a factor of two at the most.
             by *= (wanted / risen.max(MIN_PROFILE_RISE * wanted)).sqrt();
         }
         Ok(by)

@@ -1,8 +1,9 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
-//! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
-//! compares the wheels with such measurements integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
-//! the first row and after the last, the speeds of the interval there go on.
+//! An outside instrument has a clock of its own. Between two rows of the log the wheels are taken to turn at
+//! constant speeds, so that every method that compares the wheels with such measurements integrates the same
+//! motion. A log whose rows jitter begins a little after its run does: half of an interval before the first
+//! row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
@@ -31,7 +32,8 @@ pub struct WheelAngleInterpolator<'a> {
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
-    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a turn.
+    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a
+    /// turn.
     ///
     /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
     #[must_use]
@@ -73,8 +75,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous: run.info().continuous })
     }
 
-    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
-    /// one of its intervals lies between them.
+    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
+    /// not span them, or has gaps and more than one of its intervals lies between them.
     #[must_use]
     pub fn steps(&self, from_s: f64, to_s: f64) -> Option<Vec<Wheels<f64>>> {
         let (first, last) = (self.row_at(from_s)?, self.row_at(to_s)?);
@@ -95,7 +97,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some(inner.chain([to]).map(step).collect())
     }
 
-    /// Whether [`Self::steps`] says anything between two instants.
+    /// Whether the log spans two instants, as [`Self::steps`] needs it.
     #[must_use]
     pub fn spans(&self, from_s: f64, to_s: f64) -> bool {
         self.steps(from_s, to_s).is_some()
@@ -107,7 +109,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         &self.turn_rad
     }
 
-    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its twist.
+    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its
+    /// twist.
     #[must_use]
     pub const fn first_rad(&self) -> Wheels<f64> {
         self.first_rad
@@ -122,8 +125,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
     }
 
-    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of the outer interval where it is close outside of the
-    /// log; `None` farther out.
+    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of
+    /// the outer interval where it is close outside of the log; `None` farther out.
     fn row_at(&self, t_s: f64) -> Option<usize> {
         let before = self.t_s.partition_point(|row_s| *row_s <= t_s + TIME_TOLERANCE_S);
         self.row_of(before, t_s)
@@ -157,7 +160,7 @@ impl<'a> WheelAngleInterpolator<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Cursor<'t, 'a> {
     track: &'t WheelAngleInterpolator<'a>,
-    /// The row of the last instant asked for.
+    /// The row of the last instant.
     row: usize,
 }
 
@@ -183,8 +186,8 @@ impl Cursor<'_, '_> {
         self.track.turn_at(self.row, t_s)
     }
 
-    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is appended, where the log does not reach from one to the
-    /// other without a gap.
+    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is
+    /// appended, where the log does not reach from one to the other without a gap.
     pub(crate) fn intervals(&mut self, from_s: f64, to_s: f64, intervals: &mut Vec<WheelInterval>) -> bool {
         let before = intervals.len();
         let Some(mut angle) = self.angle_rad(from_s) else { return false };
@@ -255,11 +258,11 @@ mod tests {
     }
 
     #[test]
-    fn outside_of_the_log_and_across_gaps_nothing_is_said() {
+    fn outside_of_the_log_and_across_gaps_there_are_no_steps() {
         for (from_s, to_s) in [(-0.6, 1.0), (1.0, 5.1), (2.0, 1.0)] {
             assert_eq!(steps(ticks(), true, from_s, to_s), None, "{from_s} {to_s}");
         }
-        // Nor is anything said beside the log of what has gaps.
+        // A log with gaps is not extrapolated.
         assert_eq!(steps(ticks(), false, -0.1, 0.5), None);
         assert_eq!(steps(ticks(), false, 1.0, 2.0), Some(vec![(10.0, -10.0)]));
         assert_eq!(steps(ticks(), false, 1.2, 1.8).map(|steps| steps.len()), Some(1));
