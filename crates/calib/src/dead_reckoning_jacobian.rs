@@ -1,7 +1,9 @@
-//! Dead reckoning with its derivatives by the three geometry parameters of the drive, for methods that descend on a path's error.
+//! Dead reckoning with its derivatives by the three geometry parameters of the drive, for methods that
+//! descend on a path's error.
 //!
-//! Steps are exact arcs (kinematics, `Rule::ExactArc`): position `p += ΔS·sinc(Δθ/2)·u(θ + Δθ/2)`, heading `θ += Δθ`, with `ΔS = (r_R φ_R + r_L φ_L)/2` and
-//! `Δθ = (r_R φ_R − r_L φ_L)/B` (paper, eq. 1 to 3) for wheel turns φ. The derivatives are carried along step by step, so that they are exact too.
+//! Steps are exact arcs (kinematics, `Rule::ExactArc`): position `p += ΔS·sinc(Δθ/2)·u(θ + Δθ/2)`, heading `θ
+//! += Δθ`, with `ΔS = (r_R φ_R + r_L φ_L)/2` and `Δθ = (r_R φ_R − r_L φ_L)/B` (paper, eq. 1 to 3) for wheel
+//! turns φ. The derivatives are carried along step by step, so that they are exact too.
 
 use kinematics::{Increment, Pose, Wheels, sinc, sinc_derivative};
 use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
@@ -9,7 +11,7 @@ use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
 use crate::estimate::Parameter;
 use crate::settings::MIN_COMMON_SCALE_COMPONENT;
 
-/// The lengths that turn wheel turns into motion.
+/// The three lengths of the drive by which wheel turns make a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GeometryParameters {
     /// Travel of each wheel for a radian, metres: its radius.
@@ -18,7 +20,7 @@ pub(crate) struct GeometryParameters {
     pub(crate) separation_m: f64,
 }
 
-/// One step's motion with what it depends on.
+/// One step's motion and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Step {
     /// Displacement in the frame in which the heading before the step was given, and turn.
@@ -57,7 +59,7 @@ pub(crate) struct DeadReckoned {
 }
 
 impl DeadReckoned {
-    /// Standing at a pose that does not depend on the geometry parameters.
+    /// At a pose that does not depend on the geometry parameters.
     pub(crate) fn at(pose: Pose) -> Self {
         Self { pose, by_geometry: Matrix3::zeros() }
     }
@@ -65,7 +67,7 @@ impl DeadReckoned {
     /// Takes one step of the wheels, radians.
     pub(crate) fn advance(&mut self, geometry_parameters: &GeometryParameters, wheel_rad: Wheels<f64>) {
         let Step { moved, by_geometry } = geometry_parameters.step(self.pose.theta_rad, wheel_rad);
-        // A heading that is off turns the step: the displacement's quarter turn.
+        // A heading error turns the step: the displacement's quarter turn.
         let heading = self.by_geometry.row(2).into_owned();
         let mut turned = Matrix3::zeros();
         turned.set_row(0, &(-moved.y_m * heading));
@@ -76,7 +78,8 @@ impl DeadReckoned {
     }
 }
 
-/// The parameter that a direction in the relative sizes of left wheel, right wheel and separation stands for, and what to drive where it is not seen.
+/// The parameter that a direction in relative left wheel, right wheel and separation stands for, and what to
+/// drive where it is not observable.
 pub(crate) fn unobservable(direction: &Vector3<f64>) -> (Parameter, &'static str) {
     let sizes = direction.normalize().abs();
     // All three grow together: every turn stays, every length grows.
@@ -133,7 +136,8 @@ mod tests {
                 let (plus, minus) = (moved(h), moved(-h));
                 for row in 0..3 {
                     let difference = (plus[row] - minus[row]) / (2.0 * h);
-                    // Third derivatives stay under 2 m·(20/0.363)³ ≈ 3e5: truncation h²/6 of it 6e-8. Rounding 1e-15/1e-6 = 1e-9.
+                    // Third derivatives stay under 2 m·(20/0.363)³ ≈ 3e5: truncation h²/6 of it 6e-8.
+                    // Rounding 1e-15/1e-6 = 1e-9.
                     let tolerance = 1e-7;
                     let found = dead_reckoned.by_geometry[(row, column)];
                     assert!((found - difference).abs() < tolerance, "{end} {row} {column}: {found} {difference}");

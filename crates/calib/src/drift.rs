@@ -1,7 +1,8 @@
 //! Drift of dead reckoning under a calibration, measured against the outside instrument.
 //!
-//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is compared at the truth's instants; between two
-//! rows of the log the pose is interpolated along the chord. Instants outside of the log are left out.
+//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is
+//! compared at the truth's instants; between two rows of the log the pose is interpolated along the chord.
+//! Instants outside of the log are left out.
 
 use dataset::{RunView, Session};
 use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
@@ -59,7 +60,8 @@ pub struct RunDrift {
     pub why_null: Option<&'static str>,
 }
 
-/// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values when there is none.
+/// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values
+/// when there is none.
 ///
 /// `name_runs` adds each session's name to its runs.
 #[must_use]
@@ -85,7 +87,7 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
 }
 
 impl CalibrationDrift {
-    /// What runs evaluated under one calibration say together.
+    /// The drift of runs that were evaluated under one calibration.
     #[must_use]
     pub fn of_runs(calibration: Option<&NamedCalibration>, runs: Vec<RunDrift>) -> Self {
         let name = calibration.map_or_else(|| "nominal".to_owned(), |calibration| calibration.name.clone());
@@ -163,7 +165,8 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     }
 }
 
-/// The reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the log.
+/// The dead-reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the
+/// log.
 fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
     while *row + 1 < log.len() && log[*row + 1].0 <= t_s + TIME_TOLERANCE_S {
         *row += 1;
@@ -219,7 +222,8 @@ mod tests {
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
     use kinematics::Wheels;
 
-    /// A straight metre in ten rows on wheels of 1 mm a tick, whose truth is 2 % longer and stamped between the rows.
+    /// A straight metre in ten rows on wheels of 1 mm a tick, whose truth is 2 % longer and stamped between
+    /// the rows.
     fn dataset(truth: Vec<TruthSample>) -> Dataset {
         let ticks: Vec<i64> = (0..=10).map(|k| 100 * k).collect();
         let run = Run {

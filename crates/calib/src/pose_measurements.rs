@@ -1,7 +1,7 @@
-//! What an outside instrument's poses say of a run: measurements far enough apart, and how the wheels turned between them.
+//! An outside instrument's poses of a run: measurements at a spacing, and how the wheels turned between them.
 //!
-//! An instrument that looks twenty times a second says little more of the wheels than one that looks once a metre, and what is wrong with its clock or with a
-//! start from standstill is in every one of its measurements.
+//! Twenty measurements a second carry little more information on the wheels than one a metre: the errors of
+//! the instrument's clock and of a start from standstill are in all of them.
 
 use dataset::{NominalRobot, RunView, Session};
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
@@ -28,11 +28,11 @@ impl Spacing {
 pub(crate) struct PoseMeasurement {
     /// Turns of the wheels since the measurement before, row by row, radians.
     pub(crate) wheel_rad: Vec<Wheels<f64>>,
-    /// What was seen, in the room; whole turns since the start are counted.
+    /// The measured pose in the room; whole turns since the start are counted.
     pub(crate) pose: Pose,
 }
 
-/// The looks at one run.
+/// The pose measurements of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PoseMeasurements<'a> {
     /// The run's id.
@@ -44,7 +44,8 @@ pub(crate) struct PoseMeasurements<'a> {
 }
 
 impl<'a> PoseMeasurements<'a> {
-    /// The looks at a run; `None` when fewer than two poses lie within its log, or the log has gaps.
+    /// The pose measurements of a run; `None` when fewer than two poses lie within its log, or the log has
+    /// gaps.
     pub(crate) fn at(
         run: &RunView<'a>,
         track: &WheelAngleInterpolator<'_>,
@@ -80,7 +81,8 @@ impl<'a> PoseMeasurements<'a> {
         Some(Self { run: &run.info().id, start, later })
     }
 
-    /// The looks at every run of all sessions that has two poses or more, and the runs whose poses are of no use.
+    /// The pose measurements of every run of all sessions that has two poses or more, and the runs whose
+    /// poses cannot be used.
     ///
     /// # Errors
     /// [`CalibError`] when a robot's nominal values are no drive, or no run is left.
@@ -109,7 +111,7 @@ impl<'a> PoseMeasurements<'a> {
     }
 }
 
-/// Where a run was first and last seen, and how the wheels turned in between.
+/// The first and the last measured pose of a run, and how the wheels turned in between.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct EndPoses {
     pub(crate) start: Pose,
@@ -132,7 +134,7 @@ impl EndPoses {
         self.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad))
     }
 
-    /// Where the robot ends by its wheels, from the origin, by the midpoint rule.
+    /// The end of the run by dead reckoning from the origin, by the midpoint rule (paper, eq. 3).
     pub(crate) fn dead_reckoned(&self, geometry: &DriveGeometry) -> Pose {
         self.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
             pose * geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad)).midpoint()
@@ -148,8 +150,9 @@ mod tests {
     use super::*;
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
 
-    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second for 20 s; poses every half second, and one
-    /// farther outside of the log on either side than its rows reach, headings wrapped.
+    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second
+    /// for 20 s; poses every half second, and one farther outside of the log on either side than its rows
+    /// reach, headings wrapped.
     fn dataset(continuous: bool) -> Dataset {
         let rows = 29;
         let (metre, spin) = (1.0, 0.25);
@@ -191,7 +194,8 @@ mod tests {
         let (measurements, rejected) = PoseMeasurements::of_all("test", &[dataset.session()], spacing).expect("poses");
         assert!(rejected.is_empty());
         let measurements = &measurements[0];
-        // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at 27.75 s.
+        // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at
+        // 27.75 s.
         assert_eq!(measurements.start.x_m, 0.0625);
         let xs: Vec<f64> = measurements.later.iter().take(4).map(|measurement| measurement.pose.x_m).collect();
         assert_eq!(xs, [0.5625, 1.0625, 1.5625, 2.0]);

@@ -88,7 +88,7 @@ impl Segment<'_> {
     }
 
     /// For each measurement, whether a wheel changed its speed since the measurement before, or within
-    /// [`SPEED_CHANGE_WINDOW_S`] where that is longer, by more than [`SPEED_CHANGE_RATIO`] of the fastest
+    /// `SPEED_CHANGE_WINDOW_S` where that is longer, by more than `SPEED_CHANGE_RATIO` of the fastest
     /// speed in the segment.
     #[must_use]
     pub fn changes_of_speed(&self) -> Vec<bool> {

@@ -1,15 +1,20 @@
 //! `circular`: the bidirectional circular path test, circles driven both ways and their radii measured.
 //!
-//! Model: on a circle of signed radius R (positive counter-clockwise) the contacts go (R ± B/2)Θ, so that with e = E_d = D_R/D_L and the wheels' turns φ
-//! (2R + B)/(2R − B) = e φ_R/φ_L. Both ways at one commanded ratio q of the outer to the inner wheel give (2R_ccw + B)/(2R_ccw − B) = e q and
-//! (2R_cw + B)/(2R_cw − B) = q/e with unsigned radii: B follows from their product, e² from their quotient ([`base_and_ratio`]).
-//! Derived here: q is the run's own, from its counts, and not the command's (ρ + b/2)/(ρ − b/2); runs are cut into overlapping legs of a quarter turn or the
-//! next reading, R = chord/(2 sin Θ/2) for each; e and B are the least squares of R over all legs, which is the closed form when the legs of a way agree.
-//! A leg that the wheels' ratio changes within is left out, so that spirals of steps serve too.
-//! Assumptions: constant wheel ratio within a leg; the instrument sees the drive's centre (one that sits a lever to the left makes counter-clockwise circles
-//! small and clockwise ones large, which is read as unequal wheels); the mean diameter is right: D_L = 2D/(e + 1), D_R = 2D e/(e + 1).
-//! Observability: e, and B in metres whatever the scale of the wheels. Blind to their common scale, which changes how far round a circle goes, not its radius.
-//! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no small-angle form.
+//! Model: on a circle of signed radius R (positive counter-clockwise) the contacts go (R ± B/2)Θ, so that
+//! with e = E_d = D_R/D_L and the wheels' turns φ (2R + B)/(2R − B) = e φ_R/φ_L. Both ways at one commanded
+//! ratio q of the outer to the inner wheel give (2R_ccw + B)/(2R_ccw − B) = e q and (2R_cw + B)/(2R_cw − B) =
+//! q/e with unsigned radii: B follows from their product, e² from their quotient ([`base_and_ratio`]).
+//! Derived here: q is the run's own, from its counts, and not the command's (ρ + b/2)/(ρ − b/2); runs are cut
+//! into overlapping arcs of a quarter turn or the next reading, R = chord/(2 sin Θ/2) for each; e and B are
+//! the least squares of R over all arcs, which is the closed form when the arcs of a direction agree. An arc
+//! within which the wheels' ratio changes is left out, so that spirals of steps serve too.
+//! Assumptions: constant wheel ratio within an arc; the instrument is at the drive's centre (one that is to
+//! the left makes counter-clockwise circles small and clockwise ones large, which is read as unequal wheels);
+//! the mean diameter is right: D_L = 2D/(e + 1), D_R = 2D e/(e + 1).
+//! Observability: e, and B in metres whatever the scale of the wheels. Blind to their common scale, which
+//! changes how far round a circle goes, not its radius.
+//! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no
+//! small-angle form.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
 use kinematics::{DriveGeometry, Point, Wheels, unwrap_near};
@@ -47,12 +52,14 @@ impl Arc {
     }
 }
 
-/// Wheelbase (metres) and E_d from the mean radii of both ways (metres, unsigned) and the ratio of the outer to the inner wheel's turn in each: the method's
-/// closed form. `None` when the circles are no wider than the wheelbase allows.
+/// Wheelbase (metres) and E_d from the mean radii of both ways (metres, unsigned) and the ratio of the outer
+/// to the inner wheel's turn in each: the method's closed form. `None` when the circles are no wider than the
+/// wheelbase allows.
 #[must_use]
 pub fn base_and_ratio(ccw: (f64, f64), cw: (f64, f64)) -> Option<(f64, f64)> {
     let ((r_ccw_m, q_ccw), (r_cw_m, q_cw)) = (ccw, cw);
-    // (2R₁ + B)(2R₂ + B) = P (2R₁ − B)(2R₂ − B): the smaller root of a quadratic, in the form that does not cancel.
+    // (2R₁ + B)(2R₂ + B) = P (2R₁ − B)(2R₂ − B): the smaller root of a quadratic, in the form that does not
+    // cancel.
     let product = q_ccw * q_cw;
     let (half, free) = ((r_ccw_m + r_cw_m) * (product + 1.0), product - 1.0);
     let root = (half * half - 4.0 * r_ccw_m * r_cw_m * free * free).sqrt();
@@ -93,7 +100,7 @@ fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -
     Some(readings)
 }
 
-/// The legs of one run; or why it has none.
+/// The arcs of one run; or why it has none.
 fn arcs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<Arc>, &'static str> {
     let readings = readings(run, robot, geometry).ok_or("the run has no odometry")?;
     let (mut arcs, mut bent, mut end) = (Vec::new(), false, 0);
@@ -189,7 +196,8 @@ impl Method for Circular {
             covariance,
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
-                why: "a factor common to both wheels changes how far round a circle goes, not its radius; the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length",
+                why: "a factor common to both wheels changes how far round a circle goes, not its radius; \
+                      the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length",
             }],
             runs_used: runs.len(),
             runs_rejected,
@@ -199,7 +207,7 @@ impl Method for Circular {
     }
 }
 
-/// Least squares of the legs' radii over e and B.
+/// Least squares of the arcs' radii over e and B.
 struct Fit {
     ratio: f64,
     separation_m: f64,
@@ -233,7 +241,8 @@ impl Fit {
         (normal, right)
     }
 
-    /// Covariance of e and B from the scatter between the runs, which have one equation each for two unknowns.
+    /// Covariance of e and B from the scatter between the runs, which have one equation each for two
+    /// unknowns.
     fn covariance(&self, runs: &[Vec<Arc>]) -> Option<DMatrix<f64>> {
         let dynamic = |matrix: Matrix2<f64>| DMatrix::from_column_slice(2, 2, matrix.as_slice());
         let (normal, _) = self.normal(runs);
@@ -292,7 +301,8 @@ mod tests {
             (at(1.01, 0.36 + h) - at(1.01, 0.36 - h)) / (2.0 * h),
         ];
         let (_, slope) = arc.predicted(1.01, 0.36);
-        // h²/6 of a third derivative of about 6·0.8·2.8³, and rounding 1e-16/1e-5; an error of 1e-3 of the slope would show.
+        // h²/6 of a third derivative of about 6·0.8·2.8³, and rounding 1e-16/1e-5; an error of 1e-3 of the
+        // slope would show.
         assert!((slope.x - by[0]).abs() < 1e-8 && (slope.y - by[1]).abs() < 1e-8, "{slope} {by:?}");
     }
 }

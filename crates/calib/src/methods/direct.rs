@@ -1,11 +1,15 @@
 //! `direct`: the paper's method, straight runs for the sensitivities and spins for the wheelbase.
 //!
-//! Model: each wheel rolls C metres a count; the contacts are B apart. A straight run of small turn Δθ moves the mark beside a wheel along a chord, from
-//! which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
-//! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses instead of marks, the wheel contacts serve as marks.
-//! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that the outlier rule leaves, wheel by wheel.
-//! Two departures from the print, both derived in docs/paper.md: chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed
-//! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
+//! Model: each wheel rolls C metres a count; the contacts are B apart. A straight run of small turn Δθ moves
+//! the mark beside a wheel along a chord, from which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ
+//! gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
+//! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses
+//! instead of marks, the wheel contacts serve as marks.
+//! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that
+//! the outlier rule leaves, wheel by wheel. Two departures from the print, both derived in docs/paper.md:
+//! chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed (14)
+//! holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8),
+//! which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
 use dataset::{PointReading, Protocol, RunView, Session};
@@ -24,7 +28,7 @@ pub struct Direct {
     pub outliers: MedianMad,
 }
 
-/// What one run says, with its id.
+/// The value of one run, with its id.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunValue<'a> {
     /// The run.
@@ -35,7 +39,8 @@ pub struct RunValue<'a> {
     pub stated_sigma: f64,
 }
 
-/// Standard deviation of one coordinate of a mark, by the instrument's statement, metres; 0 when it states none.
+/// Standard deviation of one coordinate of a mark, by the instrument's statement, metres; 0 when it states
+/// none.
 fn mark_sigma_m(session: &Session<'_>) -> f64 {
     session.truth_noise.sigma_xy_m.unwrap_or(0.0)
 }
@@ -89,7 +94,8 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         let half_m = 0.5 * self.geometry.wheel_separation_m();
         let readings = &run.run().point_readings;
         if readings.is_empty() {
-            // Poses: the contacts themselves are the marks. What the wheels turned before and after was not seen.
+            // Poses: the contacts themselves are the marks. What the wheels turned before and after was not
+            // measured.
             return Ok(EndPoses::of(run, self.session.robot, &self.geometry).map(|ends| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
                 let (start, end) = (contacts.map(|p| ends.start * p), contacts.map(|p| ends.end * p));
@@ -126,7 +132,8 @@ impl Direct {
         CalibError::NotApplicable { method: Self::NAME, why }
     }
 
-    /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of its pulses.
+    /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of
+    /// its pulses.
     ///
     /// # Errors
     /// [`CalibError::NotApplicable`] when marks are where (6) does not hold.
@@ -141,7 +148,8 @@ impl Direct {
                 let turn_rad = marks.turn_rad(0.0);
                 let chord_over_arc = sinc(0.5 * turn_rad);
                 for side in Side::BOTH {
-                    // Signed with the direction of travel: backward runs have negative chords and negative counts.
+                    // Signed with the direction of travel: backward runs have negative chords and negative
+                    // counts.
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * wheel_rad[side].signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };
                     let arc_m = chord_m / chord_over_arc + outward * marks.outside_m[side] * turn_rad;
@@ -155,7 +163,8 @@ impl Direct {
         Ok(values)
     }
 
-    /// The wheelbase from every spin, metres, given metres per radian of each wheel; with it the two wheels' turns over the robot's (∂B/∂C).
+    /// The wheelbase from every spin, metres, given metres per radian of each wheel; with it the two wheels'
+    /// turns over the robot's (∂B/∂C).
     ///
     /// # Errors
     /// [`CalibError::NotApplicable`] when marks are where (14) does not hold.
@@ -185,7 +194,7 @@ impl Direct {
         Ok(values)
     }
 
-    /// Which values are typical, and what these say together; the others are noted.
+    /// Which values are no outliers, and their summary; outliers are added to `rejected`.
     fn filter<'v, 'a: 'v>(
         &self,
         values: impl ExactSizeIterator<Item = &'v RunValue<'a>> + Clone,
@@ -204,7 +213,7 @@ impl Direct {
     }
 }
 
-/// The values that are kept.
+/// The values that are no outliers.
 fn retained<'v>(
     values: impl Iterator<Item = f64> + Clone + 'v,
     keep: &'v [bool],
@@ -221,7 +230,8 @@ impl Method for Direct {
         "the paper's: straight runs give both sensitivities, spins the wheelbase (points or poses at both ends)"
     }
 
-    /// The paper's runs: 500 mm forward and backward, about a turn each way. It gives no number of spins; 30 are ours.
+    /// The paper's runs: 500 mm forward and backward, about a turn each way. It gives no number of spins; 30
+    /// are ours.
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 0.5, runs: 82 },
@@ -271,7 +281,8 @@ impl Method for Direct {
     }
 }
 
-/// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has its own scatter.
+/// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has
+/// its own scatter.
 fn covariance(left: Option<f64>, right: Option<f64>, base: Option<f64>, slope: Wheels<f64>) -> Option<Covariance> {
     let (left, right, base) = (left?, right?, base?);
     let base_var = base + slope.left * slope.left * left + slope.right * slope.right * right;
@@ -331,8 +342,9 @@ mod tests {
 
     #[test]
     fn paper_eq_6_unsigned_is_off_backward() {
-        // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03 % at m = 50 mm means Δθ = 1.5 mrad,
-        // the turn that the paper's wheels (1.0334 and 1.0322) make over 500 pulses: 0.6/363 = 1.65 mrad.
+        // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03
+        // % at m = 50 mm means Δθ = 1.5 mrad, the turn that the paper's wheels (1.0334 and 1.0322) make over
+        // 500 pulses: 0.6/363 = 1.65 mrad.
         let marks = marks_after(Increment { distance_m: -0.5, turn_rad: 1.65e-3 }, Wheels::both(0.05));
         let arc_m: f64 = -0.5 - 0.5 * 0.363 * 1.65e-3;
         let chord_m = marks.start.left.distance_m(marks.end.left);

@@ -1,13 +1,19 @@
 //! `ivanjko`: gains of the wheels from where straight runs end, the wheelbase from how far spins turn.
 //!
-//! Model: dead reckoning of the run's own log (exact arcs) under r_L, r_R, B. Step 1: r_L and r_R minimise Σ |end seen − end reckoned|² over the straight
-//! runs, in the frame of the start. Step 2: with them u = r_R φ_R − r_L φ_L is what a spin by θ says B θ is; per direction B = Σ u²/Σ u θ, the least squares
-//! of the heading over the gain, and the result is the mean of the directions. The steps alternate until nothing changes (B bends the straight runs a little).
-//! Assumptions: the heading at the start is right: a wrong one moves a straight end sideways as unequal wheels do. Wheels that roll.
-//! Observability: all three parameters; needs straights and spins. Ends alone are used, of poses or of marks read at standstills.
-//! Derived here: Gauss–Newton in place of a general minimiser (with two numbers a run for two gains it ends in the same minimum), and the covariance, from
-//! the scatter of the ends and of the spins' wheelbases, with the slopes of each step over the other's result.
-//! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves out a wheel, is not offered.
+//! Model: dead reckoning of the run's own log (exact arcs) under r_L, r_R, B. Step 1: r_L and r_R minimise Σ
+//! |end measured − end dead reckoned|² over the straight runs, in the frame of the start. Step 2: with them u
+//! = r_R φ_R − r_L φ_L is B θ of a spin by θ; per direction B = Σ u²/Σ u θ, the least squares of the heading
+//! over the gain, and the result is the mean of the directions. The steps alternate until nothing changes (B
+//! bends the straight runs a little).
+//! Assumptions: the heading at the start is right: a wrong one moves a straight end sideways as unequal
+//! wheels do. Wheels that roll.
+//! Observability: all three parameters; needs straights and spins. Ends alone are used, of poses or of marks
+//! read at standstills.
+//! Derived here: Gauss–Newton in place of a general minimiser (with two numbers a run for two gains it ends
+//! in the same minimum), and the covariance, from the scatter of the ends and of the spins' wheelbases, with
+//! the slopes of each step over the other's result.
+//! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves
+//! out a wheel, is not offered.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
@@ -37,7 +43,7 @@ impl Ivanjko {
     }
 }
 
-/// A straight run with its end as it was seen.
+/// A straight run with its measured end.
 struct Straight {
     /// How the wheels turned, row by row, radians.
     steps_rad: Vec<Wheels<f64>>,
@@ -46,7 +52,7 @@ struct Straight {
 }
 
 impl Straight {
-    /// What is missing to the end that was seen, and the slopes of the reckoned end over r_L and r_R and over B.
+    /// Measured minus dead-reckoned end, metres, and the slopes of the latter over r_L and r_R and over B.
     fn missing(&self, at: &GeometryParameters) -> (Vector2<f64>, Matrix2<f64>, Vector2<f64>) {
         let mut end = DeadReckoned::at(Pose::IDENTITY);
         for step in &self.steps_rad {
@@ -58,7 +64,7 @@ impl Straight {
     }
 }
 
-/// A spin with its turn as it was seen.
+/// A spin with its measured turn.
 #[derive(Debug, Clone, Copy)]
 struct Spin {
     wheel_rad: Wheels<f64>,
@@ -74,7 +80,8 @@ impl Spin {
     }
 }
 
-/// Step 1 linearised: normal matrix over r_L and r_R, what each run asks for, and how the answer moves with B.
+/// Step 1 linearised: normal matrix over r_L and r_R, each run's score, the correction of both, and its slope
+/// over B.
 struct Step1 {
     normal: Matrix2<f64>,
     scores: Vec<DVector<f64>>,
@@ -99,7 +106,8 @@ impl Step1 {
     }
 }
 
-/// Step 2: the wheelbase of one direction, metres, by the least squares of the heading over its gain; `None` without spins that way.
+/// Step 2: the wheelbase of one direction, metres, by the least squares of the heading over its gain; `None`
+/// without spins in that direction.
 fn separation_m(spins: &[Spin], at: &GeometryParameters, sign: f64) -> Option<f64> {
     let of_direction = spins.iter().map(|spin| spin.of_wheels(at)).filter(|(_, turn_rad)| turn_rad * sign > 0.0);
     let (squares, products) = of_direction.fold((0.0, 0.0), |(squares, products), (travel_m, turn_rad)| {
@@ -147,9 +155,10 @@ fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<M
     Some(inverse * own * inverse.transpose())
 }
 
-/// The first and the last look at a run within its log, and how the wheels turned in between, row by row; `None` without two.
+/// The first and the last measured pose of a run within its log, and how the wheels turned in between, row by
+/// row; `None` without two.
 ///
-/// The wheels are taken at the measurements' instants: an instrument that stops looking before the log ends has not seen what they turned since.
+/// The wheels are taken at the measurements' instants: what they turn after the last one is not measured.
 fn whole(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<(Pose, PoseMeasurement)> {
     let measurements = PoseMeasurements::at(run, &WheelAngleInterpolator::of(run, robot)?, nominal, Spacing::ENDS)?;
     let PoseMeasurements { start, mut later, .. } = measurements;
@@ -165,7 +174,8 @@ impl Method for Ivanjko {
         "straight runs' ends give both wheels, spins the wheelbase, by least squares over the log"
     }
 
-    /// Straight runs and half turns each way; the numbers are those of the study that published its logs (Sousa et al. 2022: 1.5 m, 5 of each kind).
+    /// Straight runs and half turns each way; the numbers are those of the study that published its logs
+    /// (Sousa et al. 2022: 1.5 m, 5 of each kind).
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 1.5, runs: 6 },

@@ -1,11 +1,15 @@
-//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument measured.
+//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument
+//! measured.
 //!
-//! Model: [`estimation`]: counts predict, measurements correct; geometry, the noise of wheels and instrument and every start pose are estimated.
-//! Assumptions: the instrument's errors are independent. That is tested: while innovations are autocorrelated, measurements are taken farther
-//! apart. Extrinsics and latency of the instrument join when they predict runs that they were not fitted to.
-//! Observability: any path; what the measurements do not determine is named and kept at its nominal value. Ends of closed paths hide the common scale, paths without
-//! turns the wheel separation.
-//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
+//! Model: [`estimation`]: counts predict, measurements correct; geometry, the noise of wheels and instrument
+//! and every start pose are estimated.
+//! Assumptions: the instrument's errors are independent. That is tested: while innovations are
+//! autocorrelated, measurements are taken farther apart. Extrinsics and latency of the instrument join when
+//! they predict runs that they were not fitted to.
+//! Observability: any path; what the measurements do not determine is named and kept at its nominal value.
+//! Ends of closed paths hide the common scale, paths without turns the wheel separation.
+//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin,
+//! Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
 use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, OneStepError, fit_large};
@@ -32,11 +36,13 @@ impl Joint {
 
     const NAME: &'static str = "joint";
 
-    /// Calibrates from datasets of any size, in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where
-    /// [`estimation::is_large`] says no, [`Method::calibrate`] does better: it takes all measurements for every choice.
+    /// Calibrates from datasets of any size, in the memory of a part of them; `notice` gets each dataset's
+    /// number and what was noticed of it. Where [`estimation::is_large`] says no, [`Method::calibrate`] does
+    /// better: it takes all measurements for every choice.
     ///
     /// # Errors
-    /// [`LargeCalibrationError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+    /// [`LargeCalibrationError`] when the datasets cannot be read, hold no measurements, or the fit of the
+    /// subsamples diverges.
     pub fn calibrate_large(
         &self,
         datasets: &mut [Blocks],
@@ -90,7 +96,8 @@ impl Method for Joint {
     }
 }
 
-/// The drive of a fit, with what the measurements do not determine of it; `covariance` is [`ModelFit::covariance`].
+/// The drive of a fit, with what the measurements do not determine of it; `covariance` is
+/// [`ModelFit::covariance`].
 ///
 /// # Errors
 /// [`CalibError::NotADrive`] where the values of the fit are none.

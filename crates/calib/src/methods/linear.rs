@@ -1,14 +1,18 @@
 //! `linear`: linear least squares on any path, first the headings, then the positions.
 //!
-//! Model: Δs = c11 φ_R + c12 φ_L and Δθ = c21 φ_R + c22 φ_L. Step 1: θ_N − θ_0 = [Σ Δφ_R, Σ Δφ_L]·[c21; c22]. Step 2, with the headings of step 1 along the
-//! log: p_N − p_0 = [Σ Δφ_R e(θ), Σ Δφ_L e(θ)]·[c11; c12] with e(θ) the direction of the path, the chord of an exact arc between two rows. The physical form
-//! has three parameters, c11 = r_R/2, c12 = r_L/2, c21 = r_R/B, c22 = −r_L/B: r_L/r_R = −c22/c21 from step 1, then r_R alone, B = r_R/c21.
-//! Assumptions: wheels that roll; headings without noise in step 2. Heading noise of variance σ² (of the start's reading, and of the path against the log)
-//! turns what was seen against its regressor: wheels and base come out short by σ²/2 of themselves. It does not average out over runs.
-//! Observability: all parameters where paths turn both ways or both turn and go straight, and end away from their start. On closed paths the physical
-//! form keeps the mean diameter and says that it is blind to the common scale; the general one needs curves: on straights and whole spins c11 and c12 are one.
-//! Derived here: what of a run is an equation ([`Readings`]), the refusals, the covariance (residuals of a run taken together, scatter between runs), and the
-//! geometry that the general form comes nearest to.
+//! Model: Δs = c11 φ_R + c12 φ_L and Δθ = c21 φ_R + c22 φ_L. Step 1: θ_N − θ_0 = [Σ Δφ_R, Σ Δφ_L]·[c21; c22].
+//! Step 2, with the headings of step 1 along the log: p_N − p_0 = [Σ Δφ_R e(θ), Σ Δφ_L e(θ)]·[c11; c12] with
+//! e(θ) the direction of the path, the chord of an exact arc between two rows. The physical form has three
+//! parameters, c11 = r_R/2, c12 = r_L/2, c21 = r_R/B, c22 = −r_L/B: r_L/r_R = −c22/c21 from step 1, then r_R
+//! alone, B = r_R/c21.
+//! Assumptions: wheels that roll; headings without noise in step 2. Heading noise of variance σ² (of the
+//! start's reading, and of the path against the log) turns the measured displacement against its regressor:
+//! wheels and base come out short by σ²/2 of themselves. It does not average out over runs.
+//! Observability: all parameters where paths turn both ways or both turn and go straight, and end away from
+//! their start. On closed paths the physical form keeps the mean diameter and says that it is blind to the
+//! common scale; the general one needs curves: on straights and whole spins c11 and c12 are one.
+//! Derived here: what of a run is an equation ([`Readings`]), the refusals, the covariance (residuals of a
+//! run taken together, scatter between runs), and the geometry that the general form comes nearest to.
 //! Reference: Antonelli, Chiaverini, Fusco 2005 (general form); Antonelli & Chiaverini 2007 (physical form).
 
 use dataset::{NominalRobot, RunView, Session};
@@ -32,9 +36,10 @@ pub enum Form {
 /// What of a run is an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Readings {
-    /// Its last pose seen from its first, where the robot stands: the papers' form.
+    /// Its last pose in the frame of its first, where the robot stands: the papers' form.
     EndPoses,
-    /// Every pose seen from the first: for single long runs, and to see the scale on closed paths. Clocks that differ then enter the headings.
+    /// Every pose in the frame of the first: for single long runs, and to determine the scale on closed
+    /// paths. Differences of the clocks then enter the headings.
     All,
 }
 
@@ -74,7 +79,7 @@ struct Driven {
     equations: Vec<Equation>,
 }
 
-/// A pose seen from the run's first.
+/// A pose in the frame of the run's first.
 struct Equation {
     /// How the wheels turned since the equation before, row by row, radians.
     steps_rad: Vec<Wheels<f64>>,
@@ -82,9 +87,9 @@ struct Equation {
     wheel_rad: Wheels<f64>,
     /// The same with every row counted forward.
     rolled_rad: Wheels<f64>,
-    /// Turn seen, whole turns counted, radians.
+    /// Measured turn, whole turns counted, radians.
     turn_rad: f64,
-    /// Displacement seen in the frame of the first pose, metres.
+    /// Measured displacement in the frame of the first pose, metres.
     moved_m: Vector2<f64>,
 }
 
@@ -118,7 +123,8 @@ impl Driven {
         (!equations.is_empty()).then_some(Self { equations })
     }
 
-    /// Step 2's regressors at every equation: Σ Δφ e(θ) of each wheel, radians, in the frame of the first pose.
+    /// Step 2's regressors at every equation: Σ Δφ e(θ) of each wheel, radians, in the frame of the first
+    /// pose.
     fn paths(&self, turn_per_rad: Wheels<f64>) -> Vec<Wheels<Vector2<f64>>> {
         let (mut at, mut theta_rad) = (Wheels::both(Vector2::zeros()), 0.0);
         let mut after = |equation: &Equation| {
@@ -189,10 +195,12 @@ fn solve(normal: &Matrix2<f64>, right: &Vector2<f64>) -> Option<Vector2<f64>> {
     Some(normal.try_inverse()? * right)
 }
 
-/// Covariance of the solution of Σ g = 0 over runs from the scatter of the runs' scores g, with `slopes` −Σ ∂g/∂p. `taken` is how many runs' worth of
-/// equations the parameters take: n/(n − taken) is the correction of a sample's variance. `None` when nothing is left over.
+/// Covariance of the solution of Σ g = 0 over runs from the scatter of the runs' scores g, with `slopes` −Σ
+/// ∂g/∂p. `taken` is how many runs' worth of equations the parameters take: n/(n − taken) is the correction
+/// of a sample's variance. `None` when nothing is left over.
 ///
-/// Whatever is correlated inside of a run (its start's reading, its random walk) stays inside of a score: only runs have to be independent.
+/// Whatever is correlated inside of a run (its start's reading, its random walk) stays inside of a score:
+/// only runs have to be independent.
 pub(super) fn scatter_between_runs(
     slopes: &DMatrix<f64>,
     scores: &[DVector<f64>],
@@ -264,7 +272,7 @@ impl Linear {
     /// The general form: all four gains, each free.
     ///
     /// # Errors
-    /// [`CalibError`] when the paths do not tell the wheels apart, in headings or in positions.
+    /// [`CalibError`] when the paths do not determine both wheels, in headings or in positions.
     pub fn gains(&self, sessions: &[Session<'_>]) -> Result<Gains, CalibError> {
         let (_, _, runs) = self.runs(sessions)?;
         let headings = Headings::of(&runs)?;
@@ -362,7 +370,8 @@ impl Linear {
         })
     }
 
-    /// The geometry nearest to the general form: diameters of c11 and c12, and the base that turns both wheels together as c21 and c22 do.
+    /// The geometry nearest to the general form: diameters of c11 and c12, and the base that turns both
+    /// wheels together as c21 and c22 do.
     fn general(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, _) = nominal(Self::NAME, sessions)?;
         let Gains { distance_m_per_rad: c1, turn_per_rad: c2, covariance } = self.gains(sessions)?;

@@ -1,11 +1,16 @@
 //! `segments`: the drive that brings dead reckoning nearest to the truth all along the path, on any path.
 //!
-//! Model: from a run's first pose on, dead reckoning is compared with the truth at the end of every segment of a given length, and at the run's end; the
-//! error is not set back in between. Minimised is Σ |p̂ − p|² + d²·(θ̂ − θ)² over segments and runs, by Levenberg–Marquardt with exact derivatives, from the
-//! nominal values on. The print has positions alone: d is the segment's length, over which a heading error makes a position error of d·(θ̂ − θ).
-//! Assumptions: the instrument sees the drive's centre. Errors need not be independent: sigma is the scatter over runs.
-//! Observability: all three on paths with straights and turns, looked at on the way. Without heading errors in the sum spins show nothing of the separation.
-//! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends by Rprop and stops before the minimum.
+//! Model: from a run's first pose on, dead reckoning is compared with the truth at the end of every segment
+//! of a given length, and at the run's end; the error is not set back in between. Minimised is Σ |p̂ − p|² +
+//! d²·(θ̂ − θ)² over segments and runs, by Levenberg–Marquardt with exact derivatives, from the nominal
+//! values on. The print has positions alone: d is the segment's length, over which a heading error makes a
+//! position error of d·(θ̂ − θ).
+//! Assumptions: the instrument is at the drive's centre. Errors need not be independent: sigma is the scatter
+//! over runs.
+//! Observability: all three on paths with straights and turns that are measured along the path. Without
+//! heading errors in the sum, spins do not determine the separation.
+//! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends
+//! by Rprop and stops before the minimum.
 
 use dataset::Session;
 use kinematics::{DriveGeometry, Wheels};
@@ -55,7 +60,8 @@ impl PathErrors<'_> {
         3 * self.paths.iter().map(|path| path.later.len()).sum::<usize>()
     }
 
-    /// Calls `visit` with path, error (m, m, weighted rad) and its derivatives by the factors, at the end of every segment.
+    /// Calls `visit` with path, error (m, m, weighted rad) and its derivatives by the factors, at the end of
+    /// every segment.
     fn for_each_end(&self, mut visit: impl FnMut(usize, Vector3<f64>, Matrix3<f64>)) {
         let geometry_parameters = self.geometry_parameters();
         let weight = Vector3::new(1.0, 1.0, self.heading_m);
@@ -99,7 +105,7 @@ impl LeastSquaresProblem<f64, Dyn, U3> for PathErrors<'_> {
     }
 }
 
-/// What one run says of the factors: its normal matrix and its gradient.
+/// Normal matrix and gradient of one run over the factors.
 #[derive(Debug, Clone, Copy)]
 struct Share {
     normal: Matrix3<f64>,
@@ -118,7 +124,8 @@ impl PathErrors<'_> {
 }
 
 impl Segments {
-    /// The method as the table of contents offers it: the segments of the authors' program, and headings for their effect over one.
+    /// The method as the table of contents offers it: the segments of the authors' program, and headings for
+    /// their effect over one.
     pub const DEFAULT: Self = Self { segment_m: SEGMENT_M, heading_m: HEADING_WEIGHT_M };
 
     const NAME: &'static str = "segments";
@@ -161,8 +168,9 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
     Err(CalibError::Unobservable { method: Segments::NAME, parameter, why })
 }
 
-/// Covariance of the factors by leaving out one run at a time: the sandwich A⁻¹(Σ g gᵀ)A⁻¹ with each run's leverage taken into account. `None` for a single run,
-/// and where the others do not determine the factors without one.
+/// Covariance of the factors by leaving out one run at a time: the sandwich A⁻¹(Σ g gᵀ)A⁻¹ with each run's
+/// leverage taken into account. `None` for a single run, and where the others do not determine the factors
+/// without one.
 fn covariance(shares: &[Share], normal: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let runs = shares.len() as f64;
     let without: Vec<Vector3<f64>> = shares
@@ -192,7 +200,8 @@ impl Method for Segments {
         "any path with straights and turns, seen as poses: least errors of dead reckoning at the ends of its segments"
     }
 
-    /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by their ends alone.
+    /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by
+    /// their ends alone.
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 0.5, runs: 40 },
@@ -238,7 +247,8 @@ mod tests {
     const NOMINAL: [f64; 3] = [0.08, 0.08, 0.363];
     const TRUTH: [f64; 3] = [0.0811, 0.0797, 0.366];
 
-    /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns as `turn_rad` says, seen to within `error`.
+    /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns, measured to within
+    /// `error`.
     fn runs(count: u32, turn_rad: f64, straight_rad: f64, error: f64) -> Vec<PoseMeasurements<'static>> {
         let geometry_parameters =
             GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
@@ -326,7 +336,8 @@ mod tests {
         let refitted: Matrix3<f64> =
             without.iter().map(|factors| (factors - mean) * (factors - mean).transpose()).sum::<Matrix3<f64>>()
                 * (5.0 / 6.0);
-        // One step instead of a whole descent: errors of 2e-3 on paths of metres leave per mille of the second order.
+        // One step instead of a whole descent: errors of 2e-3 on paths of metres leave per mille of the
+        // second order.
         let off = (one_step - refitted).norm() / refitted.norm();
         assert!(off < 0.01, "{off}");
         // The sandwich that forgets each run's leverage would not pass.

@@ -1,11 +1,15 @@
 //! `umbmark`: squares driven both ways and measured at their ends.
 //!
-//! Model: errors of type A (wrong wheelbase: every corner turns too far by α) and of type B (unequal wheels: every side bends by β). With ε the end position, true
-//! minus odometry, in the start's frame (first leg along +x, counter-clockwise turns to the left), averaged over the runs of a direction:
-//! α = (x_cw + x_ccw)/(−4L), β = (x_cw − x_ccw)/(−4L), and to first order also α = (y_cw − y_ccw)/(−4L), β = (y_cw + y_ccw)/(−4L).
-//! Then E_b = (π/2)/(π/2 − α), R = (L/2)/sin(β/2), E_d = (R + b/2)/(R − b/2), which is (1+q)/(1−q) with q = (b/L) sin(β/2) and needs no R.
-//! Assumptions: the mean diameter is right (D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1)); corners are turned on the spot.
-//! Observability: the wheelbase and the ratio of the wheels. Blind to their common scale, which shows up as a wrong wheelbase: measure the scale first.
+//! Model: errors of type A (wrong wheelbase: every corner turns too far by α) and of type B (unequal wheels:
+//! every side bends by β). With ε the end position, true minus odometry, in the start's frame (first leg
+//! along +x, counter-clockwise turns to the left), averaged over the runs of a direction: α = (x_cw +
+//! x_ccw)/(−4L), β = (x_cw − x_ccw)/(−4L), and to first order also α = (y_cw − y_ccw)/(−4L), β = (y_cw +
+//! y_ccw)/(−4L). Then E_b = (π/2)/(π/2 − α), R = (L/2)/sin(β/2), E_d = (R + b/2)/(R − b/2), which is
+//! (1+q)/(1−q) with q = (b/L) sin(β/2) and needs no R.
+//! Assumptions: the mean diameter is right (D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1)); corners are turned on the
+//! spot.
+//! Observability: the wheelbase and the ratio of the wheels. Blind to their common scale, which shows up as a
+//! wrong wheelbase: measure the scale first.
 //! Reference: Borenstein & Feng 1995 (UMBmark), 1996 (eq. for E_b and E_d; b is the nominal wheelbase).
 
 use std::f64::consts::FRAC_PI_2;
@@ -78,7 +82,8 @@ impl Method for Umbmark {
                 else {
                     continue;
                 };
-                // Marks are read at standstills, before and after the whole log; poses from the first measurement to the last, and what lies outside was not seen.
+                // Marks are read at standstills, before and after the whole log. Poses span the log from the
+                // first measurement to the last.
                 let by_marks = run.run().truth.is_empty();
                 let ends = if by_marks { None } else { EndPoses::of(run, session.robot, &geometry) };
                 let observed =
@@ -127,7 +132,8 @@ impl Method for Umbmark {
         let by_alpha = separation_m / (FRAC_PI_2 - corner.alpha_rad);
         let by_beta = mean_m * base_m / side_m * 0.5 * (0.5 * corner.beta_rad).cos();
         let covariance = corner.variances.map(|(var, cov)| {
-            // α and β are half sum and half difference of the same two means: equal variances, and a covariance where one direction scatters more.
+            // α and β are half sum and half difference of the same two means: equal variances, and a
+            // covariance where one direction scatters more.
             let jacobian = Matrix3x2::new(0.0, -by_beta, 0.0, by_beta, by_alpha, 0.0);
             let covariance = jacobian * Matrix2::new(var, cov, cov, var) * jacobian.transpose();
             Covariance::from_column_slice(3, 3, covariance.as_slice())

@@ -1,4 +1,5 @@
-//! Self-calibration: the filter goes through logs as a robot would live them, once, row by row, and says when its parameters have settled.
+//! Self-calibration on line: the filter goes through logs once, row by row, and reports when its parameters
+//! have settled.
 
 use dataset::Session;
 use kinematics::{DriveGeometry, Pose, Wheels};
@@ -15,11 +16,11 @@ pub struct Followed {
     pub run: String,
     /// Measurements since the very first.
     pub measurements: usize,
-    /// Way driven since then by the nominal drive, metres.
+    /// Distance driven since then by the nominal drive, metres.
     pub distance_m: f64,
-    /// Turned since then by the nominal drive, either way, radians.
+    /// Turn since then by the nominal drive, in either direction, radians.
     pub turn_rad: f64,
-    /// The drive as it is believed to be.
+    /// The estimated drive.
     pub geometry: DriveGeometry,
     /// Standard deviations of left diameter, right diameter and separation, metres.
     pub sigma_m: Vector3<f64>,
@@ -28,7 +29,8 @@ pub struct Followed {
 }
 
 impl AugmentedKalman {
-    /// Follows the parameters through sessions in the order given, a measurement after the other; what is known is never gone back on.
+    /// Follows the parameters through sessions in the order given, a measurement after the other; what is
+    /// known is never gone back on.
     ///
     /// # Errors
     /// [`CalibError`] when the sessions hold no poses, or a factor leaves what is a drive.
@@ -71,7 +73,8 @@ impl AugmentedKalman {
     }
 }
 
-/// Where the parameters settled for good: the first measurement from which on they count as settled at every later one.
+/// Where the parameters settled for good: the first measurement from which on they count as settled at every
+/// later one.
 #[must_use]
 pub fn settled_at(followed: &[Followed]) -> Option<&Followed> {
     let unsettled = followed.iter().rposition(|step| !step.settled).map_or(0, |last| last + 1);

@@ -1,12 +1,17 @@
 //! `augmented_kalman`: pose and systematic factors in one extended Kalman filter, the noise in a second one.
 //!
-//! Model: the state is the pose with the factors δ_L, δ_R of the wheels and δ_B of the separation over their nominal values. Rows of the log predict, with wheel
-//! noise of variance k²|s|; poses of the instrument correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that is one
-//! pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until factors and noise stay: the linearisation is then at the answer.
-//! Assumptions: the instrument sees the drive's centre, its errors are normal and independent from measurement to measurement, factors are constant. Looks are therefore
-//! taken apart by [`AugmentedKalman::measurement_every_m`]: twenty a second of one clock that is off are not independent.
-//! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly better known afterwards is refused.
-//! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the augmented filter); Mehra 1970 for the innovations.
+//! Model: the state is the pose with the factors δ_L, δ_R of the wheels and δ_B of the separation over their
+//! nominal values. Rows of the log predict, with wheel noise of variance k²|s|; poses of the instrument
+//! correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that
+//! is one pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until
+//! factors and noise stay: the linearisation is then at the answer.
+//! Assumptions: the instrument is at the drive's centre, its errors are normal and independent from
+//! measurement to measurement, factors are constant. Measurements are therefore spaced by
+//! [`AugmentedKalman::measurement_every_m`]: twenty a second share the error of their clock.
+//! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly
+//! better known afterwards is refused.
+//! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the
+//! augmented filter); Mehra 1970 for the innovations.
 
 mod filter;
 mod follow;
@@ -120,7 +125,8 @@ impl AugmentedKalman {
         let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.held_at(*guess.variances()));
         let mut share = 1.0;
         for _ in 0..MAX_PASSES {
-            // The same variances from where the factors came to, before they are compared with others from there.
+            // The same variances from where the factors came to, before they are compared with others from
+            // there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
             let settled = (0..3).all(|i| {
                 (again.factors[i] - best.factors[i]).abs() <= PASS_TOLERANCE * again.covariance[(i, i)].sqrt()
@@ -186,7 +192,7 @@ impl Method for AugmentedKalman {
 }
 
 impl AugmentedKalman {
-    /// Refuses factors that the measurements hardly told more of than was believed before.
+    /// Refuses factors that are hardly better known than by their prior.
     fn observable(&self, covariance: &Matrix3<f64>) -> Result<(), CalibError> {
         let eigen = covariance.symmetric_eigen();
         let vague = eigen.eigenvalues.imax();

@@ -1,7 +1,9 @@
-//! The least squares of Censi et al.: displacements, the six parameters that predict them, and both stationary solutions.
+//! The least squares of Censi et al.: displacements, the six parameters that predict them, and both
+//! stationary solutions.
 //!
-//! The turn of a displacement is linear in J₂₁ and J₂₂. Given them, with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ), the rest is
-//! the minimum of |Q x|² on cos² + sin² = 1: an eigenvalue problem of two dimensions once b, ℓ_x and ℓ_y are eliminated.
+//! The turn of a displacement is linear in J₂₁ and J₂₂. Given them, with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ),
+//! the rest is the minimum of |Q x|² on cos² + sin² = 1: an eigenvalue problem of two dimensions once b, ℓ_x
+//! and ℓ_y are eliminated.
 //! Reference: Censi, Franchi, Marchionni, Oriolo 2013 (IEEE T-RO 29, 475–492).
 
 use std::f64::consts::FRAC_PI_2;
@@ -16,7 +18,7 @@ use crate::settings::{MAX_POSITION_CONDITION, MAX_PROPORTION_OFFSET, MAX_TURN_CO
 /// The method's name.
 pub(super) const NAME: &str = "censi";
 
-/// A displacement that the instrument saw, and how the wheels turned meanwhile.
+/// A measured displacement of the instrument, and how the wheels turned meanwhile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DisplacementSample {
     /// The run's id.
@@ -64,13 +66,13 @@ impl CensiFit {
         dead_reckoned
     }
 
-    /// What the instrument should have seen: ⊖ℓ ⊕ o ⊕ ℓ.
+    /// The predicted displacement of the instrument: ⊖ℓ ⊕ o ⊕ ℓ.
     #[must_use]
     pub fn predicted(&self, sample: &DisplacementSample) -> Pose {
         self.body_from_sensor.inverse() * self.dead_reckon(sample).pose * self.body_from_sensor
     }
 
-    /// Predicted minus seen, in the instrument's earlier frame: x, y in metres, heading in radians.
+    /// Predicted minus measured, in the instrument's earlier frame: x, y in metres, heading in radians.
     #[must_use]
     pub fn residual(&self, sample: &DisplacementSample) -> Vector3<f64> {
         let (predicted, measured) = (self.predicted(sample), sample.sensor_from_later);
@@ -101,7 +103,8 @@ impl CensiFit {
         jacobian
     }
 
-    /// Fisher information of the six parameters for normal errors of the instrument with standard deviations x, y (m) and heading (rad).
+    /// Fisher information of the six parameters for normal errors of the instrument with standard deviations
+    /// x, y (m) and heading (rad).
     #[must_use]
     pub fn information<'e>(
         &self,
@@ -124,7 +127,7 @@ fn rotation(theta_rad: f64) -> Matrix2<f64> {
 /// Both stationary solutions of the constrained least squares, the cheaper one first.
 ///
 /// # Errors
-/// [`CalibError`] when the excursions do not determine the parameters.
+/// [`CalibError`] when the displacements do not determine the parameters.
 pub fn solutions<'e>(
     samples: &mut (dyn Iterator<Item = &'e DisplacementSample> + '_),
 ) -> Result<[StationarySolution; 2], CalibError> {
@@ -166,8 +169,8 @@ pub fn solutions<'e>(
         return Err(unobservable);
     }
     let inverse = place.try_inverse().ok_or(unobservable)?;
-    // With (b, ℓ_x, ℓ_y) at their best for a heading, the cost is a quadratic form in (cos, sin); its eigenvectors are the stationary solutions, the multiplier of the
-    // print is minus the eigenvalue.
+    // With (b, ℓ_x, ℓ_y) at their best for a heading, the cost is a quadratic form in (cos, sin); its
+    // eigenvectors are the stationary solutions, the multiplier of the print is minus the eigenvalue.
     let form = heading - mixed.transpose() * inverse * mixed;
     let eigen = form.symmetric_eigen();
     let solution = |column: usize| {
@@ -229,7 +232,7 @@ pub(super) mod tests {
         body_from_sensor: Pose::new(0.12, -0.05, 0.4),
     };
 
-    /// What the instrument sees of these wheel turns, row by row.
+    /// The displacement of the instrument by these wheel turns, row by row.
     fn measured(fit: &CensiFit, wheel_rad: &[(f64, f64)]) -> DisplacementSample {
         let wheel_rad = wheel_rad.iter().map(|&(left, right)| Wheels { left, right }).collect();
         let mut sample = DisplacementSample { run: "run".to_owned(), wheel_rad, sensor_from_later: Pose::IDENTITY };
@@ -308,7 +311,8 @@ pub(super) mod tests {
                     Vector3::new(x_m, y_m, theta_rad)
                 };
                 let difference = (moved(h) - moved(-h)) / (2.0 * h);
-                // Under a metre and 1.3 rad: third derivatives by a radius under (10/0.363)³ ≈ 2e4, truncation 4e-9; rounding 1e-16/1e-6.
+                // Under a metre and 1.3 rad: third derivatives by a radius under (10/0.363)³ ≈ 2e4,
+                // truncation 4e-9; rounding 1e-16/1e-6.
                 let tolerance = 1e-8;
                 assert!((jacobian.column(column) - difference).amax() < tolerance, "{column}");
                 assert!((jacobian.column(column).add_scalar(1e-3) - difference).abs().min() > tolerance);
@@ -327,7 +331,7 @@ pub(super) mod tests {
         assert!(message(&all(&[(-2.0, 2.01)])).contains("spins: add straight runs"));
         assert!(message(&all(&[(1.0, 3.0)])).contains("drives one arc"));
         assert!(message(&all(&[(0.0, 0.0)])).contains("do not turn"));
-        // Straights, and spins by whole turns: where the instrument sits does not show.
+        // Straights, and spins by whole turns: the sensor's position is not observable.
         let whole_rad = std::f64::consts::TAU * 0.363 / (0.0811 + 0.0797);
         let whole = [measured(&TRUTH, &[(4.0, 4.0)]), measured(&TRUTH, &[(-whole_rad, whole_rad)])];
         assert!(message(&whole).contains("whole turns only"), "{}", message(&whole));

@@ -1,12 +1,18 @@
-//! `censi`: both wheels, the axle and where the instrument sits, six parameters at once, from what the instrument saw between pairs of instants.
+//! `censi`: both wheels, the axle and the instrument's extrinsics, six parameters at once, from displacements
+//! of the instrument.
 //!
-//! Model: the instrument at ℓ on the robot sees s = ⊖ℓ ⊕ o ⊕ ℓ where the robot moved by o. The turn of o is J₂₁ Φ_L + J₂₂ Φ_R in the wheels' turns Φ, with
-//! J₂₁ = −r_L/b and J₂₂ = r_R/b: linear least squares. Given them the rest is Q x = 0 with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ): the minimum of |Q x|² on
-//! cos² + sin² = 1. It has two stationary solutions; the cheaper one is taken. Then the worst 1 % in position or heading are dropped, and all over, four times.
-//! Assumptions: the instrument's error is alike in all directions and the wheels' own is small beside it. Rows of the log are arcs (the print takes the whole
-//! interval for one). Positions alone and marks without poses are not enough.
-//! Observability: all six, from two proportions of the wheels' turns: straights and turns. A single circle and a path without turns are refused.
-//! Reference: Censi, Franchi, Marchionni, Oriolo 2013 (IEEE T-RO 29, 475–492); the trimming is their program's.
+//! Model: the instrument at ℓ on the robot moves by s = ⊖ℓ ⊕ o ⊕ ℓ where the robot moved by o. The turn of o
+//! is J₂₁ Φ_L + J₂₂ Φ_R in the wheels' turns Φ, with J₂₁ = −r_L/b and J₂₂ = r_R/b: linear least squares. Given
+//! them, with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ), the rest is Q x = 0: the minimum of |Q x|² on
+//! cos² + sin² = 1. It has two stationary solutions; the one of lower cost is taken. Then the worst 1 % in
+//! position or heading are dropped, and the fit is repeated, four times.
+//! Assumptions: the instrument's error is alike in all directions and the wheels' own is small beside it.
+//! Rows of the log are arcs (the print takes the whole interval for one). Positions alone and marks without
+//! poses are not enough.
+//! Observability: all six, from two proportions of the wheels' turns: straights and turns. A single circle
+//! and a path without turns are refused.
+//! Reference: Censi, Franchi, Marchionni, Oriolo 2013 (IEEE T-RO 29, 475–492); the trimming is their
+//! program's.
 
 mod least_squares;
 
@@ -36,7 +42,8 @@ pub struct Censi {
     pub rounds: u32,
     /// Which share of them goes each time, for its position and for its heading.
     pub trimmed_share: f64,
-    /// Where the instrument gives poses, two that follow each other lie at least so far apart by the nominal robot, metres, …
+    /// Where the instrument gives poses, least distance of two consecutive ones by the nominal robot, metres,
+    /// …
     pub least_distance_m: f64,
     /// … or so much turn, radians: the error of a displacement does not shrink with its length.
     pub least_turn_rad: f64,
@@ -47,7 +54,7 @@ pub struct Censi {
 pub struct Trimmed {
     /// The six parameters.
     pub fit: CensiFit,
-    /// Which excursions were kept, in their order.
+    /// Which displacements were retained, in their order.
     pub retained: Vec<bool>,
     /// Shares that were dropped for their position and for their heading.
     pub dropped: (f64, f64),
@@ -68,7 +75,7 @@ impl Censi {
 
     const NAME: &'static str = least_squares::NAME;
 
-    /// What the instrument saw in all sessions: displacements where a run has them, else pairs of poses that follow each other.
+    /// The displacements of all sessions: those of a run where it has them, else between consecutive poses.
     #[must_use]
     pub fn samples(&self, sessions: &[Session<'_>]) -> Vec<DisplacementSample> {
         let mut samples = Vec::new();
@@ -101,10 +108,10 @@ impl Censi {
         samples
     }
 
-    /// Fits, drops the worst and fits again, as often as [`Self::rounds`] says.
+    /// Fits, drops the worst and fits again, [`Self::rounds`] times.
     ///
     /// # Errors
-    /// [`CalibError`] when the excursions do not determine the parameters.
+    /// [`CalibError`] when the displacements do not determine the parameters.
     pub fn trimmed(&self, samples: &[DisplacementSample]) -> Result<Trimmed, CalibError> {
         let mut retained = vec![true; samples.len()];
         let mut dropped = (0, 0);
@@ -227,7 +234,8 @@ impl Method for Censi {
     }
 }
 
-/// Inverse Fisher information with the instrument's error as the kept residuals show it, made up for what trimming took of them.
+/// Inverse Fisher information, with the instrument's variance of the retained residuals, corrected for the
+/// trimming.
 fn covariance(
     fit: &CensiFit,
     samples: &[DisplacementSample],
@@ -239,7 +247,7 @@ fn covariance(
             let residual = fit.residual(sample);
             (sum + residual.component_mul(&residual), count + 1.0)
         });
-    // Three readings an excursion, six parameters.
+    // Three readings a displacement, six parameters.
     let degrees_of_freedom = count - 2.0;
     if degrees_of_freedom < 1.0 {
         return None;
