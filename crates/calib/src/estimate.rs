@@ -150,7 +150,7 @@ pub struct Calibration {
     pub runs_rejected: Vec<Rejected>,
     /// How large datasets were calibrated; `None` where all runs were fitted as a whole.
     pub one_step: Option<OneStep>,
-    /// False when an iteration stopped without an answer; closed-form methods always converge.
+    /// False when an iteration stopped without a result; closed-form methods always converge.
     pub converged: bool,
 }
 

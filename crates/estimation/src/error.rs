@@ -30,7 +30,7 @@ pub enum EstimationError {
     },
 }
 
-/// A counter that wraps where nobody said at how many bits.
+/// A counter that wraps at a width which the dataset does not state.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml")]
 pub struct WrappedCounter {

@@ -76,7 +76,7 @@ impl GroupExtrinsics {
         let Some(inverse) = response.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return false;
         };
-        inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * plausible_sd(column)
+        inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * prior_sigma(column)
     }
 
     /// Gradient and curvature of −log prior of each own column about the common value.
@@ -86,7 +86,7 @@ impl GroupExtrinsics {
         self.columns
             .iter()
             .map(|column| {
-                let sd = plausible_sd(*column);
+                let sd = prior_sigma(*column);
                 let off = match column {
                     Column::SensorX => own.body_from_sensor.x_m - common.body_from_sensor.x_m,
                     Column::SensorY => own.body_from_sensor.y_m - common.body_from_sensor.y_m,
@@ -99,7 +99,7 @@ impl GroupExtrinsics {
     }
 }
 
-const fn plausible_sd(column: Column) -> f64 {
+const fn prior_sigma(column: Column) -> f64 {
     match column {
         Column::SensorX | Column::SensorY => EXTRINSICS_PRIOR_SIGMA_M,
         Column::SensorTheta => EXTRINSICS_PRIOR_SIGMA_RAD,

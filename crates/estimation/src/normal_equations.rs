@@ -127,7 +127,7 @@ pub fn inverse(matrix: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (size[i] * size[j])))
 }
 
-/// An orthonormal basis of the directions of so many columns that may move: those orthogonal to the fixed
+/// An orthonormal basis of the directions of `columns` columns that may move: those orthogonal to the fixed
 /// ones.
 #[must_use]
 pub fn free_basis(columns: usize, fixed: &[DVector<f64>]) -> DMatrix<f64> {

@@ -9,7 +9,7 @@ use crate::settings::MIN_VARIANCE_PRODUCT;
 /// candidates that are tested one by one need none with each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Products {
-    /// So many columns come first, which have products with all.
+    /// Number of the first columns, which have products with all.
     common: usize,
     /// For each further column, the first of those of its part: it has products with these.
     first: Vec<usize>,

@@ -121,7 +121,7 @@ fn mean_m(spins: &[Spin], at: &GeometryParameters) -> Option<f64> {
     (!directions.is_empty()).then(|| directions.iter().sum::<f64>() / directions.len() as f64)
 }
 
-/// Covariance of r_L, r_R and B. Each step's own scatter, and each step's answer moves with the other's.
+/// Covariance of r_L, r_R and B. Each step has its own scatter, and its result moves with the other's.
 fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<Matrix3<f64>> {
     let normal = DMatrix::from_column_slice(2, 2, step.normal.as_slice());
     let radii = scatter_between_runs(&normal, &step.scores, 1)?;

@@ -141,7 +141,7 @@ impl Driven {
     }
 }
 
-/// Step 1's answer with what the covariance needs of it.
+/// The result of step 1, with what its covariance needs.
 struct Headings {
     /// c22 (left, negative) and c21 (right).
     turn_per_rad: Wheels<f64>,

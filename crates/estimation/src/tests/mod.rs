@@ -256,8 +256,8 @@ fn the_noise_score_is_the_derivative_of_the_cost() {
     }
 }
 
-/// A start heading that is not measured is eliminated at its best: moving it away costs, and the sums with it
-/// at its best are what is reported.
+/// A start heading that is not measured is eliminated: the sums are those at its optimum, and moving it away
+/// costs.
 #[test]
 fn a_free_heading_is_at_its_best() {
     let dataset = dataset(false);

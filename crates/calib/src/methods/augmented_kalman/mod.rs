@@ -4,7 +4,7 @@
 //! nominal values. Rows of the log predict, with wheel noise of variance k²|s|; poses of the instrument
 //! correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that
 //! is one pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until
-//! factors and noise stay: the linearisation is then at the answer.
+//! factors and noise stay: the linearisation is then at the result.
 //! Assumptions: the instrument is at the drive's centre, its errors are normal and independent from
 //! measurement to measurement, factors are constant. Measurements are therefore spaced by
 //! [`AugmentedKalman::measurement_every_m`]: twenty a second share the error of their clock.
@@ -34,7 +34,7 @@ use crate::settings::{
     MEASUREMENT_SPACING_RAD, PASS_NOISE_TOLERANCE, PASS_TOLERANCE, POSITION_SIGMA_GUESS_M, WHEEL_SIGMA_GUESS,
 };
 
-/// The method with its beliefs before any data.
+/// The method with its priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AugmentedKalman {
     /// How far diameters and separation may be from nominal, relatively, one standard deviation.

@@ -157,7 +157,7 @@ fn sample(
     measured: Pose,
 ) -> Option<DisplacementSample> {
     let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: measured };
-    // Standing still says nothing, and its small errors would make those of motion look like outliers.
+    // Standing still carries no information, and its small errors would make those of motion look like outliers.
     if sample.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
         return None;
     }
