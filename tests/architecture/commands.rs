@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use crate::support::{real_data, succeed};
+use crate::support::real_data::real_data;
+use crate::support::succeed;
 use crate::{files, root, text};
 
 /// Code blocks of a document in order: language and lines.

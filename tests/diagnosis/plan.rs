@@ -184,7 +184,7 @@ fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
         let nearest = run.truth.iter().min_by(|a, b| (a.t_s - at_s).abs().total_cmp(&(b.t_s - at_s).abs()));
         run.truth = vec![run.truth[0], *nearest.expect("looks")];
     }
-    let ends = base.on_planned_runs(&[cut.session()]).dead_reckoned(&base.fit.model, &mut []);
+    let ends = base.on_planned_runs(&[cut.session()]).dead_reckoned(&base.solution.model, &mut []);
     assert_eq!(ends.len(), cut.runs.len());
     let off = ends.iter().map(|end| {
         let seen = end.off.inverse();
@@ -249,7 +249,7 @@ fn a_plan_without_data_keeps_what_it_promises() {
         let runs = driven(&scenario, &plan.next_experiment, 4_300 + 10 * trial);
         let sessions: Vec<_> = runs.iter().map(Dataset::session).collect();
         let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions).expect("a fit");
-        let model = &fit.fit.model;
+        let model = &fit.solution.model;
         for (name, found, real) in [
             ("left_wheel_diameter_m", 2.0 * model.m_per_rad.left, diameter_m.left),
             ("right_wheel_diameter_m", 2.0 * model.m_per_rad.right, diameter_m.right),

@@ -4,7 +4,8 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use crate::support::{real_data, succeed};
+use crate::support::real_data::real_data;
+use crate::support::succeed;
 use calib::methods::joint::Joint;
 use calib::{Calibration, Method, Parameter, compare};
 use dataset::import::importer;
@@ -205,7 +206,8 @@ fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     let (dataset, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 6);
     let sessions = [dataset.session()];
     let fit = Joint::DEFAULT.settings.fit(&sessions).expect("looks");
-    let (_, covariance) = fit.fit.information(&fit.columns).and_then(|information| information.solve()).expect("seen");
+    let (_, covariance) =
+        fit.solution.information(&fit.columns).and_then(|information| information.solve()).expect("seen");
     for (row, column) in Column::GEOMETRY.into_iter().enumerate() {
         let (low, high) = fit.profile(column, RISE_95).expect("a profile");
         let expected = 1.96 * covariance[(row, row)].sqrt();

@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{document, real_data, refusal, run_in, succeed};
+use crate::support::real_data::real_data;
+use crate::support::{document, refusal, run_in, succeed};
 
 /// Counts of a wheel turn, as the data's description says.
 const TICKS_PER_REV: f64 = 2764.8;

@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::{document, real_data, succeed};
+use crate::support::real_data::real_data;
+use crate::support::{document, succeed};
 use calib::methods::umbmark::{Form, Umbmark};
 use calib::{CalibrationReport, Method};
 use dataset::import::importer;

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use serde_json::Value;
 
+pub(crate) mod real_data;
+
 /// How a command ended.
 pub(crate) struct Ended {
     pub(crate) code: Option<i32>,
@@ -92,19 +94,4 @@ pub(crate) fn workplace() -> tempfile::TempDir {
     fs::write(temp.path().join("paper.toml"), paper()).expect("written");
     succeed(temp.path(), &["simulate", "paper.toml", "--out", "set"]);
     temp
-}
-
-/// Real logs, or `None` with a word about it; with `YAIR_REQUIRE_DATA=1` they must be there.
-#[allow(clippy::print_stdout)] // how a skipped test is seen
-pub(crate) fn real_data(test: &str, part: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("YAIR_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    let folder = root.join(part);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("YAIR_REQUIRE_DATA").is_ok_and(|value| value == "1");
-    assert!(!required, "{test}: no real data in {} (YAIR_REQUIRE_DATA=1 is set)", folder.display());
-    println!("skipped: {test}: no real data (set YAIR_DATA)");
-    None
 }

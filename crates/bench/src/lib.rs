@@ -13,7 +13,7 @@ mod moments;
 mod sweep;
 mod trial;
 
-pub use bound::{FisherInformation, Innovation, NoBound};
+pub use bound::{FisherInformation, LinearizedInnovation, NoBound};
 pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{

@@ -1,8 +1,10 @@
-//! Sessions of one robot against each other: each method calibrates on one session and is evaluated on every other, pair by pair.
+//! Sessions of one robot against each other: each method calibrates on one session and is evaluated on every
+//! other, pair by pair.
 //!
-//! A session evaluated on its own runs shows how well a method describes what it was given; only another one shows what the calibration is worth. Sessions are
-//! grouped by the kind of path that they drive, since a method may describe its own kind of path well and no other. The measure of a pair is the mean final
-//! error of position and heading over the runs of the second session; that of a kind, the mean over its ordered pairs.
+//! A session evaluated on its own runs shows how well a method describes them; only another one shows what
+//! the calibration is worth. Sessions are grouped by the kind of path that they drive, since a method may
+//! describe its own kind well and no other. The measure of a pair is the mean final error of position and
+//! heading over the runs of the second session; that of a kind, the mean over its ordered pairs.
 
 use std::collections::BTreeSet;
 
@@ -36,7 +38,8 @@ pub struct ComparedSession {
 /// One method on all pairs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedMethod {
-    /// The method; `nominal` for what the robot of the evaluated session believes, which is trained on nothing.
+    /// The method; `nominal` for what the robot of the evaluated session believes, which is trained on
+    /// nothing.
     pub method: String,
     /// Means over the pairs of each two kinds of path.
     pub kinds: Vec<KindMean>,
@@ -95,7 +98,8 @@ pub struct Refusal {
 )]
 pub struct TooFewSessions(pub usize);
 
-/// The kind of path that a session drives: `squares`, `straights + spins`, …; `mixed` for more than two protocols, `free` where none is stated.
+/// The kind of path that a session drives: `squares`, `straights + spins`, …; `mixed` for more than two
+/// protocols, `free` where none is stated.
 #[must_use]
 pub fn path_kind(session: &Session<'_>) -> String {
     let family = |protocol: Option<Protocol>| match protocol {
@@ -111,7 +115,8 @@ pub fn path_kind(session: &Session<'_>) -> String {
     if names.len() > 2 { "mixed".to_owned() } else { names.join(" + ") }
 }
 
-/// Calibrates with every method on each session and evaluates on every other one; `done` is called after each method on each session.
+/// Calibrates with every method on each session and evaluates on every other one; `done` is called after each
+/// method on each session.
 ///
 /// # Errors
 /// [`TooFewSessions`] for fewer than two sessions.
@@ -173,7 +178,7 @@ fn nominal(sessions: &[Session<'_>], kinds: &[String]) -> ComparedMethod {
     }
 }
 
-/// What a method finds on a session, as its calibration file would say it.
+/// The calibration of a method on a session, as its file would have it.
 fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<NamedCalibration, String> {
     let outcome = method.calibrate(std::slice::from_ref(session));
     if let Ok(found) = &outcome
@@ -245,7 +250,8 @@ mod tests {
     use kinematics::Wheels;
     use std::f64::consts::PI;
 
-    /// A run of one row of counts, on wheels of 1 mm a tick and a base of 0.3 m that are as large as stated, whose truth is seen exactly.
+    /// A run of one row of counts, on wheels of 1 mm a tick and a base of 0.3 m times `scale`, with an exact
+    /// truth.
     fn run(id: &str, protocol: Protocol, scale: f64, ticks: (i64, i64)) -> Run {
         let (left_m, right_m) = (scale * 1e-3 * to_f64(ticks.0), scale * 1e-3 * to_f64(ticks.1));
         let (distance_m, turn_rad) = (0.5 * (left_m + right_m), (right_m - left_m) / 0.3);
@@ -307,7 +313,8 @@ mod tests {
         let kinds: Vec<_> = found.sessions.iter().map(|session| session.path_kind.as_str()).collect();
         assert_eq!(kinds, ["straights + spins", "straights + spins", "straights"]);
         let [nominal, direct] = &found.methods[..] else { panic!("nominal and direct") };
-        // Under nominal values a metre is 20, 30 and 50 mm short, half of the runs in a and b do not go anywhere.
+        // Under nominal values a metre is 20, 30 and 50 mm short, half of the runs in a and b do not go
+        // anywhere.
         let nominal_m: Vec<f64> = nominal.pairs.iter().filter_map(|pair| pair.mean_final_position_m).collect();
         for (found, expected) in nominal_m.iter().zip([0.010, 0.015, 0.050]) {
             assert!((found - expected).abs() < 1e-12, "{nominal_m:?}");
@@ -327,7 +334,7 @@ mod tests {
         assert!(among.pairs == 2 && (among.mean_final_position_m.expect("pairs") - 0.005).abs() < 1e-9, "{among:?}");
         let across = mean("straights + spins", "straights");
         assert!(across.pairs == 2 && (across.mean_final_position_m.expect("pairs") - 0.025).abs() < 1e-9, "{across:?}");
-        // What was refused gives no pair, and says why.
+        // A refused session gives no pair, and its reason.
         assert_eq!((mean("straights", "straights").pairs, mean("straights", "straights + spins").pairs), (0, 0));
         let [refusal] = &direct.refusals[..] else { panic!("c has no spins: {:?}", direct.refusals) };
         assert!(

@@ -1,16 +1,15 @@
 //! Drift of dead reckoning under a calibration, measured against the outside instrument.
 //!
-//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is compared at the truth's instants; between two
-//! rows of the log the pose is interpolated along the chord. Instants outside of the log are left out.
+//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is
+//! compared at the truth's instants; between two rows of the log the pose is interpolated along the chord.
+//! Instants outside of the log are left out.
 
 use dataset::{RunView, Session};
 use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
 use serde::Serialize;
 
 use crate::report::NamedCalibration;
-
-/// A truth sample may miss a row's instant by the rounding of its file.
-const SAME_INSTANT_S: f64 = 1e-9;
+use crate::settings::TIME_TOLERANCE_S;
 
 /// Drift of every run under one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,7 +60,8 @@ pub struct RunDrift {
     pub why_null: Option<&'static str>,
 }
 
-/// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values when there is none.
+/// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values
+/// when there is none.
 ///
 /// `name_runs` adds each session's name to its runs.
 #[must_use]
@@ -87,7 +87,7 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
 }
 
 impl CalibrationDrift {
-    /// What runs evaluated under one calibration say together.
+    /// The drift of runs that were evaluated under one calibration.
     #[must_use]
     pub fn of_runs(calibration: Option<&NamedCalibration>, runs: Vec<RunDrift>) -> Self {
         let name = calibration.map_or_else(|| "nominal".to_owned(), |calibration| calibration.name.clone());
@@ -130,7 +130,7 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     let Some(&(log_start_s, _)) = log.first() else { return unknown(run, length_m, "the run has no odometry") };
     // The start pose holds at the first truth instant, which may be later than the log's first row.
     let first_s = observed[0].0;
-    let moved = if first_s > log_start_s + SAME_INSTANT_S {
+    let moved = if first_s > log_start_s + TIME_TOLERANCE_S {
         match at(&log, first_s, &mut 0) {
             Some(dead_reckoned) => start * dead_reckoned.inverse(),
             None => return unknown(run, length_m, "the truth does not overlap the odometry in time"),
@@ -143,9 +143,9 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     for (t_s, world_from_sensor) in &observed {
         let Some(dead_reckoned) = at(&log, *t_s, &mut row) else { continue };
         let dead_reckoned = if identity { dead_reckoned } else { moved * dead_reckoned };
-        let seen = *world_from_sensor * body_from_sensor.inverse();
-        let position_m = dead_reckoned.position().distance_m(seen.position());
-        let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - seen.theta_rad).abs();
+        let measured = *world_from_sensor * body_from_sensor.inverse();
+        let position_m = dead_reckoned.position().distance_m(measured.position());
+        let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - measured.theta_rad).abs();
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
         largest = Some((position_m.max(max_position_m), heading_rad.max(max_heading_rad)));
         last = Some((position_m, heading_rad));
@@ -165,13 +165,14 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
     }
 }
 
-/// The reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the log.
+/// The dead-reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the
+/// log.
 fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
-    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + SAME_INSTANT_S {
+    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + TIME_TOLERANCE_S {
         *row += 1;
     }
     let (row_s, pose) = *log.get(*row)?;
-    if (t_s - row_s).abs() <= SAME_INSTANT_S {
+    if (t_s - row_s).abs() <= TIME_TOLERANCE_S {
         return Some(pose);
     }
     let (next_s, next) = *log.get(*row + 1)?;
@@ -221,7 +222,8 @@ mod tests {
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
     use kinematics::Wheels;
 
-    /// A straight metre in ten rows on wheels of 1 mm a tick, whose truth is 2 % longer and stamped between the rows.
+    /// A straight metre in ten rows on wheels of 1 mm a tick, whose truth is 2 % longer and stamped between
+    /// the rows.
     fn dataset(truth: Vec<TruthSample>) -> Dataset {
         let ticks: Vec<i64> = (0..=10).map(|k| 100 * k).collect();
         let run = Run {

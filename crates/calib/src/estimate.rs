@@ -6,7 +6,9 @@ use motion_programs::Schedule;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
-use estimation::{EstimationError, OneStep};
+use estimation::{EstimationError, OneStep, WrappedCounter};
+
+use crate::settings::{MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO};
 
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,13 +24,13 @@ pub enum Parameter {
     LeftPerTick,
     /// Travel of the right wheel per tick, metres (`C_R`).
     RightPerTick,
-    /// Where the outside instrument sits on the robot: ahead of the drive's centre, metres.
+    /// Position of the outside instrument on the robot: ahead of the drive's centre, metres.
     SensorX,
-    /// Where it sits: to the left of the drive's centre, metres.
+    /// Its position to the left of the drive's centre, metres.
     SensorY,
-    /// Where it looks: its heading on the robot, radians.
+    /// Its heading on the robot, radians.
     SensorTheta,
-    /// How late the outside instrument stamps what it sees, seconds.
+    /// Latency of the outside instrument's time stamps, seconds.
     Latency,
     /// The factor common to both wheels; only ever not observable.
     CommonScale,
@@ -72,14 +74,14 @@ pub struct Estimate {
     pub parameter: Parameter,
     /// In SI units.
     pub value: f64,
-    /// One standard deviation of the value's error, or `None` when the data do not show it.
+    /// One standard deviation of the value's error, in its unit; `None` where the data show no scatter.
     pub sigma: Option<f64>,
 }
 
 /// Joint covariance of the drive's geometry, order: left diameter, right diameter, separation (m²).
 pub type Covariance = DMatrix<f64>;
 
-/// Where the outside instrument sits on the robot, for methods that find it.
+/// Extrinsics of the outside instrument, for methods that estimate them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extrinsics {
     /// The instrument's frame on the robot.
@@ -88,18 +90,19 @@ pub struct Extrinsics {
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// The instrument of a session or a run that stands apart from the others.
+/// The instrument of a session or a run that has extrinsics or a latency of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroupInstrument {
     /// The session's name, and the run's id where each run has its own.
     pub of: String,
-    /// Ahead of the drive's centre, metres; `None`, as the others, where it is common to all or these runs do not show it.
+    /// Ahead of the drive's centre, metres; `None`, as the others, where it is common to all or not
+    /// observable in these runs.
     pub sensor_x_m: Option<f64>,
     /// To the left of the drive's centre, metres.
     pub sensor_y_m: Option<f64>,
     /// Its heading on the robot, radians.
     pub sensor_theta_rad: Option<f64>,
-    /// How late it stamps what it sees, seconds.
+    /// Latency of its time stamps, seconds.
     pub latency_s: Option<f64>,
 }
 
@@ -126,17 +129,18 @@ pub struct Rejected {
 pub struct Calibration {
     /// The method's name.
     pub method: &'static str,
-    /// The geometry that dead reckoning is to use.
+    /// The estimated geometry, for dead reckoning.
     pub geometry: DriveGeometry,
     /// Ticks of a wheel turn, when the robot reports ticks.
     pub ticks_per_rev: Option<f64>,
-    /// Covariance of the geometry; `None` when the data do not show a scatter (one run a direction, say).
+    /// Covariance of the geometry, m²; `None` when the data show no scatter (one run a direction, say).
     pub covariance: Option<Covariance>,
-    /// Where the outside instrument sits on the robot; `None` for methods that take it to be at the drive's centre.
+    /// Extrinsics of the outside instrument; `None` for methods that take it to be at the drive's centre.
     pub extrinsics: Option<Extrinsics>,
-    /// How late the outside instrument stamps what it sees, seconds, with one standard deviation; `None` for methods that take it to be in time.
+    /// Latency of the outside instrument's time stamps, seconds, with one standard deviation; `None` for
+    /// methods that take it to be zero.
     pub latency_s: Option<(f64, Option<f64>)>,
-    /// Mountings and latencies that sessions or runs have for themselves; the two above are then their means.
+    /// Extrinsics and latencies of sessions or runs that have their own; the two above are then their means.
     pub group_instruments: Vec<GroupInstrument>,
     /// What the data do not determine.
     pub not_observable: Vec<NotObservable>,
@@ -144,9 +148,9 @@ pub struct Calibration {
     pub runs_used: usize,
     /// What was left out, run by run and wheel by wheel.
     pub runs_rejected: Vec<Rejected>,
-    /// How it was made where the datasets are large; `None` where all runs were fitted as a whole.
+    /// How large datasets were calibrated; `None` where all runs were fitted as a whole.
     pub one_step: Option<OneStep>,
-    /// False when an iteration stopped without an answer; closed-form methods always converge.
+    /// False when an iteration stopped without a result; closed-form methods always converge.
     pub converged: bool,
 }
 
@@ -201,7 +205,8 @@ impl Calibration {
         Some(Estimate { parameter, value: [x_m, y_m, theta_rad][row], sigma })
     }
 
-    /// Remarks on values that are far from nominal: calibration corrects per cents, and a factor is a fault of another kind.
+    /// Remarks on implausible values: calibration corrects per cents, and a factor is a fault of another
+    /// kind.
     #[must_use]
     pub fn plausibility_warnings(&self, robot: &NominalRobot) -> Vec<String> {
         let nominal = [
@@ -211,8 +216,11 @@ impl Calibration {
         ];
         let remark = |(parameter, nominal): (Parameter, f64)| {
             let factor = self.estimate(parameter)?.value / nominal;
-            // Skid steering doubles the effective separation at most (users report 1.5 to 2 times); wheels are known to a few per cent.
-            let most = if parameter == Parameter::WheelSeparation { 2.2 } else { 1.3 };
+            let most = if parameter == Parameter::WheelSeparation {
+                MAX_PLAUSIBLE_SEPARATION_RATIO
+            } else {
+                MAX_PLAUSIBLE_DIAMETER_RATIO
+            };
             let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
             let message = || format!("{} is {factor:.3} times its nominal value: {cause}", parameter.key());
             (factor > most || factor < 1.0 / most).then(message)
@@ -249,18 +257,9 @@ pub enum CalibError {
         /// What would show it.
         why: String,
     },
-    /// The counters wrap and nobody said at how many bits.
-    #[error(
-        "run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml"
-    )]
-    CounterWraps {
-        /// The run.
-        run: String,
-        /// `left` or `right`.
-        side: &'static str,
-        /// The width that the jumps show.
-        bits: u8,
-    },
+    /// The counters wrap at a width that the dataset does not state.
+    #[error(transparent)]
+    CounterWraps(WrappedCounter),
     /// The estimate is no drive.
     #[error("{method}: the estimate is not a drive: {source}")]
     NotADrive {
@@ -276,7 +275,7 @@ impl CalibError {
     pub(crate) fn of_fit(method: &'static str, error: EstimationError) -> Self {
         match error {
             EstimationError::NotADrive(source) => Self::NotADrive { method, source },
-            EstimationError::CounterWraps { run, side, bits } => Self::CounterWraps { run, side, bits },
+            EstimationError::CounterWraps(wrapped) => Self::CounterWraps(wrapped),
             other => Self::NotApplicable { method, why: other.to_string() },
         }
     }
@@ -293,7 +292,8 @@ pub trait Method: Sync + Send {
     /// What to drive for this method, as its authors did.
     fn protocol(&self) -> Vec<Schedule>;
 
-    /// Calibrates one robot from its sessions. Where sessions disagree about nominal values, the first one's are used.
+    /// Calibrates one robot from its sessions. Where sessions disagree about nominal values, the first one's
+    /// are used.
     ///
     /// # Errors
     /// [`CalibError`] when the method does not apply to these sessions, with the reason.
@@ -310,6 +310,11 @@ pub(crate) fn nominal(
     };
     let geometry = first.robot.geometry().map_err(|source| CalibError::NotADrive { method, source })?;
     Ok((*first.robot, geometry))
+}
+
+/// Covariance of diameters and separation (m²) from that of their relative changes, by row and column.
+pub(crate) fn covariance_of_lengths(relative: impl Fn(usize, usize) -> f64, lengths_m: [f64; 3]) -> Covariance {
+    Covariance::from_fn(3, 3, |row, column| relative(row, column) * lengths_m[row] * lengths_m[column])
 }
 
 /// A drive from its estimated lengths.

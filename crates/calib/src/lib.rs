@@ -1,7 +1,9 @@
-//! Calibration of a differential drive's odometry: one file a method in `methods/`, behind the trait [`Method`].
+//! Calibration of a differential drive's odometry: one file a method in `methods/`, behind the trait
+//! [`Method`].
 //!
-//! A method takes borrowed sessions of one robot and returns values with covariance, what it rejected and what the data cannot show. It links neither
-//! the simulator nor the effects: what it is not given, it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
+//! A method takes borrowed sessions of one robot. It returns values with covariance, what it rejected and
+//! what is not observable. The crate links neither the simulator nor the effects: what a method is not given,
+//! it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
 mod compare;
 mod dead_reckoning_jacobian;
@@ -11,6 +13,7 @@ mod estimate;
 mod pose_measurements;
 mod report;
 mod robust;
+mod settings;
 
 pub mod methods;
 

@@ -1,7 +1,7 @@
-//! What an outside instrument's poses say of a run: measurements far enough apart, and how the wheels turned between them.
+//! An outside instrument's poses of a run: measurements at a spacing, and how the wheels turned between them.
 //!
-//! An instrument that looks twenty times a second says little more of the wheels than one that looks once a metre, and what is wrong with its clock or with a
-//! start from standstill is in every one of its measurements.
+//! Twenty measurements a second carry little more information on the wheels than one a metre: the errors of
+//! the instrument's clock and of a start from standstill are in all of them.
 
 use dataset::{NominalRobot, RunView, Session};
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
@@ -28,11 +28,11 @@ impl Spacing {
 pub(crate) struct PoseMeasurement {
     /// Turns of the wheels since the measurement before, row by row, radians.
     pub(crate) wheel_rad: Vec<Wheels<f64>>,
-    /// What was seen, in the room; whole turns since the start are counted.
+    /// The measured pose in the room; whole turns since the start are counted.
     pub(crate) pose: Pose,
 }
 
-/// The looks at one run.
+/// The pose measurements of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PoseMeasurements<'a> {
     /// The run's id.
@@ -44,7 +44,8 @@ pub(crate) struct PoseMeasurements<'a> {
 }
 
 impl<'a> PoseMeasurements<'a> {
-    /// The looks at a run; `None` when fewer than two poses lie within its log, or the log has gaps.
+    /// The pose measurements of a run; `None` when fewer than two poses lie within its log, or the log has
+    /// gaps.
     pub(crate) fn at(
         run: &RunView<'a>,
         track: &WheelAngleInterpolator<'_>,
@@ -58,7 +59,7 @@ impl<'a> PoseMeasurements<'a> {
         let (mut from_s, start) = poses[begins];
         let (mut last_s, mut theta_rad) = (from_s, start.theta_rad);
         let (mut distance_m, mut turn_rad, mut later) = (0.0, 0.0, Vec::new());
-        for (number, &(t_s, seen)) in poses[begins..begins + within].iter().enumerate().skip(1) {
+        for (number, &(t_s, measured)) in poses[begins..begins + within].iter().enumerate().skip(1) {
             let mut turned_rad = 0.0;
             for rad in track.steps(last_s, t_s)? {
                 let step = nominal.increment(nominal.m_per_rad().zip_with(rad, |m_per_rad, rad| m_per_rad * rad));
@@ -68,16 +69,20 @@ impl<'a> PoseMeasurements<'a> {
             }
             last_s = t_s;
             // Whole turns come from the wheels, a pose at a time.
-            theta_rad = unwrap_near(seen.theta_rad, theta_rad + turned_rad);
+            theta_rad = unwrap_near(measured.theta_rad, theta_rad + turned_rad);
             if distance_m >= spacing.every_m || turn_rad >= spacing.every_rad || number + 1 == within {
-                later.push(PoseMeasurement { wheel_rad: track.steps(from_s, t_s)?, pose: Pose { theta_rad, ..seen } });
+                later.push(PoseMeasurement {
+                    wheel_rad: track.steps(from_s, t_s)?,
+                    pose: Pose { theta_rad, ..measured },
+                });
                 (from_s, distance_m, turn_rad) = (t_s, 0.0, 0.0);
             }
         }
         Some(Self { run: &run.info().id, start, later })
     }
 
-    /// The looks at every run of all sessions that has two poses or more, and the runs whose poses are of no use.
+    /// The pose measurements of every run of all sessions that has two poses or more, and the runs whose
+    /// poses cannot be used.
     ///
     /// # Errors
     /// [`CalibError`] when a robot's nominal values are no drive, or no run is left.
@@ -93,7 +98,7 @@ impl<'a> PoseMeasurements<'a> {
                 let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
                 match Self::at(run, &track, &nominal, spacing) {
                     Some(found) => measurements.push(found),
-                    None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_LOOKS.to_owned() }),
+                    None => rejected.push(Rejected { run: run.info().id.clone(), why: NO_MEASUREMENTS.to_owned() }),
                 }
             }
         }
@@ -106,16 +111,16 @@ impl<'a> PoseMeasurements<'a> {
     }
 }
 
-/// Where a run was first and last seen, and how the wheels turned in between.
+/// The first and the last measured pose of a run, and how the wheels turned in between.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ConvergenceCriterion {
+pub(crate) struct EndPoses {
     pub(crate) start: Pose,
     /// Whole turns since the start are counted.
     pub(crate) end: Pose,
     wheel_rad: Vec<Wheels<f64>>,
 }
 
-impl ConvergenceCriterion {
+impl EndPoses {
     /// The first and the last measurement within the log; `None` as for [`PoseMeasurements::at`].
     pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<Self> {
         let PoseMeasurements { start, mut later, .. } =
@@ -129,7 +134,7 @@ impl ConvergenceCriterion {
         self.wheel_rad.iter().fold(Wheels::both(0.0), |sum, rad| sum.zip_with(*rad, |sum, rad| sum + rad))
     }
 
-    /// Where the robot ends by its wheels, from the origin, by the midpoint rule.
+    /// The end of the run by dead reckoning from the origin, by the midpoint rule (paper, eq. 3).
     pub(crate) fn dead_reckoned(&self, geometry: &DriveGeometry) -> Pose {
         self.wheel_rad.iter().fold(Pose::IDENTITY, |pose, rad| {
             pose * geometry.increment(geometry.m_per_rad().zip_with(*rad, |m_per_rad, rad| m_per_rad * rad)).midpoint()
@@ -138,15 +143,16 @@ impl ConvergenceCriterion {
 }
 
 const NO_POSES: &str = "no run has the robot's pose at two instants (truth.csv with headings, or two marked points) and wheels that are logged";
-const NO_LOOKS: &str = "its log has gaps, or does not span two of its poses";
+const NO_MEASUREMENTS: &str = "its log has gaps, or does not span two of its poses";
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
 
-    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second for 20 s; poses every half second, and one
-    /// farther outside of the log on either side than its rows reach, headings wrapped.
+    /// Wheels of 1 m circumference, 0.25 m a second straight for 8 s, then on the spot by a radian a second
+    /// for 20 s; poses every half second, and one farther outside of the log on either side than its rows
+    /// reach, headings wrapped.
     fn dataset(continuous: bool) -> Dataset {
         let rows = 29;
         let (metre, spin) = (1.0, 0.25);
@@ -182,13 +188,14 @@ mod tests {
     }
 
     #[test]
-    fn looks_are_spaced_end_with_the_log_and_count_whole_turns() {
+    fn measurements_are_spaced_end_with_the_log_and_count_whole_turns() {
         let dataset = dataset(true);
         let spacing = Spacing { every_m: 0.5, every_rad: 4.0 };
         let (measurements, rejected) = PoseMeasurements::of_all("test", &[dataset.session()], spacing).expect("poses");
         assert!(rejected.is_empty());
         let measurements = &measurements[0];
-        // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at 27.75 s.
+        // The first pose within the log is at 0.25 s; every 2 s, or every 4 s of turning, the last one at
+        // 27.75 s.
         assert_eq!(measurements.start.x_m, 0.0625);
         let xs: Vec<f64> = measurements.later.iter().take(4).map(|measurement| measurement.pose.x_m).collect();
         assert_eq!(xs, [0.5625, 1.0625, 1.5625, 2.0]);

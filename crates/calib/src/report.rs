@@ -1,4 +1,5 @@
-//! Calibrations as documents: the JSON of `yair calibrate` and the TOML file that `yair evaluate --calibration` takes, which have the same names.
+//! Calibrations as documents: the JSON of `yair calibrate` and the TOML file that `yair evaluate
+//! --calibration` takes, which have the same names.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -9,6 +10,7 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter};
+use crate::settings::MAX_FILE_BYTES;
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -81,7 +83,8 @@ pub struct MethodReport {
     /// The values by key.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, ReportedValue>,
-    /// Instruments that sessions or runs have for themselves, null where these runs do not show it; their means stand among the parameters.
+    /// Instruments of sessions or runs that have their own, null where these runs do not determine it; their
+    /// means stand among the parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[serde(rename = "own_instruments")]
     pub group_instruments: Vec<GroupInstrument>,
@@ -97,10 +100,10 @@ pub struct MethodReport {
     /// How the values were found where the datasets are too large to be fitted as a whole.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub one_step: Option<OneStep>,
-    /// Whether the method came to an answer.
+    /// Whether the method converged.
     #[serde(default)]
     pub converged: bool,
-    /// Values that are hard to believe, and what to look at.
+    /// Implausible values, and what to check.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
@@ -116,7 +119,7 @@ pub struct ReportedValue {
     /// Why there is no sigma.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_why_null: Option<String>,
-    /// Ends of the profile interval at 95 %, where one was asked for.
+    /// Ends of the profile interval at 95 %, where it was computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_95: Option<[f64; 2]>,
 }
@@ -209,9 +212,6 @@ impl MethodReport {
     }
 }
 
-/// Calibration files are small; anything larger is another file.
-const LARGEST_FILE_BYTES: u64 = 1 << 20;
-
 impl CalibrationReport {
     /// The calibration file's text.
     ///
@@ -233,9 +233,9 @@ impl CalibrationReport {
         let place = path.display().to_string();
         let mut text = String::new();
         let file = std::fs::File::open(path).map_err(io)?;
-        file.take(LARGEST_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
-        if text.len() as u64 > LARGEST_FILE_BYTES {
-            let message = format!("it has more than {LARGEST_FILE_BYTES} bytes");
+        file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > MAX_FILE_BYTES {
+            let message = format!("it has more than {MAX_FILE_BYTES} bytes");
             return Err(ReportError::NotACalibration { place, message });
         }
         let report: Self = toml::from_str(&text).map_err(|error| {
@@ -289,7 +289,7 @@ const KNOWN_KEYS: &[&str] = &[
     Parameter::Latency.key(),
 ];
 
-/// Values to dead reckon with, under a name.
+/// A named set of values for dead reckoning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedCalibration {
     /// The name that tables show.
@@ -299,7 +299,8 @@ pub struct NamedCalibration {
 }
 
 impl NamedCalibration {
-    /// The drive for a robot: what the calibration does not say stays nominal; a diameter missing beside a travel per tick follows from it.
+    /// The drive for a robot: missing values stay nominal; a diameter missing beside a travel per tick
+    /// follows from it.
     #[must_use]
     pub fn geometry(&self, robot: &NominalRobot, nominal: DriveGeometry) -> Option<DriveGeometry> {
         let value = |parameter: Parameter| self.values.get(parameter.key()).copied();
@@ -315,7 +316,7 @@ impl NamedCalibration {
         DriveGeometry::new(diameter_m, value(Parameter::WheelSeparation).unwrap_or(nominal.wheel_separation_m())).ok()
     }
 
-    /// Where the outside instrument's frame is on the robot; at its centre unless the calibration says otherwise.
+    /// The outside instrument's frame on the robot; the identity unless the calibration has extrinsics.
     #[must_use]
     pub fn body_from_sensor(&self) -> Pose {
         let [x_m, y_m, theta_rad] =

@@ -1,52 +1,51 @@
-//! The outlier rule, the summary of what is left, and what trimming takes of a variance.
+//! The outlier rule, the summary of the values that are left, and the variance that trimming leaves.
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-/// Rejection by median and median absolute deviation: a value is an outlier when |x − median| > cut · 1.4826 · MAD.
+use crate::settings::{MAD_CUT, MAD_TO_SIGMA, MIN_VALUES_FOR_OUTLIERS};
+
+/// Rejection by median and median absolute deviation: a value is an outlier when |x − median| > cut · 1.4826
+/// · MAD.
 ///
-/// The paper says that "statistical filtering rejects atypical values" and not which; this is the rule of Iglewicz & Hoaglin (1993), whose cut of 3.5
-/// rejects a Gaussian value about once in 2000. It acts on each wheel by itself, as the paper's 79 left and 82 right values show.
+/// The paper says that "statistical filtering rejects atypical values" and not which; this is the rule of
+/// Iglewicz & Hoaglin (1993), whose cut of 3.5 rejects a Gaussian value about once in 2000. It acts on each
+/// wheel by itself, as the paper's 79 left and 82 right values show.
 ///
-/// Readings rounded to a grid cluster on a few values, and their MAD can be far smaller than the rounding; the rule would then throw out whole clusters
-/// and bias the mean. So no value is atypical that the instrument's stated precision explains: the robust standard deviation is never taken below it.
+/// Readings rounded to a grid cluster on a few values, and their MAD can be far smaller than the rounding;
+/// the rule would then throw out whole clusters and bias the mean. So no value is atypical that the
+/// instrument's stated precision explains: the robust standard deviation is never taken below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MedianMad {
-    /// How many robust standard deviations are too many.
+    /// Robust standard deviations from the median beyond which a value is an outlier.
     pub cut: f64,
 }
 
-/// The MAD of a Gaussian times this is its standard deviation: 1/Φ⁻¹(3/4).
-const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
-
-/// Fewer values than this have no shape to depart from.
-const FEWEST_TO_JUDGE: usize = 5;
-
 impl Default for MedianMad {
     fn default() -> Self {
-        Self { cut: 3.5 }
+        Self { cut: MAD_CUT }
     }
 }
 
 impl MedianMad {
-    /// Which values are kept, in their order. `stated_sigma` is the standard deviation that the instrument's precision alone gives a value, 0 when it
-    /// is not known.
+    /// Which values are no outliers, in their order. `stated_sigma` is the standard deviation of a value by
+    /// the instrument's stated precision, 0 when it is not stated.
     #[must_use]
     pub fn keep(&self, values: &[f64], stated_sigma: f64) -> Vec<bool> {
-        if values.len() < FEWEST_TO_JUDGE {
+        if values.len() < MIN_VALUES_FOR_OUTLIERS {
             return vec![true; values.len()];
         }
         let sorted = sorted(values);
         let center = median(&sorted);
         let deviation = median_deviation(&sorted, center);
         let limit = self.cut * (MAD_TO_SIGMA * deviation).max(stated_sigma);
-        // A limit of zero: half of the values agree exactly and nothing says how wide the rest may be.
+        // A limit of zero: half of the values agree exactly, and nothing bounds the rest.
         values.iter().map(|value| limit == 0.0 || (value - center).abs() <= limit).collect()
     }
 }
 
 /// The values in the order of [`f64::total_cmp`].
 ///
-/// They are sorted by whole numbers: a few dozen of these sort without branches, half of which a processor would foretell wrongly.
+/// They are sorted as integers, without branches that a processor would predict wrongly.
 fn sorted(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<i64> = values.iter().map(|value| in_total_order(value.to_bits().cast_signed())).collect();
     order.sort_unstable();
@@ -59,7 +58,8 @@ fn median(sorted: &[f64]) -> f64 {
     if odd { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
-/// Median of the distances from the median: they rise to both sides of the middle, so that the sides are merged until half of them are passed.
+/// Median of the distances from the median: they rise to both sides of the middle, so that the sides are
+/// merged until half of them are passed.
 fn median_deviation(sorted: &[f64], center: f64) -> f64 {
     let (below, above) = sorted.split_at(sorted.len() / 2);
     let below = below.iter().rev().map(|value| center - value);
@@ -120,7 +120,8 @@ impl Summary {
     }
 }
 
-/// What is left of the variance of a normal error whose largest share was dropped: along one axis, and of each of two axes by their distance.
+/// Share of a normal variance that is left after the largest errors were dropped, by their shares: in the
+/// plane by distance, and along one axis.
 pub(crate) fn left_of_variance(dropped: (f64, f64)) -> (f64, f64) {
     let (in_plane, along) = dropped;
     // A distance: 1 − c²/2·e^(−c²/2)/(1 − e^(−c²/2)) with e^(−c²/2) the dropped share.
@@ -163,7 +164,7 @@ mod tests {
 
     #[test]
     fn the_median_deviation_is_that_of_the_sorted_deviations() {
-        // Irregular values with ties, all lengths, in some order.
+        // Irregular values with ties, of every number, in some order.
         for count in 1..40_u32 {
             for seed in 0..20_u32 {
                 let value = |k: u32| f64::from((k * k * 31 + seed * 17 + k * 7) % 23) * 0.37 - 3.0;

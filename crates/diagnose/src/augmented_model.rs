@@ -33,13 +33,13 @@ impl<'a> AugmentedModel<'a> {
 
     /// A candidate's sizes.
     pub(crate) fn estimates(&self, index: usize) -> DVector<f64> {
-        DVector::from_column_slice(&self.fit.fit.model.term_values[self.range(index)])
+        DVector::from_column_slice(&self.fit.solution.model.term_values[self.range(index)])
     }
 }
 
 /// −log likelihood of a fit over as many innovations as the fullest of those compared: a measurement that one fit takes for an outlier is charged as one.
 pub(crate) fn cost(fit: &ModelFit<'_>, count: f64) -> f64 {
-    total(&fit.fit.pass.runs).map_or(f64::INFINITY, |sum| sum.cost() + left_out_cost(&sum, count))
+    total(&fit.solution.pass.runs).map_or(f64::INFINITY, |sum| sum.cost() + left_out_cost(&sum, count))
 }
 
 /// What the innovations that are missing to a number of them cost: each lies as far off as an outlier does at least, and has a variance as the others have.
@@ -50,7 +50,7 @@ pub(crate) fn left_out_cost(equations: &NormalEquations, count: f64) -> f64 {
 }
 
 pub(crate) fn count(fit: &ModelFit<'_>) -> f64 {
-    fit.fit.pass.runs.iter().map(|run| run.count).sum()
+    fit.solution.pass.runs.iter().map(|run| run.count).sum()
 }
 
 /// A fit that takes a smaller share of the measurements that another one takes has lost the robot.
@@ -71,11 +71,12 @@ pub(crate) fn refit<'a>(
         estimates.extend(own.filter(|own| own.len() == none.len()).unwrap_or(none));
     }
     let follows = |fit: &ModelFit<'_>| {
-        fit.fit.model.term_values.iter().all(|size| size.is_finite()) && count(fit) > MIN_FOLLOWED * count(&from.fit)
+        fit.solution.model.term_values.iter().all(|size| size.is_finite())
+            && count(fit) > MIN_FOLLOWED * count(&from.fit)
     };
     let near = from.fit.extended_from(estimates, &mut terms(&candidates)).ok().filter(follows);
     let near = match near {
-        Some(fit) if !fit.fit.left_basin => return Some(AugmentedModel { fit, candidates }),
+        Some(fit) if !fit.solution.left_basin => return Some(AugmentedModel { fit, candidates }),
         near => near,
     };
     let anew = base.extended(&mut terms(&candidates)).ok().filter(follows);

@@ -1,11 +1,10 @@
 //! The order of work.
 
+use calib::methods::joint::calibrated_drive;
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
 use estimation::{EstimationError, FitSettings, ModelFit};
-use kinematics::DriveGeometry;
-use nalgebra::DMatrix;
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
@@ -78,7 +77,7 @@ pub struct FittedModel {
 
 impl FittedModel {
     fn of(extended: &AugmentedModel<'_>) -> Self {
-        Self { model: extended.fit.fit.model.clone(), candidates: extended.candidates.clone() }
+        Self { model: extended.fit.solution.model.clone(), candidates: extended.candidates.clone() }
     }
 
     /// Its terms, at the start of their lives.
@@ -94,7 +93,7 @@ const MAX_REJECTED: f64 = 0.2;
 const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 
 fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
-    let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
     fit.records.measurements() as f64 / runs.max(1) as f64
 }
 
@@ -205,22 +204,6 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Op
 
 /// The calibration with what was found in the model.
 fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
-    let fit = &extended.fit;
-    let model = &fit.fit.model;
-    let not_physical =
-        |why: kinematics::GeometryError| CalibError::NotApplicable { method: "joint", why: why.to_string() };
-    let geometry = DriveGeometry::new(model.m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), model.separation_m)
-        .map_err(not_physical)?;
-    let diameter_m = geometry.wheel_diameter_m();
-    let estimates = [diameter_m.left, diameter_m.right, model.separation_m];
-    let covariance = fit.covariance(&mut crate::candidate::terms(&extended.candidates));
-    Ok(Calibration {
-        covariance: covariance
-            .as_ref()
-            .map(|covariance| DMatrix::from_fn(3, 3, |i, j| covariance[(i, j)] * estimates[i] * estimates[j])),
-        not_observable: calib::methods::joint::not_observable(fit),
-        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
-        converged: fit.fit.converged,
-        ..Calibration::new("joint", geometry, datasets[0].robot.ticks_per_rev)
-    })
+    let covariance = extended.fit.covariance(&mut crate::candidate::terms(&extended.candidates));
+    calibrated_drive(&extended.fit, covariance.as_ref(), datasets[0].robot.ticks_per_rev)
 }

@@ -25,7 +25,7 @@ pub(crate) const READ_STANDING_S: f64 = 2.0;
 pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
-    let fit = &model.fit.fit;
+    let fit = &model.fit.solution;
     let counts = nominal.ticks_per_rev.unwrap_or(MIN_COUNTS);
     let per_tick = (MIN_COUNTS / counts).ceil().max(1.0);
     let mut robot: Robot = toml::from_str(STAND_IN).map_err(|error| error.message().to_owned())?;
@@ -114,7 +114,7 @@ fn values_of_runs(sparse: &Sparse, model: &AugmentedModel<'_>) -> BTreeMap<Strin
 
 /// The calibrated lengths as effects on the nominal ones.
 fn geometry(model: &AugmentedModel<'_>) -> Result<[Effect; 3], String> {
-    let (found, nominal) = (&model.fit.fit.model, &model.fit.nominal);
+    let (found, nominal) = (&model.fit.solution.model, &model.fit.nominal);
     let mean = |wheels: kinematics::Wheels<f64>| 0.5 * (wheels.left + wheels.right);
     let ratio = |wheels: kinematics::Wheels<f64>| wheels.right / wheels.left;
     let right_over_left = ratio(found.m_per_rad) / ratio(nominal.m_per_rad);

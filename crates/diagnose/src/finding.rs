@@ -233,7 +233,7 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
 
 /// The counts do not follow the robot, and no gross fault explains it.
 pub(crate) fn of_lost(base: &ModelFit<'_>) -> Finding {
-    let sigmas = NoiseComponent::ALL.map(|component| base.fit.noise.sigma(component));
+    let sigmas = NoiseComponent::ALL.map(|component| base.solution.noise.sigma(component));
     of_causes(vec![Cause::Unknown], 0.0, BTreeMap::new(), Basis::Uncorrelated(sigmas))
 }
 

@@ -90,9 +90,9 @@ fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
 
 /// Every unit's cost under a fit to the other folds, and its run's dead reckoning under that fit.
 fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
-    let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
     let (units, blocks) = if runs >= MIN_RUNS {
-        (fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
+        (fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
     } else if runs > 0 {
         (fit.in_blocks(terms, MIN_RUNS.div_ceil(runs)), true)
     } else {
@@ -120,7 +120,7 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         let covariance = inverse(&own.along(&free).matrix, RIDGE)
             .ok_or("the other runs do not determine the model once some are held out")?;
         let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
-        let mut model = fit.fit.model.clone();
+        let mut model = fit.solution.model.clone();
         fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
         for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
@@ -145,7 +145,7 @@ fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
     let prior_sigma: Vec<f64> =
         terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.prior_sigma).collect();
     let of = |column: &Column| match column {
-        Column::Term(k) => (fit.fit.model.term_values[*k], prior_sigma[*k].powi(-2)),
+        Column::Term(k) => (fit.solution.model.term_values[*k], prior_sigma[*k].powi(-2)),
         _ => (0.0, 0.0),
     };
     fit.columns.iter().map(of).collect()

@@ -43,7 +43,7 @@ pub(crate) fn regated<'a>(
 ) -> Option<AugmentedModel<'a>> {
     let fit = open.fit.refit_gated(&mut terms(&open.candidates)).ok()?;
     let model = AugmentedModel { fit, ..open };
-    let outliers = |model: &AugmentedModel<'_>| model.fit.fit.pass.outliers.len();
+    let outliers = |model: &AugmentedModel<'_>| model.fit.solution.pass.outliers.len();
     let (before, after) = (log_bayes_factor(base, found), log_bayes_factor(base, &model) - log_trials);
     (outliers(&model) < outliers(found) && after > before + log_odds_margin(before)).then_some(model)
 }

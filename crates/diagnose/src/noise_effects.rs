@@ -137,7 +137,7 @@ fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding
     if p_value >= TURNS_LEVEL {
         return None;
     }
-    let sigma = model.fit.fit.noise.sigma(NoiseComponent::Turn);
+    let sigma = model.fit.solution.noise.sigma(NoiseComponent::Turn);
     let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
     let parameters = BTreeMap::from([("turn_sigma_rad_per_sqrt_rad".to_owned(), value)]);
     let causes = with_sign(Sign::ScatterWithTurn, without_ids);

@@ -10,7 +10,7 @@
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
 use effects::IsolatedError;
-use estimation::{Column, Innovation, ModelFit, NormalEquations, Segment, total};
+use estimation::{Column, InnovationComponent, ModelFit, NormalEquations, Segment, total};
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -186,12 +186,12 @@ fn log_mean(logs: &[f64]) -> f64 {
 }
 
 /// The large errors, from the innovations on every measurement.
-fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
+fn large(fit: &ModelFit<'_>, innovations: &[Vec<InnovationComponent>]) -> Vec<Large> {
     let Some(phase) = innovations.first() else { return Vec::new() };
     let segments = &fit.records.segments;
     let since: Vec<Vec<(f64, Wheels<f64>)>> = segments.iter().map(Segment::since_previous_measurement).collect();
     let at_ramp: Vec<Vec<bool>> = segments.iter().map(Segment::changes_of_speed).collect();
-    let m_per_rad = fit.fit.model.m_per_rad;
+    let m_per_rad = fit.solution.model.m_per_rad;
     // Of each measurement, with the measurement before that is taken: its own error, and where it is.
     let mut measurements: Vec<(Large, (usize, bool))> = Vec::new();
     let mut before = None;
@@ -278,7 +278,7 @@ fn seen(model: &AugmentedModel<'_>, fit: &ModelFit<'_>, large: &[Large]) -> Vec<
         let run = runs.iter().find(|run| run.run == large.run)?;
         let own: Vec<usize> = (0..COLUMNS).map(|column| first + number * COLUMNS + column).collect();
         let of_run = projection.of_columns(run, &own);
-        let separation_m = fit.fit.model.separation_m;
+        let separation_m = fit.solution.model.separation_m;
         // The gradient is the cost's.
         Some(Measured { large: large.clone(), separation_m, information: of_run.information, score: -of_run.gradient })
     };

@@ -34,9 +34,9 @@ const SEEN_SCATTER: f64 = 4.0;
 /// Whether the noise of a fit leaves room for what the contacts of both wheels scatter by.
 fn scatters_enough(extended: &AugmentedModel<'_>, contact_m: f64) -> bool {
     let fit = &extended.fit;
-    let variance = |of| fit.fit.noise.sigma(of).powi(2);
-    let distance_m = fit.records.distance_between_measurements_m(&fit.fit.model);
-    let (wheel, separation_m) = (variance(NoiseComponent::Wheel) * distance_m, fit.fit.model.separation_m);
+    let variance = |of| fit.solution.noise.sigma(of).powi(2);
+    let distance_m = fit.records.distance_between_measurements_m(&fit.solution.model);
+    let (wheel, separation_m) = (variance(NoiseComponent::Wheel) * distance_m, fit.solution.model.separation_m);
     // Along, half of each wheel; in heading, their difference.
     let along = variance(NoiseComponent::MeasurementPosition) + 0.5 * wheel;
     let heading = variance(NoiseComponent::MeasurementHeading) + 2.0 * wheel / separation_m.powi(2);

@@ -67,7 +67,7 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
         reach = (1.5 * sigma).clamp(CLOSER * reach, reach);
     }
     let ends = [best.x - WITHIN_95 * sigma, best.x + WITHIN_95 * sigma].map(at);
-    let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.term_values[first + k];
+    let size = |point: &Point<'_>, k: usize| point.model.fit.solution.model.term_values[first + k];
     let extra_sigma = |k: usize| {
         let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
         moved.fold(0.0, f64::max) / WITHIN_95

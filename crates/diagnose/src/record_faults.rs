@@ -85,7 +85,7 @@ pub(crate) fn fault(
             let most_outliers = base.map_or(MAY_BE_OFF, |base| MAY_BE_OFF.max(STILL_OFF * rejected_share(base)));
             let follows = is_drive(&fit)
                 && rejected_share(&fit) < most_outliers
-                && fit.fit.model.body_from_sensor.theta_rad.abs() <= MAX_ROTATED_RAD;
+                && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_ROTATED_RAD;
             if !follows && !visible_in_log {
                 continue;
             }
@@ -113,7 +113,7 @@ pub(crate) fn fault(
 
 /// How implausible the geometry parameters of a fit are, as a part of its cost.
 fn implausible(fit: &ModelFit<'_>) -> f64 {
-    let (model, nominal) = (&fit.fit.model, &fit.nominal);
+    let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let off = |of: f64, nominal: f64, sd: f64| 0.5 * ((of / nominal).abs().ln() / sd).powi(2);
     off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_SD)
         + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_SD)
@@ -123,7 +123,7 @@ fn implausible(fit: &ModelFit<'_>) -> f64 {
 
 /// Share of measurements that a fit takes for outliers.
 pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
-    fit.fit.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64
+    fit.solution.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64
 }
 
 /// Does a base fit look like a robot whose counts follow it?
@@ -133,7 +133,7 @@ fn is_sound(fit: &ModelFit<'_>) -> bool {
 
 /// Does the robot go where a drive of any lengths would, by the counts?
 pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
-    let sigma = |of| fit.fit.noise.sigma(of);
+    let sigma = |of| fit.solution.noise.sigma(of);
     sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA
         && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
         && sigma(NoiseComponent::MeasurementPosition) < BLURRED * fit.records.extent_m()
@@ -142,14 +142,14 @@ pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
 
 /// Are a fit's lengths and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
-    let (model, nominal) = (&fit.fit.model, &fit.nominal);
+    let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
     near(model.m_per_rad.left, nominal.m_per_rad.left, 2.0 * WHEEL_SD)
         && near(model.m_per_rad.right, nominal.m_per_rad.right, 2.0 * WHEEL_SD)
         && near(model.separation_m, nominal.separation_m, 1.5 * SEPARATION_SD)
-        && fit.fit.noise.sigma(NoiseComponent::Wheel) < WHEEL_SIGMA
-        && fit.fit.noise.sigma(NoiseComponent::Turn) < TURN_SIGMA
-        && fit.fit.converged
+        && fit.solution.noise.sigma(NoiseComponent::Wheel) < WHEEL_SIGMA
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < TURN_SIGMA
+        && fit.solution.converged
 }
 
 /// Wheels that are farther from nominal than by this factor are not what they are believed to be.
@@ -157,7 +157,7 @@ const ANOTHER_ROBOT: f64 = 1.3;
 
 /// By which factor the wheels of a fit are too large or too small for the robot that its description tells of, if they are.
 pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
-    let ratio = fit.fit.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
+    let ratio = fit.solution.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
     let factor = (ratio.left * ratio.right).sqrt();
     (factor.ln().abs() > ANOTHER_ROBOT.ln()).then_some(factor)
 }

@@ -5,7 +5,7 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::{Innovation, ModelFit, Projected, Segment, WHITE_BELOW};
+use estimation::{InnovationComponent, ModelFit, Projected, Segment, WHITENESS_Z};
 use kinematics::Side;
 
 use crate::augmented_model::AugmentedModel;
@@ -129,13 +129,13 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
     let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
-    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITE_BELOW;
+    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
     Checked { autocorrelated, checks, correlation, outliers }
 }
 
 /// The innovations of the first phase: phases share their measurements' errors.
-fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovation> {
-    let first = fit.fit.pass.innovations.first();
+fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f InnovationComponent> {
+    let first = fit.solution.pass.innovations.first();
     first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
 }
 
@@ -153,7 +153,7 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
         let z = (mean - 1.0) / (variance.max(2.0) / n).sqrt();
         add(Check::InnovationSize(name), mean, p_of_z(z));
     }
-    let runs: Vec<_> = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let runs: Vec<_> = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let (sum, count) = runs.iter().fold((0.0, 0.0), |(sum, count), run| (sum + run.chi_square, count + run.count));
     if runs.len() > 2 && count > 0.0 {
         let mean = sum / count;
@@ -184,7 +184,8 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
         let (mut resembles, mut weights) = (0.0, 0.0_f64);
         for lag in 1..=LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
-            let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
+            let follows =
+                |pair: &&[&InnovationComponent]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
             for pair in series.windows(lag + 1).filter(follows) {
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
@@ -246,8 +247,8 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
 /// difference of two measurements, a measurement that errs spoils the displacement to it and the one from it, and both together are right.
 fn outliers(fit: &ModelFit<'_>) -> Outliers {
     let mut found = Outliers { measurements: innovations(fit, 0).len(), ..Outliers::default() };
-    let far = &fit.fit.pass.outliers;
-    let phase = fit.fit.pass.innovations.first().map_or(&[][..], Vec::as_slice);
+    let far = &fit.solution.pass.outliers;
+    let phase = fit.solution.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     let mut undone_by = None;
     for (position, &(segment, measurement)) in far.iter().enumerate() {
         if fit.records.segments[segment].is_displacement() {
@@ -293,7 +294,7 @@ fn undo(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
 /// anew, there is nothing to stay: the same says that errors last, and not whose they are.
 pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
-    let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
+    let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > LARGE;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));
@@ -461,7 +462,7 @@ mod tests {
             });
         }
         let fit = fitted(&dataset);
-        assert_eq!(fit.fit.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
+        assert_eq!(fit.solution.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
         let found = outliers(&fit);
         assert_eq!((found.isolated, found.staying), (1, 1));
     }

@@ -11,8 +11,8 @@ use crate::statistics::p_of_chi_square;
 /// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
 /// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
 pub(crate) fn differs_from_run_to_run(model: &AugmentedModel<'_>) -> f64 {
-    let runs: Vec<_> = model.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    let Some(equations) = total(&model.fit.fit.pass.runs) else { return 1.0 };
+    let runs: Vec<_> = model.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let Some(equations) = total(&model.fit.solution.pass.runs) else { return 1.0 };
     let own = [Column::Separation.index()];
     let Some(projection) = model.fit.eliminated(&equations, &own) else { return 1.0 };
     let (mut squares, mut mean, mut spread) = (0.0, 0.0, 0.0);

@@ -18,7 +18,7 @@ pub(crate) struct Test {
 
 /// The test of a candidate in its fitted model, and along its principal directions in units of the plausible: information and size.
 pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Option<(Test, Vec<(f64, f64)>)> {
-    let equations = total(&extended.fit.fit.pass.runs)?;
+    let equations = total(&extended.fit.solution.pass.runs)?;
     let parameters = extended.candidates[candidate].parameters();
     let own = extended.columns(candidate);
     let projected = extended.fit.eliminated(&equations, &own)?.of_columns(&equations, &own);
@@ -49,11 +49,11 @@ pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Opti
 /// Liang & Zeger 1986.
 pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usize, level: f64) -> bool {
     // Fewer runs do not say how a size differs between them.
-    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let runs: Vec<_> = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     if runs.len() < MIN_RUNS {
         return true;
     }
-    let Some(equations) = total(&extended.fit.fit.pass.runs) else { return false };
+    let Some(equations) = total(&extended.fit.solution.pass.runs) else { return false };
     let own = extended.columns(candidate);
     let Some(projection) = extended.fit.eliminated(&equations, &own) else { return false };
     let information = projection.of_columns(&equations, &own).information;
@@ -68,11 +68,11 @@ pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usiz
 /// Standard deviations of a candidate's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
 /// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
 fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>> {
-    let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
+    let runs: Vec<_> = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     if runs.len() < MIN_RUNS {
         return None;
     }
-    let equations = total(&extended.fit.fit.pass.runs)?;
+    let equations = total(&extended.fit.solution.pass.runs)?;
     let own = extended.columns(candidate);
     let projection = extended.fit.eliminated(&equations, &own)?;
     let inverse = inverse(&projection.of_columns(&equations, &own).information, RIDGE)?;
@@ -90,7 +90,7 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
 /// Each candidate's test beside the others, and by how much what is not known of variants and names widens its sizes.
 pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> Vec<Test> {
     // As wide as Student's quantile is where measurements are few.
-    let Some(equations) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
+    let Some(equations) = total(&model.fit.solution.pass.runs) else { return Vec::new() };
     let few = student_95(freedom(&model.fit, &equations)) / 1.96;
     let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
         let (mut test, _) = wald_test(model, candidate)?;

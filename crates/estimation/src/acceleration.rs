@@ -1,5 +1,5 @@
-//! Anderson's acceleration of the fit's steps. Mean and noise step side by side, each as if the other stayed: what one moves, the other follows in the next step, and
-//! steps shrink by a constant share. The last few of them show that share, and where it leads.
+//! Anderson acceleration of the fit's steps. Mean and noise step side by side, each as if the other stayed,
+//! so that steps converge linearly. The last of them give the rates, and the fixed point.
 //!
 //! Reference: Anderson 1965; Walker & Ni 2011 (the mixing as least squares over differences of steps).
 
@@ -7,57 +7,51 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-/// So many differences are kept.
-const DEPTH: usize = 3;
-/// A step that is made longer than so many times is none that the last ones showed.
-const LONGEST: f64 = 10.0;
+use crate::settings::{
+    ANDERSON_DEPTH, ANDERSON_DIVERGED_MEAN_STEP, ANDERSON_DIVERGED_NOISE_STEP, ANDERSON_MEAN_STEP, ANDERSON_NOISE_STEP,
+    ANDERSON_SINGULAR_VALUE, MAX_ANDERSON_DIVERGENCES, MAX_ANDERSON_STEP_RATIO,
+};
 
-/// How large a step is: of the mean squared over its variance, and of the noise as a share of a variance.
+/// Size of a step: of the mean squared over its variance, and of the noise in the logarithm of a variance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
+pub(super) struct StepSize {
     pub(super) mean: f64,
     pub(super) noise: f64,
 }
 
-/// Steps that are smaller follow each other as those of a linear map do; larger ones do not. A variance that is far too large shrinks by one in its logarithm.
-const NEAR: Size = Size { mean: 1.0, noise: 0.3 };
-/// Where steps become larger than this, what the last ones showed has led astray.
-const DIVERGED: Size = Size { mean: 10.0, noise: 0.9 };
-/// Led astray so often, the fit goes on without.
-const MAX_DIVERGED: u32 = 2;
-/// Differences that hardly differ, as a share of the largest, tell nothing apart.
-const SINGULAR: f64 = 1e-10;
-
 /// The steps so far.
 #[derive(Debug, Default)]
 pub(super) struct Acceleration {
-    /// The last step that was proposed, and what was moved by instead.
+    /// The last step that was proposed, and the one that was taken.
     last: Option<(DVector<f64>, DVector<f64>)>,
-    /// How proposed steps differed from those before, and what had been moved by in between; the newest last.
+    /// Differences of consecutive proposed steps, and the steps taken in between; the newest last.
     differences: VecDeque<(DVector<f64>, DVector<f64>)>,
     engaged: bool,
     diverged: u32,
 }
 
 impl Acceleration {
-    /// Whether to go by the last steps at all, the next one being so large.
-    pub(super) fn engages(&mut self, step: Size) -> bool {
-        if self.engaged && (step.mean > DIVERGED.mean || step.noise > DIVERGED.noise) {
+    /// Whether the next step, of this size, is to be mixed.
+    pub(super) fn engages(&mut self, step: StepSize) -> bool {
+        if self.engaged && (step.mean > ANDERSON_DIVERGED_MEAN_STEP || step.noise > ANDERSON_DIVERGED_NOISE_STEP) {
             (self.engaged, self.last) = (false, None);
             self.differences.clear();
             self.diverged += 1;
         }
-        self.engaged |= step.mean < NEAR.mean && step.noise < NEAR.noise && self.diverged < MAX_DIVERGED;
+        self.engaged |= step.mean < ANDERSON_MEAN_STEP
+            && step.noise < ANDERSON_NOISE_STEP
+            && self.diverged < MAX_ANDERSON_DIVERGENCES;
         self.engaged
     }
 
-    /// What to move by instead of a step that is proposed. `metric` is the information on what is moved: lengths are in standard deviations.
-    pub(super) fn instead_of(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
+    /// The mixed step in the place of a proposed one. `metric` is the information, so that lengths are in
+    /// standard deviations.
+    pub(super) fn mixed(&mut self, step: &DVector<f64>, metric: &DMatrix<f64>) -> DVector<f64> {
         let squared = |of: &DVector<f64>| of.dot(&(metric * of));
         if let Some((before, moved)) = self.last.take() {
             self.differences.push_back((step - before, moved));
         }
-        if self.differences.len() > DEPTH {
+        if self.differences.len() > ANDERSON_DEPTH {
             self.differences.pop_front();
         }
         if self.differences.is_empty() {
@@ -68,22 +62,24 @@ impl Acceleration {
             self.differences.iter().map(|(difference, _)| metric * difference).collect();
         let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&part_equations[j]));
         let along = DVector::from_fn(n, |i, _| part_equations[i].dot(step));
-        let least = SINGULAR * products.diagonal().max();
+        let least = ANDERSON_SINGULAR_VALUE * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
-        let mixed = self
+        let combined = self
             .differences
             .iter()
             .zip(shares.iter())
             .fold(step.clone(), |sum, ((difference, moved), share)| sum - (difference + moved) * *share);
-        if mixed.iter().all(|by| by.is_finite()) && squared(&mixed) <= LONGEST * LONGEST * squared(step) {
-            mixed
+        if combined.iter().all(|by| by.is_finite())
+            && squared(&combined) <= MAX_ANDERSON_STEP_RATIO * MAX_ANDERSON_STEP_RATIO * squared(step)
+        {
+            combined
         } else {
             self.differences.clear();
             step.clone()
         }
     }
 
-    /// What was moved by in the end, for a step that had been proposed.
+    /// Records the step that was taken for a proposed one.
     pub(super) fn moved(&mut self, proposed: DVector<f64>, by: DVector<f64>) {
         self.last = Some((proposed, by));
     }
@@ -93,16 +89,16 @@ impl Acceleration {
 mod tests {
     use super::*;
 
-    /// A map that draws nearer by a constant share in each direction is solved in as many steps as it has directions, and one to see it by.
+    /// A linear map of three rates is solved after three differences.
     #[test]
-    fn a_linear_iteration_ends_once_its_shares_have_been_seen() {
+    fn a_linear_iteration_ends_once_its_rates_are_known() {
         let shares = DVector::from_vec(vec![0.9, -0.5, 0.3]);
         let metric = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 1e4, 1.0]));
         let mut acceleration = Acceleration::default();
         let mut x = DVector::from_vec(vec![1.0, -2.0, 3.0]);
         for _ in 0..5 {
             let step = shares.component_mul(&x) - &x;
-            let by = acceleration.instead_of(&step, &metric);
+            let by = acceleration.mixed(&step, &metric);
             x += &by;
             acceleration.moved(step, by);
         }

@@ -1,8 +1,9 @@
-//! Symmetric matrices of a pose, several at a time: the filter's covariance, and its derivatives by the logarithm of each variance.
+//! Symmetric matrices of a pose, several at a time: the filter's covariance, and its derivatives by the
+//! logarithm of each variance.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Several symmetric matrices of a pose, element by element: what is done to one is done to all at a time.
+/// Several symmetric matrices of a pose, element by element: each operation acts on all of them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Covariances<const N: usize> {
     xx: [f64; N],
@@ -64,7 +65,7 @@ impl<const N: usize> Covariances<N> {
         self
     }
 
-    /// Adds one of several others to one of these.
+    /// Adds matrix `of` of others to matrix `at`.
     #[inline(always)]
     pub(super) fn add<const M: usize>(&mut self, at: usize, others: &Covariances<M>, of: usize) {
         self.xx[at] += others.xx[of];
@@ -80,7 +81,7 @@ impl<const N: usize> Covariances<N> {
         [&mut self.xx, &mut self.xy, &mut self.yy, &mut self.xt, &mut self.yt, &mut self.tt]
     }
 
-    /// Adds a column times itself, so many times, to one of them.
+    /// Adds `times` the outer product of a column to matrix `at`.
     #[inline(always)]
     pub(super) fn add_outer(&mut self, at: usize, column: &Vector3<f64>, times: f64) {
         self.xx[at] += column.x * column.x * times;
@@ -91,7 +92,7 @@ impl<const N: usize> Covariances<N> {
         self.tt[at] += column.z * column.z * times;
     }
 
-    /// One of them.
+    /// Matrix `of`.
     pub(crate) fn matrix(&self, of: usize) -> Matrix3<f64> {
         let Self { xx, xy, yy, xt, yt, tt } = self;
         Matrix3::new(xx[of], xy[of], xt[of], xy[of], yy[of], yt[of], xt[of], yt[of], tt[of])

@@ -1,4 +1,5 @@
-//! What whoever extends `joint`'s model needs beside the fit: normal equation in blocks, and dead reckoning with terms.
+//! Operations on a fit beside the estimate: normal equations of blocks, decimation, and errors of dead
+//! reckoning with terms.
 
 use std::sync::Arc;
 
@@ -10,31 +11,34 @@ use crate::error::EstimationError;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
-use crate::noise::{MIN_SIGMA, NoiseComponent};
+use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
-use crate::optimizer::Fit;
+use crate::optimizer::Solution;
 use crate::pass::pass;
 use crate::propagation::{CarriedState, Propagator};
 use crate::records::{MeasuredPose, Segment};
+use crate::settings::{MAX_DECIMATION_NONCENTRALITY, MIN_NOISE_SIGMA};
 use crate::wheel_angles::WheelInterval;
 
-/// How far off dead reckoning ends.
+/// Error of dead reckoning at a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EndError {
     /// Which run: session and run in the order given.
     pub run: (usize, usize),
-    /// Of the position, metres.
+    /// Error of the position, metres.
     pub position_m: f64,
-    /// Of the heading, radians.
+    /// Error of the heading, radians.
     pub heading_rad: f64,
-    /// Way of the drive's centre, metres.
+    /// Distance driven by the drive's centre, metres.
     pub length_m: f64,
-    /// Where dead reckoning ends, in the frame of where the instrument saw the end: ahead, to the left, turned to the left.
+    /// The dead-reckoned pose of the instrument in the frame of the measured one: ahead, to the left
+    /// (metres), turned to the left (radians).
     pub off: Pose,
 }
 
 impl ModelFit<'_> {
-    /// The normal equation at the values found, each run cut into so many blocks that start anew; for runs too few to be held out whole.
+    /// The normal equations at the values found, each run cut into `blocks` that start anew, for runs too few
+    /// to be held out whole.
     #[must_use]
     pub fn in_blocks(&self, terms: &mut [Box<dyn ModelTerm>], blocks: usize) -> Vec<NormalEquations> {
         self.blocks(terms, blocks, self.gate())
@@ -51,50 +55,50 @@ impl ModelFit<'_> {
             .flat_map(|block| {
                 let part: Vec<_> =
                     self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
-                let Fit { model, noise, free_headings, .. } = &self.fit;
+                let Solution { model, noise, free_headings, .. } = &self.solution;
                 let found = pass(&self.records, &part, model, noise, free_headings, terms, pass_options);
                 found.runs.into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
     }
 
-    /// The same fit on counts put together in steps of up to so long, for scans: what they ask goes over fewer intervals. `terms` are those of the fit. `None` where that
-    /// would leave more than half of the intervals, or by longer steps the fit is another one: measurements then lie elsewhere, or a term goes with single rows.
+    /// The same fit on records whose intervals are joined up to `longest_s` seconds, for faster scans.
+    /// `terms` are those of the fit. `None` where more than half of the intervals would be left, or where the
+    /// innovations change: a term may depend on single rows.
     #[must_use]
     pub fn decimated(&self, terms: &mut [Box<dyn ModelTerm>], longest_s: f64) -> Option<Self> {
-        /// Measurements that lie elsewhere by δ of their standard deviations make Σδ² at the most of what is not there: less than chance does.
-        const SAME: f64 = 1.0;
         let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
-        let coarse = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
-        let runs = coarse.scan_parts(terms, &[]);
-        let both = runs.iter().zip(&self.fit.pass.runs);
-        let same_looks = both.clone().all(|(run, own)| run.count == own.count);
+        let decimated = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
+        let runs = decimated.scan_parts(terms, &[]);
+        let both = runs.iter().zip(&self.solution.pass.runs);
+        let same_measurements = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
-        (same_looks && squares < SAME).then_some(coarse)
+        (same_measurements && squares < MAX_DECIMATION_NONCENTRALITY).then_some(decimated)
     }
 
-    /// How far displacements that follow each other, taken together, lie from dead reckoning with the geometry parameters found, in standard deviations of a measurement; `None` where
-    /// there is none.
+    /// Mahalanobis distance of consecutive displacements, composed, from dead reckoning with the geometry
+    /// found, in standard deviations of a measurement. `None` where there is no displacement.
     #[must_use]
     pub fn mahalanobis_distance(&self, segments: std::ops::Range<usize>) -> Option<f64> {
         let (mut measured, mut dead_reckoned) = (None, Pose::IDENTITY);
         for segment in self.records.segments.get(segments)?.iter().filter(|segment| segment.is_displacement()) {
             let (_, _, (_, end)) = segment.ends()?;
-            let extrinsics = self.fit.model.instrument(segment.run).body_from_sensor;
+            let extrinsics = self.solution.model.instrument(segment.run).body_from_sensor;
             let turned =
-                |pose: Pose, interval: &WheelInterval| pose * self.fit.model.increment(interval.wheel_rad).arc();
+                |pose: Pose, interval: &WheelInterval| pose * self.solution.model.increment(interval.wheel_rad).arc();
             let moved = segment.intervals.iter().fold(Pose::IDENTITY, turned);
             measured = Some(measured.unwrap_or(Pose::IDENTITY) * end);
             dead_reckoned = dead_reckoned * (extrinsics.inverse() * moved * extrinsics);
         }
         let off = dead_reckoned.to(measured?);
-        let [_, _, xy, theta] = self.fit.noise.variance;
+        let [_, _, xy, theta] = self.solution.noise.variance;
         let off_rad = wrap_to_pi(off.theta_rad);
         Some(((off.x_m * off.x_m + off.y_m * off.y_m) / xy + off_rad * off_rad / theta).sqrt())
     }
 
-    /// The fit, with the terms that are in it, with next to no noise of one kind: what the data lose by it says whether they need it.
+    /// The fit, with its terms, with one noise fixed at next to nothing: the loss of likelihood tests that
+    /// noise.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -104,30 +108,31 @@ impl ModelFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<Self, EstimationError> {
         let mut without = Self { prior: self.prior.without(component), ..self.clone() };
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.noise = from.noise.map(|mut noise| {
-            noise.variance[component as usize] = MIN_SIGMA * MIN_SIGMA;
+            noise.variance[component as usize] = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
             noise
         });
         without.refit_with(Some(from), terms)?;
         Ok(without)
     }
 
-    /// Dead reckoning of every segment from its first measurement to its last under a model with terms; segments that are seen without headings are left out.
+    /// Dead reckoning of every segment from its first measurement to its last under a model with terms;
+    /// segments without measured headings are left out.
     #[must_use]
     pub fn dead_reckoned(&self, model: &Model, terms: &mut [Box<dyn ModelTerm>]) -> Vec<EndError> {
         self.dead_reckoned_of(model, terms, |_| true)
     }
 
-    /// The same of some runs: session and run in the order given.
+    /// The same of the selected runs: session and run in the order given.
     #[must_use]
     pub fn dead_reckoned_of(
         &self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
-        asked: impl Fn((usize, usize)) -> bool,
+        selected: impl Fn((usize, usize)) -> bool,
     ) -> Vec<EndError> {
-        self.dead_reckoned_to(model, terms, asked, |segment| &segment.measurements[segment.measurements.len() - 1..])
+        self.dead_reckoned_to(model, terms, selected, |segment| &segment.measurements[segment.measurements.len() - 1..])
     }
 
     /// Dead reckoning of every segment from its first measurement to each one after it.
@@ -145,13 +150,13 @@ impl ModelFit<'_> {
         &'b self,
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
-        asked: impl Fn((usize, usize)) -> bool,
+        selected: impl Fn((usize, usize)) -> bool,
         measurements: impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose],
     ) -> Vec<EndError> {
         let mut found = Vec::new();
-        // Where the displacements of a run have led.
+        // The state at the end of the displacements so far.
         let mut carried: Option<CarriedState> = None;
-        for segment in self.records.segments.iter().filter(|segment| asked(segment.run)) {
+        for segment in self.records.segments.iter().filter(|segment| selected(segment.run)) {
             let Some((start, first, _)) = segment.ends() else { continue };
             let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
             let mut propagator = Propagator::new(segment, model, terms);
@@ -168,7 +173,8 @@ impl ModelFit<'_> {
                     let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
                     add(propagator.sum_of_terms(), late)
                 };
-            // Where the drive's centre stands at the first measurement, to first order in what the terms add to it.
+            // Where the drive's centre stands at the first measurement, to first order in what the terms add
+            // to it.
             let mounted = start * body_from_sensor.inverse();
             let off = expected_offset(&mut propagator, first.0, mounted, segment.intervals.get(first.1));
             let mut pose = mounted * off.inverse();

@@ -1,28 +1,31 @@
-//! Records in longer intervals, for whoever asks what hardly changes from one row of a fast log to the next.
+//! Records with longer intervals, for covariates that hardly change from one row of a fast log to the next.
 //!
-//! Rows a hundred times a second are ten to a measurement that comes ten times a second. A covariate that is a matter of tenths of a second is as well asked of five of
-//! them together; wheels that turn on, each at its own speed, go the same arc but for the square of what their speeds change by in the meantime.
+//! Between two measurements at 10 Hz a log at 100 Hz has ten rows. A covariate that varies within tenths of a
+//! second may be evaluated for five of them together. The arc of joined rows differs from theirs by the
+//! square of the change of the wheels' speeds.
 
 use kinematics::Wheels;
 
 use crate::records::{MeasuredPose, Records, Segment};
+use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;
 
-/// Records whose intervals have been put together, and the same measurements taken of them.
+/// Records with joined intervals, and the same measurements taken of them.
 pub(crate) struct Decimated<'a> {
     pub(crate) records: Records<'a>,
     pub(crate) selections: Vec<Selection>,
 }
 
 impl<'a> Decimated<'a> {
-    /// Pieces of one way of turning put together, up to so long; measurements stay where they are. `None` where that leaves more than half of them.
+    /// Joins intervals in which both wheels keep turning, up to `longest_s` seconds; measurements stay where
+    /// they are. `None` where more than half of the intervals would be left.
     pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
         let (segments, ends): (Vec<_>, Vec<_>) =
-            records.segments.iter().map(|segment| put_together(segment, longest_s)).unzip();
+            records.segments.iter().map(|segment| join_intervals(segment, longest_s)).unzip();
         let intervals =
             |segments: &[Segment<'_>]| segments.iter().map(|segment| segment.intervals.len()).sum::<usize>();
-        if 2 * intervals(&segments) > intervals(&records.segments) {
+        if MIN_DECIMATION * intervals(&segments) > intervals(&records.segments) {
             return None;
         }
         let of_segment = |(propagations, ends): (&Vec<PropagationInterval>, &Vec<usize>)| {
@@ -41,39 +44,40 @@ impl<'a> Decimated<'a> {
     }
 }
 
-/// A segment with its intervals put together between its measurements, and how many there are now for each number of them before: it is told where a measurement is, and means nothing elsewhere.
-fn put_together<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<usize>) {
+/// A segment with its intervals joined between measurements, and for each number of intervals before the
+/// number now; the latter holds at measurements only.
+fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<usize>) {
     let mut ends = Vec::with_capacity(segment.intervals.len() + 1);
-    let mut together: Vec<WheelInterval> = Vec::new();
-    let mut seen_before = vec![false; segment.intervals.len() + 1];
-    segment.measurements.iter().for_each(|measurement| seen_before[measurement.after] = true);
-    for (interval, seen_before) in segment.intervals.iter().zip(seen_before) {
-        ends.push(together.len());
-        match together.last_mut() {
+    let mut joined: Vec<WheelInterval> = Vec::new();
+    let mut measured_before = vec![false; segment.intervals.len() + 1];
+    segment.measurements.iter().for_each(|measurement| measured_before[measurement.after] = true);
+    for (interval, measured_before) in segment.intervals.iter().zip(measured_before) {
+        ends.push(joined.len());
+        match joined.last_mut() {
             Some(last)
-                if !seen_before
-                    && last.dt_s + interval.dt_s <= longest_s * (1.0 + 1e-9)
-                    && turns_on(last.wheel_rad, interval.wheel_rad) =>
+                if !measured_before
+                    && last.dt_s + interval.dt_s <= longest_s * (1.0 + STEP_LENGTH_TOLERANCE)
+                    && keeps_turning(last.wheel_rad, interval.wheel_rad) =>
             {
                 last.dt_s += interval.dt_s;
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.row_s[1] = interval.row_s[1];
             }
-            _ => together.push(*interval),
+            _ => joined.push(*interval),
         }
     }
-    ends.push(together.len());
-    together.shrink_to_fit();
+    ends.push(joined.len());
+    joined.shrink_to_fit();
     let measurements = segment
         .measurements
         .iter()
         .map(|measurement| MeasuredPose { after: ends[measurement.after], ..*measurement })
         .collect();
-    (Segment { intervals: together, measurements, ..*segment }, ends)
+    (Segment { intervals: joined, measurements, ..*segment }, ends)
 }
 
-/// Whether both wheels turn on as they did: neither turns back, begins or stands still.
-fn turns_on(last: Wheels<f64>, next: Wheels<f64>) -> bool {
+/// Do both wheels keep their direction: neither turns back, begins or stops?
+fn keeps_turning(last: Wheels<f64>, next: Wheels<f64>) -> bool {
     let as_before = last.zip_with(next, |last, next| last * next > 0.0 || (last == 0.0 && next == 0.0));
     as_before.left && as_before.right
 }

@@ -1,8 +1,9 @@
-//! Derivatives of poses by the columns of the normal equation, in the order in which a processor takes many at a time.
+//! Derivatives of poses by the columns of the normal equation, laid out for vector instructions.
 
 use nalgebra::Vector3;
 
-/// Derivatives of a pose or a motion by columns, coordinate by coordinate: loops over columns go many at a time.
+/// Derivatives of a pose or a motion by columns, coordinate by coordinate, so that loops over columns
+/// vectorise.
 pub(super) struct Derivatives {
     pub(super) x: Vec<f64>,
     pub(super) y: Vec<f64>,
@@ -51,7 +52,7 @@ impl Derivatives {
         }
     }
 
-    /// What a direction sees of each.
+    /// The component of each along a direction.
     #[inline(always)]
     pub(super) fn along(&self, direction: Vector3<f64>) -> impl Iterator<Item = f64> {
         let all = self.x.iter().zip(&self.y).zip(&self.theta);

@@ -14,17 +14,8 @@ pub enum EstimationError {
     #[error("the nominal robot is not a drive: {0}")]
     NotADrive(#[from] GeometryError),
     /// The counters wrap and no `counter_bits` says where.
-    #[error(
-        "run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml"
-    )]
-    CounterWraps {
-        /// The run.
-        run: String,
-        /// `left` or `right`.
-        side: &'static str,
-        /// The width that the jumps show.
-        bits: u8,
-    },
+    #[error(transparent)]
+    CounterWraps(#[from] WrappedCounter),
     /// No run has wheels and two measurements.
     #[error("no run has logged wheels and two measurements of an instrument within its log")]
     NoMeasurements,
@@ -39,6 +30,18 @@ pub enum EstimationError {
     },
 }
 
+/// A counter that wraps at a width which the dataset does not state.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("run {run}: the {side} counter wraps at {bits} bits; say counter_bits = {bits} under [robot] in dataset.toml")]
+pub struct WrappedCounter {
+    /// The run's id.
+    pub run: String,
+    /// `left` or `right`.
+    pub side: &'static str,
+    /// The counter's width by its jumps, bits.
+    pub bits: u8,
+}
+
 /// Refuses sessions whose counters wrap unannounced: a fit would take a jump of 2ⁿ counts for motion.
 ///
 /// # Errors
@@ -48,7 +51,7 @@ pub fn refuse_wrapped_counters(sessions: &[Session<'_>]) -> Result<(), Estimatio
         let WheelLog::Ticks(ticks) = &view.odometry().wheels else { continue };
         for side in Side::BOTH {
             if let Some(bits) = suspected_wrap(&ticks[side]) {
-                return Err(EstimationError::CounterWraps { run: view.info().id.clone(), side: side.name(), bits });
+                return Err(WrappedCounter { run: view.info().id.clone(), side: side.name(), bits }.into());
             }
         }
     }

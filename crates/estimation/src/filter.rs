@@ -1,7 +1,9 @@
-//! The filter of one segment: innovations, their derivatives by the mean parameters, and the score of the noise.
+//! The filter of one segment: innovations, their derivatives by the mean parameters, and the score of the
+//! noise.
 //!
-//! Scalar updates, one component of a measurement after the other: along and across the robot, then heading. With gain k = P h/s the sensitivities follow
-//! D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
+//! Scalar updates, one component of a measurement after the other: along and across the robot, then heading.
+//! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on
+//! the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
 use kinematics::{InstructionSet, Kernel, Pose, Twist, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
@@ -14,21 +16,18 @@ use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
 use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
 use crate::records::{MeasuredPose, Segment, Start};
+use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 
-/// A measurement whose squared innovation, over its variance, is larger than this lies outside of what chance does: χ² with 3 degrees of freedom at 1 − 1e-5.
-pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
-/// After so many measurements in a row that do not fit, it is the filter that is wrong: it starts again.
-const RESTART_AFTER: u32 = 2;
 const NOISES: usize = 4;
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
+pub struct InnovationComponent {
     /// Which segment.
     pub segment: usize,
-    /// Which look of the segment.
+    /// Which measurement of the segment.
     pub measurement: usize,
     /// 0 along the robot, 1 across, 2 heading.
     pub component: usize,
@@ -61,11 +60,12 @@ pub(crate) struct PassOptions<'p> {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
     pub(crate) gate: OutlierGate,
-    /// Legs are kept, for passes at models near this one.
+    /// Record the propagations, for passes at models near this one.
     pub(crate) keep: bool,
-    /// Legs are taken as they were kept by a pass at another model.
+    /// Propagations recorded by a pass at another model, to be used instead of integrating.
     pub(crate) by: Option<&'p CachedPropagation>,
-    /// The last columns come in parts of so many, each tested for itself: columns of two parts have no products with each other.
+    /// The last columns come in parts of so many, each tested for itself: columns of two parts have no
+    /// products with each other.
     pub(crate) parts: &'p [usize],
 }
 
@@ -106,15 +106,15 @@ pub(super) struct Filter<'f, 'a> {
     /// Derivatives of the measurement by the terms' parameters, in the room.
     by_measurement: Derivatives,
     pub(super) sums: Sums<'f>,
-    pub(super) innovations: Vec<Innovation>,
+    pub(super) innovations: Vec<InnovationComponent>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
-    /// What a component of a measurement sees of each column directly, and in all.
+    /// Derivatives of a component of the measurement by each column: directly, and in all.
     direct: Vec<f64>,
     j: Vec<f64>,
 }
 
-/// The filter of a segment over its propagation intervals, from a start heading that nobody saw.
+/// The filter of a segment over its propagation intervals, from a start heading that is not measured.
 struct Run<'r, 'f, 'a> {
     filter: &'r mut Filter<'f, 'a>,
     propagations: &'r [PropagationInterval],
@@ -176,17 +176,19 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.propagator.carried(self.pose * self.instrument.body_from_sensor)
     }
 
-    /// Legs come from here, not from the counts.
+    /// Takes propagations from here instead of integrating the counts.
     pub(super) fn take_propagations(&mut self, propagations: PropagationSource<'f>) {
         self.propagator.propagations = propagations;
     }
 
-    /// What the segment said, and its propagation intervals where they were to be kept.
-    pub(super) fn into_parts(self) -> (Sums<'f>, Vec<usize>, Vec<Innovation>, NoiseScore, Option<SegmentCache>) {
+    /// The sums of the segment, its outliers and innovations, and its propagations where they were recorded.
+    pub(super) fn into_parts(
+        self,
+    ) -> (Sums<'f>, Vec<usize>, Vec<InnovationComponent>, NoiseScore, Option<SegmentCache>) {
         (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.propagations.into_cached())
     }
 
-    /// Filters the looks at the ends of some propagation intervals.
+    /// Filters the measurements at the ends of some propagation intervals.
     pub(super) fn run(&mut self, propagations: &[PropagationInterval], free_heading_rad: f64) {
         // Loops over a dozen columns: eight at a time leave more over than they save.
         InstructionSet::Avx2.run(Run { filter: self, propagations, free_heading_rad });
@@ -219,7 +221,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.outliers.push(propagation.measurement);
             rejected_in_a_row += 1;
             // Without a heading the filter cannot start in the middle of a segment.
-            if rejected_in_a_row >= RESTART_AFTER
+            if rejected_in_a_row >= RESTART_AFTER_OUTLIERS
                 && self.segment.measurements[propagation.measurement].theta_rad.is_some()
                 && self.segment.start == Start::MeasuredPose
             {
@@ -229,14 +231,15 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
     }
 
-    /// Variances of a measurement's position and heading: the instrument's, times what its row states of itself.
+    /// Variances of a measurement's position and heading: the instrument's, times what its row states of
+    /// itself.
     #[inline(always)]
     fn variance_of(&self, measured: &MeasuredPose) -> [f64; 2] {
         let [_, _, xy, theta] = self.noise.variance;
         [xy * measured.variance_factor[0], theta * measured.variance_factor[1]]
     }
 
-    /// Stands where a measurement saw the robot, after so many propagation intervals.
+    /// Starts at a measurement, after a number of propagation intervals.
     #[inline(always)]
     fn start_at(&mut self, (propagations, measurement): (usize, usize), next_piece: usize, free_heading_rad: f64) {
         let measured = self.segment.measurements[measurement];
@@ -297,7 +300,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.pose_by_noise = [[0.0; NOISES]; 3];
     }
 
-    /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force, in the room, for each parameter.
+    /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force,
+    /// in the room, for each parameter.
     #[inline(always)]
     fn measurement(&mut self, propagations: usize, t_s: f64, twist: Twist) {
         self.propagator.measurement(self.pose, propagations, t_s, twist);
@@ -353,7 +357,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.instrument;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
-        // A measurement is late by the way that the instrument made in the meantime.
+        // A measurement is late by the distance that the instrument moved in the meantime.
         let moved = Vector3::new(
             cos * twist.v_m_s - twist.omega_rad_s * mounted.y,
             sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
@@ -369,7 +373,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             measured.y_m - self.pose.y_m - ahead.y,
             measured.theta_rad.map_or(0.0, |theta_rad| wrap_to_pi(theta_rad - self.pose.theta_rad - ltheta - ahead.z)),
         );
-        // What a component c of the measurement sees of the pose, and of the parameters directly: rows along, across, heading.
+        // Derivatives of a component of the measurement by the pose; rows: along, across, heading.
         let by_heading = Vector3::new(-ahead.y, ahead.x, 1.0);
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
@@ -395,7 +399,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             return false;
         }
         self.covariance = covariance;
-        // The lengths, and a free heading, the last column, are seen in the pose alone.
+        // The geometry, and a free heading, which is the last column, act through the pose alone.
         let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -moved];
         for (component, update) in measured.iter().enumerate().take(components) {
             let axis = axes[component];
@@ -417,7 +421,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.sums.add(&self.j, v, s);
             if self.pass_options.innovations {
                 let sigma = s.sqrt();
-                self.innovations.push(Innovation {
+                self.innovations.push(InnovationComponent {
                     segment: self.number,
                     measurement: propagation.measurement,
                     component,
@@ -432,8 +436,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         true
     }
 
-    /// The filter's recursions, differentiated by the logarithm of each variance; Gupta & Mehra 1974. With the gain k = Ph/s, and ′ for a derivative,
-    /// P′ ← P′ − P′h kᵀ − k (P′h)ᵀ + s′ k kᵀ.
+    /// The filter's recursions, differentiated by the logarithm of each variance; Gupta & Mehra 1974. With
+    /// the gain k = Ph/s, and ′ for a derivative, P′ ← P′ − P′h kᵀ − k (P′h)ᵀ + s′ k kᵀ.
     #[inline(always)]
     fn score_noise(&mut self, component: usize, update: &Update, r: f64) {
         let Update { row, gain, v, s } = update;
@@ -463,7 +467,7 @@ impl<'f, 'a> Filter<'f, 'a> {
 /// What one component of a measurement changes.
 #[derive(Clone, Copy)]
 struct Update {
-    /// What it sees of the pose.
+    /// Its derivative by the pose.
     row: Vector3<f64>,
     gain: Vector3<f64>,
     /// Innovation, the components before it taken into account, and its variance.

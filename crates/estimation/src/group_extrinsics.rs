@@ -1,16 +1,21 @@
-//! Instruments of their own: the extrinsics or a latency that each session, or each run, has for itself.
+//! Extrinsics and latency of groups: of each session, or of each run.
 //!
-//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on n). A run's normal equation with that put in is
-//! I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹ of its group: whoever reads normal equations need not know that o exists.
-//! A weak prior keeps a group that shows nothing of o at what is common to all.
-//! Reference: Schur complement; Neyman & Scott 1948 for what many nuisances of few data do to a variance, and why they must gain on what was held out.
+//! With the group's own columns o and all others n, the group's normal equation gives o = −I_oo⁻¹ (g_o + I_on
+//! n). A run's normal equation with that put in is I_nn − A I_on − I_no Aᵀ + A I_oo Aᵀ with A = I_no I_oo⁻¹
+//! of its group: the users of normal equations need not know of o. A weak prior keeps o at its common value
+//! where a group does not determine it.
+//! Reference: Neyman & Scott 1948: many nuisances of few data each bias a variance, so that they must gain on
+//! held-out data.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::{Column, GroupExtrinsics, Model};
 use crate::normal_equations::NormalEquations;
+use crate::settings::{
+    EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S, MAX_POSTERIOR_TO_PRIOR_SIGMA,
+};
 
-/// How a group's own columns follow a step of the others: at rest, and by each column of the normal equation.
+/// Response of a group's own columns: their own step, and that by each column of the normal equation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GroupResponse {
     pub(crate) group: (usize, usize),
@@ -35,7 +40,8 @@ impl GroupResponse {
 }
 
 impl GroupExtrinsics {
-    /// Takes the own columns out of the normal equations of runs or parts of runs; the model is the one in force.
+    /// Takes the own columns out of the normal equations of runs or parts of runs; the model is the one in
+    /// force.
     pub(crate) fn eliminate(&self, equations: &mut [NormalEquations], model: &Model) -> Vec<GroupResponse> {
         let at: Vec<usize> = self.columns.iter().map(|column| column.index()).collect();
         let mut groups: Vec<(usize, usize)> =
@@ -64,23 +70,23 @@ impl GroupExtrinsics {
             .collect()
     }
 
-    /// Is a column of a group known better than before any data?
-    pub(crate) fn is_shown(&self, follow: &GroupResponse, column: Column) -> bool {
+    /// Is a column of a group determined better than by its prior?
+    pub(crate) fn is_shown(&self, response: &GroupResponse, column: Column) -> bool {
         let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
-        let Some(inverse) = follow.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
+        let Some(inverse) = response.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return false;
         };
-        inverse[(at, at)].sqrt() < 0.5 * plausible_sd(column)
+        inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * prior_sigma(column)
     }
 
-    /// Gradient and curvature of what is plausible of each own column's distance from the common value.
+    /// Gradient and curvature of −log prior of each own column about the common value.
     fn pull(&self, model: &Model, group: (usize, usize)) -> Vec<(f64, f64)> {
         let common = model.common_instrument();
         let own = self.of.get(&group).copied().unwrap_or(common);
         self.columns
             .iter()
             .map(|column| {
-                let sd = plausible_sd(*column);
+                let sd = prior_sigma(*column);
                 let off = match column {
                     Column::SensorX => own.body_from_sensor.x_m - common.body_from_sensor.x_m,
                     Column::SensorY => own.body_from_sensor.y_m - common.body_from_sensor.y_m,
@@ -93,20 +99,16 @@ impl GroupExtrinsics {
     }
 }
 
-/// A marker that is taken off and put back sits elsewhere by less than a hand's breadth, turned by less than one sees; clocks are set to a tenth of a second.
-const MOUNT_SD_M: f64 = 0.05;
-const MOUNT_SD_RAD: f64 = 0.1;
-const LATENCY_SD_S: f64 = 0.1;
-
-const fn plausible_sd(column: Column) -> f64 {
+const fn prior_sigma(column: Column) -> f64 {
     match column {
-        Column::SensorX | Column::SensorY => MOUNT_SD_M,
-        Column::SensorTheta => MOUNT_SD_RAD,
-        _ => LATENCY_SD_S,
+        Column::SensorX | Column::SensorY => EXTRINSICS_PRIOR_SIGMA_M,
+        Column::SensorTheta => EXTRINSICS_PRIOR_SIGMA_RAD,
+        _ => LATENCY_PRIOR_SIGMA_S,
     }
 }
 
-/// Puts own columns that follow the others by `by` into an normal equation; their own rows and columns are empty afterwards.
+/// Eliminates own columns, whose response to the others is `by`, from a normal equation; their rows and
+/// columns are zero afterwards.
 fn substitute(equations: &mut NormalEquations, at: &[usize], by: &DMatrix<f64>) {
     let n = equations.gradient.len();
     let own = DMatrix::from_fn(at.len(), at.len(), |i, j| equations.information[(at[i], at[j])]);

@@ -1,13 +1,18 @@
-//! Maximum-likelihood estimation of a differential drive from whole runs: the likelihood, the fit, augmented models and predicted information.
+//! Maximum-likelihood estimation of a differential drive from whole runs: the likelihood, the fit, augmented
+//! models and predicted information.
 //!
-//! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the geometry in force, plus mean terms; noise k² per metre that
-//! a wheel rolls and a variance per radian turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white noise. Start poses are
-//! free: a run begins at its first measurement. The innovations' derivatives by every mean parameter give, run by run, a normal equation ([`NormalEquations`]): estimates,
-//! score tests, refits and held-out scores are linear algebra on these.
+//! State: the robot's pose in the room. Motion between two measurements: exact arcs from the counts with the
+//! geometry in force, plus mean terms; noise k² per metre that a wheel rolls and a variance per radian
+//! turned. A measurement: the pose through the instrument's extrinsics, late by its latency, with white
+//! noise. Start poses are free: a run begins at its first measurement. The innovations' derivatives by every
+//! mean parameter give, run by run, a normal equation ([`NormalEquations`]): estimates, score tests, refits
+//! and held-out scores are linear algebra on these.
 //!
-//! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry is never moved to make a covariance fit
-//! (mean-only information). A wrong noise model on 10⁵ measurements would outvote the mean.
-//! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974 (scoring); Chong & Kleeman 1997 (k²|s|).
+//! The noise is a nuisance of the mean and not the other way round: its size is estimated, but the geometry
+//! is never moved to make a covariance fit (mean-only information). A wrong noise model on 10⁵ measurements
+//! would outvote the mean.
+//! Reference: Schweppe 1965 (likelihood from innovations); de Jong 1991 (diffuse starts); Gupta & Mehra 1974
+//! (scoring); Chong & Kleeman 1997 (k²|s|).
 
 mod acceleration;
 mod covariances;
@@ -31,25 +36,26 @@ mod products;
 mod profile;
 mod propagation;
 mod records;
+mod settings;
 #[cfg(test)]
 mod tests;
 mod thinning;
 mod wheel_angles;
 
 pub use dead_reckoned_ends::EndError;
-pub use error::{EstimationError, refuse_wrapped_counters};
-pub use filter::{Innovation, OutlierGate};
+pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
+pub use filter::{InnovationComponent, OutlierGate};
 pub use maximum_likelihood::FitSettings;
 pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
-pub use model_fit::{ModelFit, WHITE_BELOW};
+pub use model_fit::ModelFit;
 pub use noise::{Noise, NoiseComponent};
 pub use normal_equations::{
-    ClusterRobust, Information, NormalEquations, Projected, RIDGE, SchurComplement, free_basis, inverse, total,
+    ClusterRobust, Information, NormalEquations, Projected, SchurComplement, free_basis, inverse, total,
 };
-pub use one_step::{LARGE_ROWS, LargeFit, OneStep, OneStepError, fit_large, is_large};
-pub use optimizer::{ConvergenceCriterion, Fit, FitOptions, fit, pass_with_innovations};
+pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
+pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
 pub use pass::Pass;
-pub use profile::RISE_95;
 pub use records::{Records, Segment};
+pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

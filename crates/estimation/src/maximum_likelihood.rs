@@ -1,5 +1,5 @@
-//! The order of work of a fit: geometry first, then what is not observable is fixed, the instrument's extrinsics and latency where they predict held-out runs, thinning
-//! while innovations are not white.
+//! The order of a fit: the geometry; fixing what is not observable; extrinsics and latency where they predict
+//! held-out runs; thinning while innovations are not white.
 
 use dataset::Session;
 
@@ -8,17 +8,19 @@ use crate::filter::OutlierGate;
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
-use crate::optimizer::{ConvergenceCriterion, NOISE_SETTLED};
+use crate::optimizer::ConvergenceCriterion;
+use crate::settings::NOISE_STEP_TOLERANCE;
 
-/// What a fit may do beside the geometry.
+/// What a fit estimates beside the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
     /// Estimate extrinsics and latency of the instrument where they predict held-out runs.
     pub nuisances: bool,
-    /// Take measurements farther apart while their errors are autocorrelated; without, every measurement counts as independent.
+    /// Thin measurements while their errors are autocorrelated; otherwise every measurement counts as
+    /// independent.
     pub thin: bool,
-    /// Thin displacements too. Poses in between are passed over and their distance stays; displacements in between are lost, and with them precision. A test of a model
-    /// must not count autocorrelated displacements as independent; a calibration is better with them.
+    /// Thin displacements too. A thinned pose leaves the motion whole; a thinned displacement is lost, and
+    /// with it precision. Tests of a model need it, calibration is better without it.
     pub thin_displacements: bool,
 }
 
@@ -33,10 +35,10 @@ impl FitSettings {
     /// # Errors
     /// [`EstimationError`] when the sessions hold no measurements, or the fit diverges.
     pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<ModelFit<'a>, EstimationError> {
-        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_SETTLED), sessions)
+        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE), sessions)
     }
 
-    /// The fit, its steps followed so far.
+    /// The fit, with its criterion of convergence.
     pub(crate) fn fit_until<'a>(
         &self,
         ends: ConvergenceCriterion,

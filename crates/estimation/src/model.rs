@@ -1,4 +1,5 @@
-//! The mean parameters: the drive's three geometry parameters, where and how late the instrument looks, and the sizes of further terms.
+//! The mean parameters: the three geometry parameters, the instrument's extrinsics and latency, and the
+//! values of further terms.
 
 use std::collections::BTreeMap;
 
@@ -14,15 +15,15 @@ pub enum Column {
     RightWheel,
     /// Relative change of the wheel separation.
     Separation,
-    /// Place of the instrument ahead of the drive's centre, metres.
+    /// Position of the instrument ahead of the drive's centre, metres.
     SensorX,
-    /// Its place to the left, metres.
+    /// Its position to the left, metres.
     SensorY,
     /// Its heading on the robot, radians.
     SensorTheta,
-    /// How late a measurement bears its time, seconds.
+    /// Latency of the measurements' time stamps, seconds.
     Latency,
-    /// A parameter of a further term, by its place among all of them.
+    /// A parameter of a further term, by its index among all of them.
     Term(usize),
 }
 
@@ -44,7 +45,7 @@ impl Column {
     /// The instrument's extrinsics.
     pub const EXTRINSICS: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
 
-    /// Its place in a normal equation.
+    /// Its index in a normal equation.
     #[must_use]
     pub const fn index(self) -> usize {
         match self {
@@ -60,16 +61,16 @@ impl Column {
     }
 }
 
-/// Where and how late an instrument looks.
+/// Extrinsics and latency of an instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
     /// Its frame on the robot.
     pub body_from_sensor: Pose,
-    /// How late its measurements bear their time, seconds.
+    /// Latency of its measurements' time stamps, seconds.
     pub latency_s: f64,
 }
 
-/// Who has an instrument of its own.
+/// Which groups of runs have extrinsics and latency of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grouping {
     /// Each session.
@@ -79,7 +80,7 @@ pub enum Grouping {
 }
 
 impl Grouping {
-    /// The group of a run: its session, and the run itself where runs stand apart.
+    /// The group of a run: its session, and the run itself where each run is a group.
     #[must_use]
     pub const fn group(self, run: (usize, usize)) -> (usize, usize) {
         match self {
@@ -89,12 +90,12 @@ impl Grouping {
     }
 }
 
-/// What stands apart, and its values.
+/// The columns that each group has for itself, and their values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupExtrinsics {
-    /// For whom.
+    /// The groups.
     pub grouping: Grouping,
-    /// The columns that do, of mounting and latency.
+    /// Its own columns, of extrinsics and latency.
     pub columns: Vec<Column>,
     /// The instruments found, by group.
     pub of: BTreeMap<(usize, usize), Instrument>,
@@ -117,16 +118,16 @@ pub struct Model {
     pub separation_m: f64,
     /// The instrument's frame on the robot, where it is common to all.
     pub body_from_sensor: Pose,
-    /// How late measurements bear their time, seconds, where it is common to all.
+    /// Latency of the measurements' time stamps, seconds, where it is common to all.
     pub latency_s: f64,
     /// Instruments that sessions or runs have for themselves.
     pub own: Option<GroupExtrinsics>,
-    /// Sizes of the further terms' parameters.
+    /// Values of the further terms' parameters, in their units.
     pub term_values: Vec<f64>,
 }
 
 impl Model {
-    /// A drive seen at its centre, in time, with further terms of no size.
+    /// A drive whose instrument is at its centre and without latency, with further terms at zero.
     #[must_use]
     pub fn of(geometry: &DriveGeometry, term_parameters: usize) -> Self {
         Self {
@@ -151,7 +152,7 @@ impl Model {
         Increment::from_travel(travel_m, self.separation_m)
     }
 
-    /// Where and how late the instrument looks in a run.
+    /// The instrument of a run: session and run in the order given.
     #[must_use]
     pub fn instrument(&self, run: (usize, usize)) -> Instrument {
         let own = self.own.as_ref().and_then(|own| own.of.get(&own.grouping.group(run)));

@@ -1,4 +1,5 @@
-//! The maximum-likelihood fit of whole runs: records, the measurements taken of them, free columns, and the operations on a fit that is there.
+//! The maximum-likelihood fit of whole runs: its records, the measurements taken of them, its free columns,
+//! and what can be done with a fit.
 
 use std::sync::Arc;
 
@@ -11,28 +12,14 @@ use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
-use crate::optimizer::{ConvergenceCriterion, Fit, FitOptions, From, fit_from};
+use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::records::{Records, Segment};
+use crate::settings::{
+    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_RUNS_TO_HOLD_OUT,
+    MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES, WHITENESS_Z,
+};
 use crate::thinning::{Selection, Thinning};
-
-/// Innovations are taken for white while no component's correlation with the measurement before reaches this many standard errors: three components at 1 % together.
-pub const WHITE_BELOW: f64 = 2.935;
-/// How many before an innovation it may resemble.
-const LAGS: i32 = 5;
-/// In how many phases thinned measurements are taken.
-const PHASES: usize = 4;
-/// Thinned further, a run would be little more than its ends.
-const MIN_MEASUREMENTS_PER_RUN: f64 = 1.0;
-/// A direction of the geometry parameters is seen when its relative standard deviation is below this: nominal values are better known than worse.
-const LARGEST_SIGMA: f64 = 0.03;
-/// An instrument whose heading on the robot seems to be more than this is mounted so on purpose; less may be the lie of a short log.
-const ROTATED_SENSOR_RAD: f64 = 0.2;
-/// With fewer runs, they are cut into blocks to be held out.
-pub(crate) const MIN_RUNS: usize = 6;
-pub(crate) const FOLDS: usize = 6;
-/// The scatter of so many runs says more of a covariance than the model does, though innovations be white.
-const MIN_RUNS_FOR_ROBUST: usize = 20;
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
 #[derive(Debug, Clone)]
@@ -45,22 +32,23 @@ pub struct ModelFit<'a> {
     pub selections: Arc<Vec<Selection>>,
     /// The nominal drive.
     pub nominal: Model,
-    /// Where fits start: the nominal drive with its instrument turned as it seems to be.
+    /// Where fits start: the nominal drive, with the approximate heading of its sensor.
     pub(crate) start: Model,
-    /// The fit.
-    pub fit: Fit,
+    /// The values found, with the pass at them.
+    pub solution: Solution,
     /// The free columns.
     pub columns: Vec<Column>,
-    /// Directions of the three geometry parameters that the data do not determine, and that stay nominal: rows left, right, separation.
+    /// Directions of the three geometry parameters that the data do not determine, and that stay nominal:
+    /// rows left, right, separation.
     pub unobservable: Vec<DVector<f64>>,
     pub(crate) prior: NoisePrior,
-    /// Where steps of its fits end.
+    /// When the steps of its fits have converged.
     pub(crate) ends: ConvergenceCriterion,
-    /// The normal equation of parts, where there are no records to make it of.
+    /// Normal equations of parts, for a fit whose records have no measurements.
     pub(crate) parts: Vec<NormalEquations>,
-    /// Displacements count as neighbours when it is asked whether measurements are white.
-    pub(crate) displacements_follow: bool,
-    /// Measurements that lie far off are taken like the others.
+    /// Displacements of a run count as a series when autocorrelation is tested.
+    pub(crate) displacements_in_series: bool,
+    /// Measurements are not gated: outliers are taken too.
     pub(crate) ungated: bool,
 }
 
@@ -70,14 +58,14 @@ impl<'a> ModelFit<'a> {
         sessions: &[Session<'a>],
         nominal: Model,
         ends: ConvergenceCriterion,
-        displacements_follow: bool,
+        displacements_in_series: bool,
     ) -> Self {
         let records = Records::of(sessions);
         let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
         Self {
             selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
             thinning: Thinning::NONE,
-            fit: Fit::nothing(&nominal, &prior),
+            solution: Solution::nothing(&nominal, &prior),
             columns: Column::GEOMETRY.to_vec(),
             unobservable: Vec::new(),
             records: Arc::new(records),
@@ -86,7 +74,7 @@ impl<'a> ModelFit<'a> {
             prior,
             ends,
             parts: Vec::new(),
-            displacements_follow,
+            displacements_in_series,
             ungated: false,
         }
     }
@@ -95,27 +83,28 @@ impl<'a> ModelFit<'a> {
 impl ModelFit<'_> {
     /// The values found, with records that hold no measurements.
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
-        let Self { thinning, nominal, start, fit, columns, unobservable, prior, ends, parts, .. } = self;
-        let fit = Fit { pass: Pass { innovations: Vec::new(), outliers: Vec::new(), ..fit.pass }, ..fit };
-        let (displacements_follow, ungated) = (self.displacements_follow, self.ungated);
+        let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
+        let pass = Pass { innovations: Vec::new(), outliers: Vec::new(), ..solution.pass };
+        let solution = Solution { pass, ..solution };
+        let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {
             records: Arc::new(records),
             selections: Arc::default(),
             thinning,
             nominal,
             start,
-            fit,
+            solution,
             columns,
             unobservable,
             prior,
             ends,
             parts,
-            displacements_follow,
+            displacements_in_series,
             ungated,
         }
     }
 
-    /// An instrument that looks to the side cannot be left out of the first fit.
+    /// Frees the extrinsics of a rotated sensor, which the first fit cannot do without.
     pub(crate) fn free_extrinsics_if_rotated(&mut self) {
         let heading_rad = self.records.sensor_heading_rad(&self.nominal);
         if heading_rad.abs() > ROTATED_SENSOR_RAD {
@@ -124,19 +113,20 @@ impl ModelFit<'_> {
         }
     }
 
-    pub(crate) fn refit(&mut self, from: Option<From>) -> Result<(), EstimationError> {
+    pub(crate) fn refit(&mut self, from: Option<InitialValues>) -> Result<(), EstimationError> {
         self.refit_with(from, &mut [])
     }
 
     pub(crate) fn refit_with(
         &mut self,
-        from: Option<From>,
+        from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
-        let from = from.unwrap_or_else(|| From { model: self.start.clone(), noise: None, free_headings: None });
+        let from =
+            from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
         let Self { ends, ungated, .. } = *self;
         let options = FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) };
-        self.fit = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
         Ok(())
     }
 
@@ -153,56 +143,57 @@ impl ModelFit<'_> {
         self.unobservable.iter().map(of).collect()
     }
 
-    pub(crate) fn here(&self) -> From {
-        let Fit { model, noise, free_headings, .. } = &self.fit;
-        From { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
+    pub(crate) fn current_values(&self) -> InitialValues {
+        let Solution { model, noise, free_headings, .. } = &self.solution;
+        InitialValues { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
     }
 
-    /// Takes measurements farther apart until their innovations are white, or a run has too few left.
+    /// Thins measurements until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
         while !self.is_white() {
-            every_s *= 2.0;
+            every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit(Some(self.here()))?;
+            self.refit(Some(self.current_values()))?;
         }
         Ok(())
     }
 
-    /// Measurements so far apart; `None` when a run has too few left.
+    /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
-        let thinning = Thinning { every_s: every_s - 0.5 * between_s, phases: PHASES };
+        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
         let selections = Selection::of(&self.records, thinning, &self.nominal);
         (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
     }
 
-    /// Does [`Self::thin`] take measurements farther apart than all of them?
+    /// Does [`Self::thin`] leave measurements out?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
         let between_s = median_between(&self.records).filter(|_| !self.is_white());
-        between_s.is_some_and(|between_s| self.thinned(2.0 * between_s, between_s).is_some())
+        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
     }
 
     pub(crate) fn is_white(&self) -> bool {
-        self.correlation() <= WHITE_BELOW
+        self.correlation() <= WHITENESS_Z
     }
 
-    /// The largest correlation of an innovation with the one before, of displacements (where they are to be thinned) with several before, over the components, in standard errors.
+    /// The largest autocorrelation of the innovations over the components, in standard errors: at lag 1, and
+    /// at several lags for displacements where these are to be thinned.
     #[must_use]
     pub fn correlation(&self) -> f64 {
         let times_taken = self.times_taken();
         (0..3)
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
-                for phase in &self.fit.pass.innovations {
+                for phase in &self.solution.pass.innovations {
                     let series: Vec<_> = phase.iter().filter(|innovation| innovation.component == component).collect();
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
                         count += 1.0;
-                        for (lag, before) in (1..=LAGS).zip(series[..number].iter().rev()) {
+                        for (lag, before) in (1..=MAX_AUTOCORRELATION_LAG).zip(series[..number].iter().rev()) {
                             let weight = self.records.weight_of_pair(before.segment, innovation.segment, lag);
-                            let counts = self.displacements_follow || before.segment == innovation.segment;
+                            let counts = self.displacements_in_series || before.segment == innovation.segment;
                             if counts && weight > 0.0 {
                                 products += weight * before.z * innovation.z;
                                 pairs += weight * weight;
@@ -215,7 +206,8 @@ impl ModelFit<'_> {
             .fold(0.0, |largest: f64, z| largest.max(z.abs()))
     }
 
-    /// In how many phases the errors of a measurement are, on average: those of poses in all, as the propagation intervals between them overlap; those of a displacement where it is taken.
+    /// Mean number of phases in which the errors of a measurement are: all of them for poses, as their
+    /// propagation intervals overlap; those that take it for a displacement.
     fn times_taken(&self) -> f64 {
         let taken =
             |segment: usize| self.selections.iter().filter(|phase| !phase.propagations[segment].is_empty()).count();
@@ -224,33 +216,34 @@ impl ModelFit<'_> {
             let (sum, count) = times.fold((0, 0), |(sum, count), times| (sum + times, count + 1));
             sum as f64 / f64::max(f64::from(count), 1.0)
         } else {
-            self.fit.pass.innovations.len() as f64
+            self.solution.pass.innovations.len() as f64
         }
     }
 
     /// The normal equation in units that can be held out: runs, or blocks where runs are few.
     pub(crate) fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
-        if self.fit.pass.runs.len() >= MIN_RUNS {
-            return self.fit.pass.runs.clone();
+        if self.solution.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {
+            return self.solution.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(terms, MIN_RUNS.div_ceil(self.fit.pass.runs.len().max(1)))
+        self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.solution.pass.runs.len().max(1)))
     }
 
-    /// Names the directions of the geometry parameters that the measurements do not determine, and keeps them nominal.
+    /// Finds the directions of the geometry parameters that the measurements do not determine, and fixes them
+    /// at their nominal values.
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
-        let Some(information) = self.fit.information(&self.columns) else { return Ok(()) };
-        let held_before = !self.unobservable.is_empty();
+        let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
+        let was_fixed = !self.unobservable.is_empty();
         self.unobservable = unobservable(&information.matrix);
         if self.unobservable.is_empty() {
-            // What has come to be seen since is free again.
-            return if held_before { self.refit(Some(self.here())) } else { Ok(()) };
+            // A direction that has become observable is free again.
+            return if was_fixed { self.refit(Some(self.current_values())) } else { Ok(()) };
         }
-        // Back along what is not seen; what is seen stays as it was found.
+        // The model goes back to nominal along unobservable directions only.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
-        let mut model = self.fit.model.clone();
+        let mut model = self.solution.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
         let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));
         for direction in &self.unobservable {
@@ -259,19 +252,19 @@ impl ModelFit<'_> {
                 model.advance(column, -along * share);
             }
         }
-        let from = From { model, noise: None, free_headings: None };
+        let from = InitialValues { model, noise: None, free_headings: None };
         self.refit(Some(from))
     }
 
-    /// One pass at the values found with the sensitivities of further terms carried along, at zero size: what score tests are made of. The terms of the fit come
-    /// first.
+    /// One pass at the values found, with the sensitivities of further terms at zero: what score tests are
+    /// made of. The terms of the fit come first.
     #[must_use]
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        // Terms that are in the fit come first and keep their sizes.
-        let mut model = self.fit.model.clone();
+        // Terms of the fit come first and keep their values.
+        let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
-        let Fit { noise, free_headings, .. } = &self.fit;
+        let Solution { noise, free_headings, .. } = &self.solution;
         let pass_options = PassOptions { innovations: true, gate: self.gate(), ..PassOptions::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
     }
@@ -280,46 +273,50 @@ impl ModelFit<'_> {
         OutlierGate::of(self.ungated)
     }
 
-    /// The fit to every measurement, those that lie far off too: a large effect that shows in few measurements makes them lie far off, and without them it is not seen. Where some
-    /// err by themselves, it is a worse fit.
+    /// The fit to every measurement, outliers too. A large effect that shows in few measurements makes
+    /// outliers of these, and is lost without them. Where measurements have gross errors of their own, it is
+    /// a worse fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
-        let mut open = Self { ungated: true, ..self.clone() };
-        open.refit(None)?;
-        Ok(open)
+        let mut ungated_fit = Self { ungated: true, ..self.clone() };
+        ungated_fit.refit(None)?;
+        Ok(ungated_fit)
     }
 
-    /// The values found, on every measurement of the first phase, those that lie far off too; nothing is fitted again.
+    /// The values found, evaluated on every measurement of the first phase, outliers too; nothing is fitted
+    /// again.
     #[must_use]
     pub fn evaluated_ungated(&self) -> Self {
         let first = self.selections.iter().take(1).cloned().collect();
         Self { ungated: true, selections: Arc::new(first), ..self.clone() }
     }
 
-    /// The same fit, measurements that lie far off by it left out. `terms` are those of the fit.
+    /// The same fit with outliers rejected. `terms` are those of the fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_gated(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
-        let mut shut = Self { ungated: false, ..self.clone() };
-        shut.refit_with(Some(self.here()), terms)?;
-        Ok(shut)
+        let mut gated = Self { ungated: false, ..self.clone() };
+        gated.refit_with(Some(self.current_values()), terms)?;
+        Ok(gated)
     }
 
-    /// The normal equation of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
+    /// The normal equations of the same pass for terms that are tested one by one: the last parameters come
+    /// in parts of these sizes, and columns of two parts have no products.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        let mut model = self.fit.model.clone();
+        let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
-        let Fit { noise, free_headings, .. } = &self.fit;
+        let Solution { noise, free_headings, .. } = &self.solution;
         let pass_options = PassOptions { parts, gate: self.gate(), ..PassOptions::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
 
-    /// The fit with further terms, their sizes free beside what is free already, on the same measurements.
+    /// The fit with further terms, whose values are free beside the columns that are free already, on the
+    /// same measurements.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -328,7 +325,7 @@ impl ModelFit<'_> {
         self.extended_from(vec![0.0; parameters], terms)
     }
 
-    /// The same, begun with given sizes: those of the terms that are in this fit already, say. The terms are those of `terms` only.
+    /// The same from given values of all `terms`, which replace those of this fit.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -340,7 +337,7 @@ impl ModelFit<'_> {
         let mut columns = self.columns.clone();
         columns.retain(|column| !matches!(column, Column::Term(_)));
         columns.extend((0..term_values.len()).map(Column::Term));
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
@@ -348,14 +345,15 @@ impl ModelFit<'_> {
         Ok(extended)
     }
 
-    /// Covariance of the free columns: from the observed information where runs are few and innovations white, else corrected for what the model gets wrong by the
-    /// scatter of the runs (the sandwich over runs, each run's leverage taken into account). `terms` are those of the fit.
+    /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
+    /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
+    /// & McCaffrey 2002). `terms` are those of the fit.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
-        let (_, inverse) = self.fit.information(&self.columns)?.along(&free).solve()?;
+        let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
         let units = self.units(terms);
-        let enough = if self.thinning == Thinning::NONE { MIN_RUNS_FOR_ROBUST } else { free.ncols() + 2 };
+        let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
         if units.len() < enough {
             return Some(&free * inverse * free.transpose());
         }
@@ -369,25 +367,26 @@ impl ModelFit<'_> {
         free_basis(self.columns.len(), &self.fixed())
     }
 
-    /// The Schur complement of the free columns, but for some that are asked for.
+    /// The Schur complement of the free columns, without some.
     #[must_use]
-    pub fn eliminated(&self, equations: &NormalEquations, asked: &[usize]) -> Option<SchurComplement> {
+    pub fn eliminated(&self, equations: &NormalEquations, others: &[usize]) -> Option<SchurComplement> {
         let columns: Vec<Column> =
-            self.columns.iter().copied().filter(|column| !asked.contains(&column.index())).collect();
+            self.columns.iter().copied().filter(|column| !others.contains(&column.index())).collect();
         let basis = free_basis(columns.len(), &self.fixed_along(&columns));
         SchurComplement::of(equations, &columns, basis)
     }
 }
-/// The directions of the three geometry parameters that a normal equation, which begins with them, does not determine.
+/// The directions of the three geometry parameters that a normal equation, which begins with them, does not
+/// determine.
 pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
     (0..3)
-        .filter(|&k| eigenvalues[k] < LARGEST_SIGMA.powi(-2))
+        .filter(|&k| eigenvalues[k] < MAX_OBSERVABLE_SIGMA.powi(-2))
         .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
         .collect()
 }
 
-/// Information on the three geometry parameters with the other columns at their best.
+/// Information on the three geometry parameters with the other columns eliminated.
 fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
     let n = matrix.nrows();
     let own = matrix.view((0, 0), (3, 3)).into_owned();

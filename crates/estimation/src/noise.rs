@@ -1,13 +1,18 @@
-//! Noise of the wheels and of the instrument: four variances, each with what is known of it before any data.
+//! Noise of the wheels and of the instrument: four variances and their priors.
 
 use dataset::TruthNoise;
+
+use crate::settings::{
+    FIXED_NOISE_LOG_SIGMA, HEADING_PRIOR_SIGMA_RAD, MIN_NOISE_SIGMA, NOISE_PRIOR_LOG_SIGMA, POSITION_PRIOR_SIGMA_M,
+    STATED_NOISE_LOG_SIGMA, TURN_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA,
+};
 
 /// One of the variances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoiseComponent {
     /// Of a wheel's travel, m² per metre rolled (k²).
     Wheel,
-    /// Of the heading, rad² per radian turned: the wheelbase that scatters.
+    /// Of the heading, rad² per radian turned: a wheelbase that varies.
     Turn,
     /// Of each of a measurement's two coordinates, m².
     MeasurementPosition,
@@ -20,51 +25,38 @@ impl NoiseComponent {
     pub const ALL: [Self; 4] = [Self::Wheel, Self::Turn, Self::MeasurementPosition, Self::MeasurementHeading];
 }
 
-/// Sizes of the four variances.
+/// Values of the four variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// The variances in the order of [`NoiseComponent::ALL`].
     pub variance: [f64; 4],
 }
 
-/// What is plausible of a standard deviation before any data: it is within a factor e^`log_sd` of `centre` with two chances in three.
+/// Prior of the standard deviations: ln σ is normal about ln `centre` with the standard deviation `log_sd`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoisePrior {
     pub(crate) centre: [f64; 4],
     pub(crate) log_sd: [f64; 4],
 }
 
-/// Wheels on a floor scatter by 0.1 to 5 mm/√m (Chong & Kleeman 1997 and the paper's 0.5), and instruments err by tenths of a millimetre to centimetres. The prior is
-/// worth less than one run of data, and keeps apart what endpoints alone cannot.
-const WHEEL_SIGMA: f64 = 7e-4;
-const TURN_SIGMA: f64 = 1e-3;
-const MEASUREMENT_SIGMA_M: f64 = 1e-3;
-const MEASUREMENT_SIGMA_RAD: f64 = 3e-3;
-const VAGUE: f64 = 2.0;
-/// A precision that the dataset states is believed to a factor of two: instruments are sold by their best.
-const STATED: f64 = 0.7;
-/// Nothing on wheels is measured better, nor rolls truer, than to a micrometre and a microradian: without noise there is no weight.
-pub(crate) const MIN_SIGMA: f64 = 1e-6;
-/// A standard deviation that is not to move stays within e^±0.01 of where it is.
-const HELD: f64 = 0.01;
-
 impl NoisePrior {
     pub(crate) fn of(stated: TruthNoise) -> Self {
         let reused = |sigma: Option<f64>| sigma.filter(|sigma| *sigma > 0.0);
         let (xy, theta) = (reused(stated.sigma_xy_m), reused(stated.sigma_theta_rad));
-        let log_sd = |stated: Option<f64>| if stated.is_some() { STATED } else { VAGUE };
+        let log_sd =
+            |stated: Option<f64>| if stated.is_some() { STATED_NOISE_LOG_SIGMA } else { NOISE_PRIOR_LOG_SIGMA };
         Self {
             centre: [
-                WHEEL_SIGMA,
-                TURN_SIGMA,
-                xy.unwrap_or(MEASUREMENT_SIGMA_M),
-                theta.unwrap_or(MEASUREMENT_SIGMA_RAD),
+                WHEEL_PRIOR_SIGMA,
+                TURN_PRIOR_SIGMA,
+                xy.unwrap_or(POSITION_PRIOR_SIGMA_M),
+                theta.unwrap_or(HEADING_PRIOR_SIGMA_RAD),
             ],
-            log_sd: [VAGUE, VAGUE, log_sd(xy), log_sd(theta)],
+            log_sd: [NOISE_PRIOR_LOG_SIGMA, NOISE_PRIOR_LOG_SIGMA, log_sd(xy), log_sd(theta)],
         }
     }
 
-    /// Plausible standard deviations of a measurement's position, metres, and heading, radians.
+    /// Prior standard deviations of a measurement's position, metres, and heading, radians.
     pub(crate) const fn measurement_sigma(&self) -> [f64; 2] {
         [
             self.centre[NoiseComponent::MeasurementPosition as usize],
@@ -72,9 +64,9 @@ impl NoisePrior {
         ]
     }
 
-    /// The same with one standard deviation held at next to nothing.
+    /// The same with one standard deviation fixed at its lower bound.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
-        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_SIGMA, HELD);
+        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_NOISE_SIGMA, FIXED_NOISE_LOG_SIGMA);
         self
     }
 
@@ -99,7 +91,7 @@ impl Noise {
         self.variance[component as usize].sqrt()
     }
 
-    /// All larger by a factor, and none less than `least`.
+    /// All times a factor, and none below `least`.
     pub(crate) fn scaled(&self, factor: f64, least: f64) -> Self {
         Self { variance: self.variance.map(|variance| (variance * factor).max(least)) }
     }

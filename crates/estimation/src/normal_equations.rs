@@ -1,12 +1,15 @@
-//! Normal equations of the mean parameters around the model in force: the sums of one run, systems of chosen columns, the Schur complement, inverse and
-//! cluster-robust covariance.
+//! Normal equations of the mean parameters around the model in force: the sums of one run, systems of chosen
+//! columns, the Schur complement, inverse and cluster-robust covariance.
 //!
-//! With (I, g) over all columns, n the free ones and c those that are asked for: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc and g_c|n = g_c − I_cn I_nn⁻¹ g_n.
-//! References: Rao 1948 (score tests on I_c|n, g_c|n); White 1982 and Liang & Zeger 1986 (cluster-robust covariance); Bell & McCaffrey 2002 (leverage of a cluster).
+//! With (I, g) over all columns, n the free ones and c others: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc and g_c|n =
+//! g_c − I_cn I_nn⁻¹ g_n.
+//! References: Rao 1948 (score tests on I_c|n, g_c|n); White 1982 and Liang & Zeger 1986 (cluster-robust
+//! covariance); Bell & McCaffrey 2002 (leverage of a cluster).
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Column;
+use crate::settings::{FREE_EIGENVALUE, RIDGE};
 
 /// Sums of a run's whitened innovations v/√s and their derivatives j/√s by the mean parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,11 +115,9 @@ impl Information {
     }
 }
 
-/// What is added to each diagonal element, as a share of it, before a matrix is inverted that may be singular by rounding alone.
-pub const RIDGE: f64 = 1e-12;
-
-/// The inverse of an information matrix by Cholesky, in columns of like size (radians, metres and ratios differ by orders of magnitude); `ridge` is added to each
-/// diagonal element as a share of it. `None` when a direction is not determined.
+/// The inverse of an information matrix by Cholesky, after scaling its diagonal to one (radians, metres and
+/// ratios differ by orders of magnitude); `ridge` is added to each diagonal element as a share of it. `None`
+/// when a direction is not determined.
 #[must_use]
 pub fn inverse(matrix: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
@@ -126,31 +127,30 @@ pub fn inverse(matrix: &DMatrix<f64>, ridge: f64) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (size[i] * size[j])))
 }
 
-/// An orthonormal basis of the directions of so many columns that may move: those orthogonal to the fixed ones.
+/// An orthonormal basis of the directions of `columns` columns that may move: those orthogonal to the fixed
+/// ones.
 #[must_use]
 pub fn free_basis(columns: usize, fixed: &[DVector<f64>]) -> DMatrix<f64> {
-    /// Fixed directions have eigenvalue 1 or more in H Hᵀ, the others 0 up to rounding.
-    const ZERO: f64 = 1e-9;
     if fixed.is_empty() {
         return DMatrix::identity(columns, columns);
     }
     let fixed = DMatrix::from_columns(fixed);
     let eigen = (&fixed * fixed.transpose()).symmetric_eigen();
     let free: Vec<_> = (0..columns)
-        .filter(|&k| eigen.eigenvalues[k] < ZERO)
+        .filter(|&k| eigen.eigenvalues[k] < FREE_EIGENVALUE)
         .map(|k| eigen.eigenvectors.column(k).into_owned())
         .collect();
     if free.is_empty() { DMatrix::zeros(columns, 0) } else { DMatrix::from_columns(&free) }
 }
 
-/// What is left of some columns with the free ones at their best.
+/// Normal equation of some columns with the free ones eliminated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projected {
     /// I_c|n.
     pub information: DMatrix<f64>,
     /// g_c|n.
     pub gradient: DVector<f64>,
-    /// How much of each column's raw information is left.
+    /// Share of each column's information that is left.
     pub share: Vec<f64>,
 }
 
@@ -173,7 +173,8 @@ impl SchurComplement {
         Some(Self { gradient: own.gradient, free: basis, columns, inverse })
     }
 
-    /// The score of one run by some columns, with what the free columns' estimate takes of it, which all runs share, taken out.
+    /// The score of one run by some columns, less the part that the free columns, which all runs share,
+    /// explain.
     #[must_use]
     pub fn score_of(&self, run: &NormalEquations, all: &NormalEquations, columns: &[usize]) -> DVector<f64> {
         let cross = all.block(columns, &self.columns) * &self.free;
@@ -190,7 +191,7 @@ impl SchurComplement {
             + &weights * run.block(&self.columns, &self.columns) * weights.transpose()
     }
 
-    /// What is left of some columns.
+    /// The normal equation of some columns with the free ones eliminated.
     #[must_use]
     pub fn of_columns(&self, equations: &NormalEquations, columns: &[usize]) -> Projected {
         let cross = equations.block(columns, &self.columns) * &self.free;
@@ -202,7 +203,8 @@ impl SchurComplement {
     }
 }
 
-/// Covariance of an estimate by the scatter of clusters: I⁻¹ (Σ u uᵀ) I⁻¹ with each cluster's score u taken as it would be without the cluster in the fit.
+/// Covariance of an estimate by the scatter of clusters: I⁻¹ (Σ u uᵀ) I⁻¹ with each cluster's score u taken
+/// as it would be without the cluster in the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClusterRobust {
     /// The covariance.
@@ -212,7 +214,8 @@ pub struct ClusterRobust {
 }
 
 impl ClusterRobust {
-    /// Of clusters by the variance of their scores and the scores; `inverse` is that of the whole information.
+    /// Of clusters by the variance of their scores and the scores; `inverse` is that of the whole
+    /// information.
     #[must_use]
     pub fn of(inverse: &DMatrix<f64>, clusters: impl IntoIterator<Item = Information>) -> Self {
         let n = inverse.nrows();
@@ -256,7 +259,8 @@ mod tests {
         let all = equations();
         let left = SchurComplement::of(&all, &[Column::LeftWheel], free_basis(1, &[])).expect("determined");
         let Projected { information, gradient, share } = left.of_columns(&all, &[1, 2]);
-        // I_cc − I_cn I_nn⁻¹ I_nc = [[3 − 1/2, 1], [1, 4]], g_c − I_cn I_nn⁻¹ g_n = (0 − 1/2·2, 1). The ridge changes them by 1e-12.
+        // I_cc − I_cn I_nn⁻¹ I_nc = [[3 − 1/2, 1], [1, 4]], g_c − I_cn I_nn⁻¹ g_n = (0 − 1/2·2, 1). The ridge
+        // changes them by 1e-12.
         let expected = DMatrix::from_row_slice(2, 2, &[2.5, 1.0, 1.0, 4.0]);
         assert!((information - expected).amax() < 1e-11);
         assert!((gradient - DVector::from_column_slice(&[-1.0, 1.0])).amax() < 1e-11);
@@ -283,8 +287,9 @@ mod tests {
 
     #[test]
     fn clusters_that_agree_have_the_covariance_of_their_mean() {
-        // One parameter, four runs of unit information: θ = mean, scores ∓1 about it. The score without the run is u/(1 − 1/4), so the covariance is
-        // (1/4)² · 4 · (4/3)² · 3/4 = 1/3: the sample variance 4/3 over four.
+        // One parameter, four runs of unit information: θ = mean, scores ∓1 about it. The score without the
+        // run is u/(1 − 1/4), so the covariance is (1/4)² · 4 · (4/3)² · 3/4 = 1/3: the sample variance 4/3
+        // over four.
         let runs = [1.0, -1.0, 1.0, -1.0].map(|score| Information {
             matrix: DMatrix::from_element(1, 1, 1.0),
             gradient: DVector::from_element(1, score),

@@ -1,4 +1,5 @@
-//! The instrument's extrinsics and latency, for all or for each session or run: they join the model when they predict what they were not fitted to.
+//! The instrument's extrinsics and latency, common to all or for each session or run: they join the model
+//! when they predict held-out runs.
 
 use kinematics::Pose;
 use nalgebra::DVector;
@@ -6,15 +7,11 @@ use nalgebra::DVector;
 use crate::error::EstimationError;
 use crate::filter::OutlierGate;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
-use crate::model_fit::{FOLDS, MIN_RUNS, ModelFit};
+use crate::model_fit::ModelFit;
 use crate::normal_equations::{NormalEquations, total};
-use crate::optimizer::Fit;
+use crate::optimizer::Solution;
+use crate::settings::{BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT};
 use crate::thinning::Thinning;
-
-/// A nuisance must gain by so many standard errors on what was held out.
-const GAIN_IN_SIGMAS: f64 = 2.0;
-/// What a run has for itself is judged on the other parts of it.
-const PARTS_OF_PER_RUN: usize = 3;
 
 /// A run, or a part of one, with the fold that holds it out.
 struct Unit {
@@ -22,7 +19,7 @@ struct Unit {
     equations: NormalEquations,
 }
 
-/// What was predicted of runs by fits to other runs.
+/// Held-out prediction: of units by fits to the other folds.
 #[derive(Debug, Clone, PartialEq)]
 struct HeldOut {
     /// Each unit's cost.
@@ -33,22 +30,22 @@ struct HeldOut {
     end_rad: f64,
 }
 
-/// A set of the instrument's columns that earned its place.
-struct Earned {
-    /// Over none of them, on what was held out.
+/// A set of the instrument's columns that predicts held-out units.
+struct AcceptedNuisances {
+    /// Gain in held-out log-likelihood over none of them.
     gain: f64,
     columns: Vec<Column>,
     own: Option<GroupExtrinsics>,
     held_out: HeldOut,
 }
 
-/// Whether nuisances explain what is not white or lies far off.
+/// Whether nuisances explain autocorrelation or outliers.
 pub(crate) enum Explained<T> {
     /// The fit with them.
     Yes(T),
     /// The fit without them, thinned as far as it has to be.
     No { thinned: T },
-    /// There was nothing to explain, or nothing to do it.
+    /// There was nothing to explain, or no nuisance was accepted.
     NotTried,
 }
 
@@ -62,30 +59,32 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
     Some((mean, (variance / n).sqrt()))
 }
 
-/// Lets the extrinsics and the latency of the instrument in, common to all or for each session or run, where they predict runs that they were not fitted to: the
-/// measurements by their likelihood, and the ends of the runs by dead reckoning. Terms on the instrument's side lower a cost easily and can worsen what a
-/// calibration is for. What a run has for itself is fitted to one part of it and judged by another.
+/// Adds extrinsics and latency, common to all or for each session or run, where they predict held-out units:
+/// the measurements by their likelihood, and the ends of the runs by dead reckoning. The second condition
+/// keeps out terms that lower the cost and worsen the calibration. What each run has for itself is fitted to
+/// some blocks of it and judged on the others.
 pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
     let sets: [&[Column]; 3] = [
         &Column::EXTRINSICS,
         &[Column::Latency],
         &[Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency],
     ];
-    let several = fit.fit.pass.runs.iter().any(|run| run.run.0 != fit.fit.pass.runs[0].run.0);
+    let several = fit.solution.pass.runs.iter().any(|run| run.run.0 != fit.solution.pass.runs[0].run.0);
     let mut groupings = vec![None];
-    // Where errors last, a part of a run shares them with its other parts, and what a run seems to have for itself is not judged by anything unseen.
+    // Autocorrelated errors are common to the blocks of a run, so that blocks are no held-out data for each
+    // other.
     if gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white()) {
         groupings.push(Some(Grouping::Run));
     }
     if several {
         groupings.push(Some(Grouping::Session));
     }
-    let mut best: Option<Earned> = None;
+    let mut best: Option<AcceptedNuisances> = None;
     for grouping in groupings {
         let units = units_of(fit, grouping, gate);
         let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
-        // What a larger set gains over a smaller one, it must gain by as much as that over nothing.
-        let mut of_grouping: Option<Earned> = None;
+        // A larger set must gain over the smaller one as significantly as that over none.
+        let mut of_grouping: Option<AcceptedNuisances> = None;
         for set in sets {
             let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
             let (columns, own): (Vec<Column>, _) = match grouping {
@@ -93,34 +92,37 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
                 Some(grouping) => (others().collect(), Some(GroupExtrinsics::new(grouping, set.to_vec()))),
             };
             let Some(found) = held_out(fit, &units, &columns, own.as_ref()) else { continue };
-            let before = of_grouping.as_ref().map_or(&base, |earned| &earned.held_out);
+            let before = of_grouping.as_ref().map_or(&base, |accepted| &accepted.held_out);
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
-            if mean > GAIN_IN_SIGMAS * error && !drifts {
+            if mean > MIN_HELD_OUT_GAIN_SIGMA * error && !drifts {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
-                of_grouping = Some(Earned { gain, columns, own, held_out: found });
+                of_grouping = Some(AcceptedNuisances { gain, columns, own, held_out: found });
             }
         }
-        if let Some(earned) = of_grouping
-            && best.as_ref().is_none_or(|best| earned.gain > best.gain)
+        if let Some(accepted) = of_grouping
+            && best.as_ref().is_none_or(|best| accepted.gain > best.gain)
         {
-            best = Some(earned);
+            best = Some(accepted);
         }
     }
-    if let Some(Earned { columns, own, .. }) = best {
-        let mut from = fit.here();
-        // From where these measurements put them, and with every measurement until they fit: from nothing, a gate may hide what they would explain.
+    if let Some(AcceptedNuisances { columns, own, .. }) = best {
+        let mut from = fit.current_values();
+        // The refit starts at the step that all measurements ask for: from zero, the gate could reject what
+        // it explains.
         if gate == OutlierGate::Off {
             from.noise = None;
         }
         let mut all: Vec<NormalEquations> =
             units_of(fit, own.as_ref().map(|own| own.grouping), gate).into_iter().map(|unit| unit.equations).collect();
-        let follows = own.as_ref().map_or_else(Vec::new, |own| own.eliminate(&mut all, &from.model));
+        let responses = own.as_ref().map_or_else(Vec::new, |own| own.eliminate(&mut all, &from.model));
         from.model.own = own;
         if let Some((step, _)) = total(&all).and_then(|sum| sum.of(&columns).solve()) {
             columns.iter().zip(step.iter()).for_each(|(column, by)| from.model.advance(*column, *by));
-            follows.iter().for_each(|follow| from.model.advance_own(follow.group, &follow.step(&columns, &step)));
+            responses
+                .iter()
+                .for_each(|response| from.model.advance_own(response.group, &response.step(&columns, &step)));
         }
         fit.columns = columns;
         fit.refit(Some(from))?;
@@ -128,49 +130,50 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     Ok(())
 }
 
-/// Measurements that resemble each other, or lie far off, may do so because the instrument sits elsewhere or is late: the fit with what it earns on all measurements, if
-/// they are then white, and were not before or less than half as many lie far off. If they are not, their number says little for what they seem to show.
+/// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
+/// thinning and without the gate. The fit is accepted if its innovations need no thinning, and if the fit
+/// without nuisances needs thinning or has more than twice as many outliers.
 pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,
 ) -> Result<Explained<ModelFit<'a>>, EstimationError> {
-    if (fit.is_white() || !thin) && fit.fit.pass.outliers.is_empty() {
+    if (fit.is_white() || !thin) && fit.solution.pass.outliers.is_empty() {
         return Ok(Explained::NotTried);
     }
     let mut explained = fit.clone();
     add_nuisances(&mut explained, OutlierGate::Off)?;
-    if explained.columns == fit.columns && explained.fit.model.own.is_none() {
+    if explained.columns == fit.columns && explained.solution.model.own.is_none() {
         return Ok(Explained::NotTried);
     }
     let mut plain = fit.clone();
     if thin {
         plain.thin()?;
     }
-    let far = |found: &ModelFit<'_>| found.fit.pass.outliers.len();
-    let uses_more = plain.thinning != Thinning::NONE || 2 * far(&explained) < far(&plain);
+    let outliers = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
+    let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
     let is_better = uses_more && !(thin && explained.is_to_be_thinned());
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
 
-/// Fits some columns, and what is own to groups, to all units but a fold, for each fold, and judges them on that fold. `None` when some fold's others do not
-/// determine the columns.
+/// Cross-validation of some columns and of the groups' own: for each fold, one step on the other folds,
+/// judged on it. `None` when the others of some fold do not determine the columns.
 fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<&GroupExtrinsics>) -> Option<HeldOut> {
     let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
     for fold in 0..FOLDS.min(units.len()) {
         let mut others: Vec<NormalEquations> =
             units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.equations.clone()).collect();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.fit.model));
+        let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.solution.model));
         let (step, _) = total(&others)?.of(columns).solve()?;
-        let mut common = fit.fit.model.clone();
+        let mut common = fit.solution.model.clone();
         columns.iter().zip(step.iter()).for_each(|(column, by)| common.advance(*column, *by));
         for (k, unit) in units.iter().enumerate().filter(|(_, unit)| unit.fold == fold) {
             let NormalEquations { run, .. } = unit.equations;
             let (mut columns, mut step, mut model) = (columns.to_vec(), step.clone(), common.clone());
-            // A group of which nothing else is known has what is common.
+            // A group without data in the other folds has the common instrument.
             if let Some(own) = own
-                && let Some(follow) = follows.iter().find(|follow| follow.group == own.grouping.group(run))
+                && let Some(response) = responses.iter().find(|response| response.group == own.grouping.group(run))
             {
-                let by = follow.step(&columns, &step);
+                let by = response.step(&columns, &step);
                 own.columns.iter().zip(by.iter()).for_each(|(column, by)| model.advance(*column, *by));
                 columns.extend(&own.columns);
                 step = DVector::from_iterator(columns.len(), step.iter().chain(by.iter()).copied());
@@ -185,15 +188,16 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
     Some(found)
 }
 
-/// Evidence to be held out, so that a group is not held out as a whole.
+/// Normal equations of the units that are held out; no group is held out as a whole.
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
-    let runs = fit.fit.pass.runs.len().max(1);
+    let runs = fit.solution.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
-        (Some(Grouping::Run), gate) => fit.blocks(&mut [], PARTS_OF_PER_RUN, gate),
+        (Some(Grouping::Run), gate) => fit.blocks(&mut [], BLOCKS_PER_RUN, gate),
         (_, OutlierGate::On) => fit.units(&mut []),
-        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS.div_ceil(runs), gate),
+        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS_TO_HOLD_OUT.div_ceil(runs), gate),
     };
-    // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different folds.
+    // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different
+    // folds.
     let mut measured: Vec<((usize, usize), usize)> = Vec::new();
     parts
         .into_iter()
@@ -217,13 +221,14 @@ fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -
 impl ModelFit<'_> {
     /// Is a column of the instrument in the model, for all or for groups?
     pub fn has(&self, column: Column) -> bool {
-        self.columns.contains(&column) || self.fit.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
+        self.columns.contains(&column)
+            || self.solution.model.own.as_ref().is_some_and(|own| own.columns.contains(&column))
     }
 
-    /// The instrument that all share, or the mean of those that groups show to have.
+    /// The common instrument, or the mean over groups of their own where these are observable.
     pub fn mean_instrument(&self) -> Instrument {
-        let common = self.fit.model.common_instrument();
-        let Some(own) = &self.fit.model.own else { return common };
+        let common = self.solution.model.common_instrument();
+        let Some(own) = &self.solution.model.own else { return common };
         let mean = |column: Column, common: f64, of: fn(&Instrument) -> f64| {
             let shown: Vec<f64> = own
                 .of
@@ -244,11 +249,11 @@ impl ModelFit<'_> {
         }
     }
 
-    /// Does a group's data show a column of its own?
+    /// Is a column of a group's own instrument observable in its data?
     #[must_use]
     pub fn shows(&self, group: (usize, usize), column: Column) -> bool {
-        let Fit { model, pass, .. } = &self.fit;
-        let follow = pass.own.iter().find(|follow| follow.group == group);
-        model.own.as_ref().zip(follow).is_some_and(|(own, follow)| own.is_shown(follow, column))
+        let Solution { model, pass, .. } = &self.solution;
+        let response = pass.own.iter().find(|response| response.group == group);
+        model.own.as_ref().zip(response).is_some_and(|(own, response)| own.is_shown(response, column))
     }
 }

@@ -1,8 +1,10 @@
-//! Datasets too large to be held: the whole fit of pieces that are spread over them, then one scoring step over all, a part at a time.
+//! Datasets too large for memory: a fit of subsamples that are spread over them, then one scoring step over
+//! all, part by part.
 //!
-//! With the normal equation Σ I, Σ g of everything at the pieces' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is asymptotically as good as the fit of everything, as θ₀ is
-//! within O(1/√n): what it misses is of the order of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
-//! whether the instrument has the extrinsics or a latency are those of the pieces.
+//! With the normal equation Σ I, Σ g of everything at the subsamples' estimate θ₀, θ₁ = θ₀ − (Σ I)⁻¹ Σ g is
+//! asymptotically as good as the fit of everything, as θ₀ is within O(1/√n): what it misses is of the order
+//! of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
+//! whether the instrument has the extrinsics or a latency are those of the subsamples.
 
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, channel, sync_channel};
@@ -19,41 +21,23 @@ use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::{ConvergenceCriterion, pass_settled};
 use crate::records::Records;
+use crate::settings::{
+    LARGE_ROWS, MAX_PART_THREADS, MAX_ROWS_PER_MEASUREMENT, MAX_SCORING_STEPS, MAX_SUBSAMPLE_ROWS, MIN_PART_BLOCKS,
+    MIN_PART_MEASUREMENTS, MIN_PART_PROPAGATIONS, ONE_STEP_TOLERANCE, PRELIMINARY_NOISE_TOLERANCE,
+    SUBSAMPLE_MEASUREMENTS, SUBSAMPLE_NOISE_TOLERANCE, SUBSAMPLES,
+};
 use crate::thinning::Selection;
 
-/// With more rows of odometry and measurements together, datasets are large: fitted as a whole they take a hundred passes, and half a kilobyte a row.
-pub const LARGE_ROWS: usize = 500_000;
-/// With more rows a measurement, pieces would show too few measurements: such datasets are fitted as a whole.
-const MAX_ROWS_PER_MEASUREMENT: usize = 500;
-/// Measurements of the pieces together. They show a variance to 0.3 %, and a correlation of innovations to 0.4 %.
-const FIRST_MEASUREMENTS: usize = 1 << 16;
-/// Rows of the pieces together at most, where measurements are few.
-const FIRST_ROWS: usize = 1 << 19;
-/// As many as can be held out, and no more: measurements may have to be thinned to some of hundreds of rows, and only a long way shows by its end what lengths are worth.
-const PIECES: usize = 8;
-/// How far the noise of the pieces is followed before measurements are told to be white or not, and at last: nearer than the pieces know it.
-const FIRST_NOISE_SETTLED: f64 = 5e-2;
-const LAST_NOISE_SETTLED: f64 = 1e-3;
-/// A part that is held at a time has so many blocks at least, and so many measurements and thinned measurements: at its cut one of them has no other to begin at.
-const PART_BLOCKS: usize = 32;
-const PART_MEASUREMENTS: usize = 1000;
-const PART_PROPAGATIONS: usize = 50;
-/// Parts wait for no more cores than these, as each holds its memory.
-const MAX_WORKERS: usize = 4;
-/// A step whose square, of lengths by ratio and of headings in radians, is below this share of a standard deviation is right to about that share.
-const NEAR: f64 = 0.05;
-const MAX_PASSES: usize = 5;
-
-/// How a calibration of large datasets was made.
+/// How large datasets were calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OneStep {
     /// Measurements of all runs.
     #[serde(rename = "looks")]
     pub measurements: usize,
-    /// Measurements of the pieces that were fitted as a whole first.
+    /// Measurements of the subsamples that were fitted first.
     #[serde(rename = "first_looks")]
     pub first_measurements: usize,
-    /// Passes over everything: one, unless the first fit was far off.
+    /// Scoring steps over all measurements: one, unless the first fit was far off.
     pub passes: usize,
 }
 
@@ -68,14 +52,15 @@ pub enum OneStepError {
     Estimation(#[from] EstimationError),
 }
 
-/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500 rows at least.
+/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500
+/// rows at least.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
-    let (rows, measurements) = rows_and_looks(datasets);
+    let (rows, measurements) = rows_and_measurements(datasets);
     rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
 }
 
-fn rows_and_looks(datasets: &[Blocks]) -> (usize, usize) {
+fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
     let of = |blocks: &Blocks, count: fn(&Blocks, usize) -> usize| -> usize {
         (0..blocks.infos().len()).map(|run| count(blocks, run)).sum()
     };
@@ -87,7 +72,7 @@ fn rows_and_looks(datasets: &[Blocks]) -> (usize, usize) {
 /// Blocks of one run: dataset, run, blocks.
 type Part = (usize, usize, Range<usize>);
 
-/// One part's evidence, and what else it said.
+/// The normal equation of a part, and what else it gives.
 struct PartEquations {
     number: usize,
     equations: Option<NormalEquations>,
@@ -95,13 +80,13 @@ struct PartEquations {
     measurements: usize,
 }
 
-/// Everything at the values of a fit.
+/// The normal equations of all parts at the values of a fit.
 struct GatheredParts {
     parts: Vec<NormalEquations>,
     measurements: usize,
 }
 
-/// The fit of datasets of any size; its records hold no measurements, only the runs' ids.
+/// The fit of datasets of any size; its records have the runs' ids and no measurements.
 #[derive(Debug, Clone)]
 pub struct LargeFit {
     /// The fit.
@@ -114,35 +99,37 @@ pub struct LargeFit {
     pub names: Vec<String>,
 }
 
-/// Fits datasets of any size in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where [`is_large`] says no,
-/// [`FitSettings::fit`] does better: it takes all measurements for every choice.
+/// Fits datasets of any size in the memory of a part of them; `notice` gets each dataset's index and
+/// warnings. Where [`is_large`] is false, [`FitSettings::fit`] is better: it bases every choice on all
+/// measurements.
 ///
 /// # Errors
-/// [`OneStepError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+/// [`OneStepError`] when the datasets cannot be read, hold no measurements, or the fit of the subsamples
+/// diverges.
 pub fn fit_large(
     settings: FitSettings,
     datasets: &mut [Blocks],
     mut notice: impl FnMut(usize, &Warning),
 ) -> Result<LargeFit, OneStepError> {
-    let pieces = pieces(datasets)?;
-    let sessions: Vec<Session<'_>> = pieces.iter().map(Dataset::session).collect();
-    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(FIRST_NOISE_SETTLED), &sessions)?;
-    first.ends = ConvergenceCriterion::NoiseShare(LAST_NOISE_SETTLED);
-    first.refit(Some(first.here()))?;
+    let subsamples = subsamples(datasets)?;
+    let sessions: Vec<Session<'_>> = subsamples.iter().map(Dataset::session).collect();
+    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(PRELIMINARY_NOISE_TOLERANCE), &sessions)?;
+    first.ends = ConvergenceCriterion::NoiseShare(SUBSAMPLE_NOISE_TOLERANCE);
+    first.refit(Some(first.current_values()))?;
     let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
     let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
-    // What the pieces hold is needed no more.
+    // The subsamples are needed no more.
     let mut found = first.with_records(Records { segments: Vec::new(), unused: Vec::new(), ids });
     let mut passes = 0;
     loop {
         passes += 1;
         let GatheredParts { parts, measurements } = found.gather(datasets, part_blocks, &mut notice)?;
         let is_near = found.step_over(parts)?;
-        if is_near || passes == MAX_PASSES {
-            found.fit.converged &= is_near;
+        if is_near || passes == MAX_SCORING_STEPS {
+            found.solution.converged &= is_near;
             return Ok(LargeFit {
                 fit: found,
                 one_step: OneStep { measurements, first_measurements, passes },
@@ -153,17 +140,17 @@ pub fn fit_large(
     }
 }
 
-/// The pieces, a dataset of them from each dataset.
-fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
-    let (rows, measurements) = rows_and_looks(datasets);
-    let wanted = (FIRST_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(FIRST_ROWS);
-    // Every so many rows a piece, in the middle of these.
-    let stride = (rows / PIECES).max(1);
-    let within = stride.saturating_sub(wanted / PIECES) / 2..(stride + wanted / PIECES) / 2;
+/// The subsamples: a dataset of them from each dataset.
+fn subsamples(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
+    let (rows, measurements) = rows_and_measurements(datasets);
+    let wanted = (SUBSAMPLE_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(MAX_SUBSAMPLE_ROWS);
+    // A subsample is in the middle of each stride of rows.
+    let stride = (rows / SUBSAMPLES).max(1);
+    let within = stride.saturating_sub(wanted / SUBSAMPLES) / 2..(stride + wanted / SUBSAMPLES) / 2;
     let mut before = 0;
-    let mut pieces = Vec::with_capacity(datasets.len());
+    let mut subsamples = Vec::with_capacity(datasets.len());
     for blocks in datasets {
-        let mut piece = blocks.header().clone();
+        let mut subsample = blocks.header().clone();
         for run in 0..blocks.infos().len() {
             let count = blocks.blocks(run);
             let start = before;
@@ -173,48 +160,49 @@ fn pieces(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
             while block < count {
                 let end = block + (block..count).take_while(|block| is_taken(*block)).count();
                 if end > block {
-                    piece.runs.extend(blocks.read(run, block..end)?.dataset.runs);
+                    subsample.runs.extend(blocks.read(run, block..end)?.dataset.runs);
                 }
                 block = end + 1;
             }
         }
-        pieces.push(piece);
+        subsamples.push(subsample);
     }
-    Ok(pieces)
+    Ok(subsamples)
 }
 
 /// How many blocks of a run are held at a time.
 fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
-    let (rows, measurements) = rows_and_looks(datasets);
+    let (rows, measurements) = rows_and_measurements(datasets);
     let propagations: usize =
         first.selections.first().map_or(0, |selection| selection.propagations.iter().map(Vec::len).sum::<usize>());
-    let looks_a_leg = first.records.measurements().div_ceil(propagations.max(1));
-    let wanted_looks = PART_MEASUREMENTS.max(PART_PROPAGATIONS * looks_a_leg);
-    PART_BLOCKS.max(wanted_looks.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
+    let measurements_per_propagation = first.records.measurements().div_ceil(propagations.max(1));
+    let wanted_measurements = MIN_PART_MEASUREMENTS.max(MIN_PART_PROPAGATIONS * measurements_per_propagation);
+    MIN_PART_BLOCKS.max(wanted_measurements.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
 }
 
 impl ModelFit<'_> {
-    /// The evidence of everything at the values in force, part by part. This thread reads, others compute; sums are taken in the order of the parts.
+    /// The normal equations of all parts at the values in force. This thread reads, others compute; sums are
+    /// taken in the order of the parts.
     fn gather(
         &mut self,
         datasets: &mut [Blocks],
         part_blocks: usize,
         notice: &mut impl FnMut(usize, &Warning),
     ) -> Result<GatheredParts, OneStepError> {
-        let runs_stand_apart = self.fit.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
+        let is_grouped_by_run = self.solution.model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
             .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| (dataset, run, blocks.blocks(run))))
             .flat_map(|(dataset, run, count)| {
-                // What a run has for itself is found from all of it.
-                let cuts = if runs_stand_apart { 1 } else { count.div_ceil(part_blocks) };
+                // The instrument of a run is found from all of it.
+                let cuts = if is_grouped_by_run { 1 } else { count.div_ceil(part_blocks) };
                 (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
             })
             .collect();
-        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_WORKERS);
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_PART_THREADS);
         let mut part_equations = std::thread::scope(|scope| -> Result<Vec<PartEquations>, OneStepError> {
-            // No part waits: the thread that reads waits for one that has time.
+            // No part waits in memory: the reading thread waits for a worker.
             let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
             let take = Arc::new(Mutex::new(take));
             let (hand_in, collect) = channel();
@@ -232,7 +220,7 @@ impl ModelFit<'_> {
             for (number, (dataset, run, blocks)) in parts.iter().enumerate() {
                 let loaded = datasets[*dataset].read(*run, blocks.clone())?;
                 loaded.warnings.iter().for_each(|warning| notice(*dataset, warning));
-                // Nobody takes any more: what was handed in says why.
+                // The workers have stopped; what they handed in has the reason.
                 if give.send((number, (*dataset, *run), loaded.dataset)).is_err() {
                     break;
                 }
@@ -249,7 +237,7 @@ impl ModelFit<'_> {
             }
         }
         Arc::make_mut(&mut self.records).unused = unused;
-        if let Some(own) = &mut self.fit.model.own {
+        if let Some(own) = &mut self.solution.model.own {
             let found = part_equations
                 .iter()
                 .filter_map(|part| Some((own.grouping.group(run_of(&parts[part.number])), part.own?)));
@@ -261,7 +249,7 @@ impl ModelFit<'_> {
         })
     }
 
-    /// What a part says at the values in force.
+    /// The normal equation of a part at the values in force.
     fn part_equations(
         &self,
         number: usize,
@@ -275,24 +263,25 @@ impl ModelFit<'_> {
             return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);
-        let (mut model, noise) = (self.fit.model.clone(), &self.fit.noise);
-        let stands_apart = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
-        if stands_apart {
+        let (mut model, noise) = (self.solution.model.clone(), &self.solution.noise);
+        let is_grouped_by_run = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
+        if is_grouped_by_run {
             model = pass_settled(&records, &selections, model, noise)?.0;
         }
         let instrument = model.instrument(run);
         let Instrument { body_from_sensor, latency_s } = instrument;
-        // The columns that stand apart are still in the evidence: they are taken out of a group's sum.
+        // The groups' own columns are still in the normal equation: they are eliminated from a group's sum.
         let model = Model { body_from_sensor, latency_s, own: None, ..model };
         let (_, pass) = pass_settled(&records, &selections, model, noise)?;
-        let own = stands_apart.then_some(instrument);
+        let own = is_grouped_by_run.then_some(instrument);
         Ok(PartEquations { number, equations: total(&pass.runs), own, measurements: records.measurements() })
     }
 
-    /// Moves the values by the step that the parts' evidence asks for. Was it small enough for one step to be right?
+    /// Takes the scoring step of the parts' sum. Returns whether it was small enough for one step to be
+    /// efficient.
     fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
-        let own = self.fit.model.own.clone();
-        let follows = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.fit.model));
+        let own = self.solution.model.own.clone();
+        let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));
         let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };
         let information = sum.of(&self.columns);
         self.unobservable = unobservable(&information.matrix);
@@ -303,19 +292,21 @@ impl ModelFit<'_> {
         let mut is_near = true;
         for (row, column) in self.columns.iter().enumerate() {
             moved[column.index()] = step[row];
-            self.fit.model.advance(*column, step[row]);
-            let bends = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
-            is_near &= !bends || step[row].powi(2) <= NEAR * covariance[(row, row)].sqrt();
+            self.solution.model.advance(*column, step[row]);
+            let is_nonlinear = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
+            is_near &= !is_nonlinear || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
         }
-        follows.iter().for_each(|follow| self.fit.model.advance_own(follow.group, &follow.step(&self.columns, &step)));
+        responses
+            .iter()
+            .for_each(|response| self.solution.model.advance_own(response.group, &response.step(&self.columns, &step)));
         // To first order the scores are those at the new values.
         for part in &mut parts {
             let by = &part.information * &moved;
             part.chi_square += 2.0 * part.gradient.dot(&moved) + by.dot(&moved);
             part.gradient += by;
         }
-        self.fit.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
-        self.fit.pass.own = follows;
+        self.solution.pass.runs = parts.chunk_by(|a, b| a.run == b.run).filter_map(total).collect();
+        self.solution.pass.own = responses;
         self.parts = parts;
         Ok(is_near)
     }

@@ -4,49 +4,30 @@ use kinematics::{Pose, unwrap_near};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use crate::acceleration::{Acceleration, Size};
+use crate::acceleration::{Acceleration, StepSize};
 use crate::error::EstimationError;
 use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
-use crate::noise::{MIN_SIGMA, Noise, NoisePrior};
+use crate::noise::{Noise, NoisePrior};
 use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
 use crate::propagation::CachedPropagation;
 use crate::records::{Records, Segment, Start};
+use crate::settings::{
+    ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
+    HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
+    MAX_UNGATED_STEPS, MEAN_COST_TOLERANCE, MEAN_STEP_TOLERANCE, MIN_NOISE_SIGMA, MIN_UNGATED_STEPS,
+    NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE, START_HEADING_BASELINE_M,
+    STEP_DECREASE, STEP_INCREASE,
+};
 use crate::thinning::Selection;
 
-/// Median of χ² with one degree of freedom.
-const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
-/// A step this small, squared and over its variance, changes nothing that a print shows.
-const SETTLED: f64 = 1e-8;
-/// Nor does one of the noise by less than this share of a variance.
-pub(crate) const NOISE_SETTLED: f64 = 1e-4;
-/// Where models are compared by their likelihoods, steps of the mean and of the noise may end that are this small, squared and over their variance: they change its
-/// logarithm by half of it.
-const MEAN_COST: f64 = 1e-4;
-const NOISE_COST: f64 = 1e-2;
-const LARGEST_NOISE_STEP: f64 = 1.5;
-/// After a step of less than a standard deviation, propagation intervals need not be driven again for the next: they follow it to first order.
-const NEAR: f64 = 1.0;
-/// Where steps by kept propagation intervals have settled, one by driven propagation intervals that is this small, squared and over its variance, is the last: the next would be less by orders.
-const CONFIRMED: f64 = 1e-4;
-/// So near to where they were driven, squared and over the variance, propagation intervals are what they would be if they were driven again: at 0.02, driven propagation intervals made a step of 5e-8.
-const REUSE_TOLERANCE: f64 = 0.1;
-/// Steps before outliers are told: at least, and at most.
-const MIN_STARTS: usize = 3;
-const MAX_STARTS: usize = 20;
-/// A step of ten standard deviations, squared, is a long way.
-const FAR: f64 = 100.0;
-/// Damping of a step, as a share of what is known of each direction, and where nothing is: it keeps steps finite and moves no minimum.
-const DAMPING: f64 = 1e-7;
-const MIN_INFORMATION: f64 = 1e-9;
-
-/// Where the steps of a fit end.
+/// When the steps of a fit have converged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ConvergenceCriterion {
-    /// Where they are less than 1e-4 of a standard deviation of the mean, and this share of each variance.
+    /// Steps are below 1e-4 of a standard deviation of the mean, and below this share of each variance.
     NoiseShare(f64),
-    /// Where they change the log of the likelihood by less than 0.005: a variance that hardly matters may be anything.
+    /// Steps change the log-likelihood by less than 0.005: variances that hardly matter need not converge.
     Likelihood,
 }
 
@@ -59,11 +40,11 @@ pub struct FitOptions {
     pub fixed: Vec<DVector<f64>>,
     /// The noise stays as it is.
     pub noise_fixed: bool,
-    /// Where steps end.
+    /// When the steps have converged.
     pub ends: ConvergenceCriterion,
     /// Most steps.
     pub max_steps: usize,
-    /// Measurements that lie far off are taken like the others.
+    /// Take every measurement, outliers too.
     pub ungated: bool,
 }
 
@@ -75,31 +56,31 @@ impl FitOptions {
             columns: columns.to_vec(),
             fixed: Vec::new(),
             noise_fixed: false,
-            ends: ConvergenceCriterion::NoiseShare(NOISE_SETTLED),
-            max_steps: 60,
+            ends: ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
+            max_steps: MAX_FIT_STEPS,
             ungated: false,
         }
     }
 }
 
-/// A fitted model.
+/// What the optimizer found: the values of mean and noise, and the pass at them.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub struct Solution {
     /// The mean parameters.
     pub model: Model,
     /// The noise.
     pub noise: Noise,
-    /// Start headings of segments whose instrument sees none, radians; 0 for others.
+    /// Start headings of segments without measured headings, radians; 0 for others.
     pub(crate) free_headings: Vec<f64>,
     /// The last pass, at the values above.
     pub pass: Pass,
-    /// Did the steps die out?
+    /// Did the steps converge?
     pub converged: bool,
-    /// Did a step go far, and farther than the first? What it ends at may be one of several minima.
+    /// Was a step long, and longer than the first? The minimum may then be one of several.
     pub left_basin: bool,
 }
 
-impl Fit {
+impl Solution {
     /// Before anything is fitted.
     pub(crate) fn nothing(nominal: &Model, prior: &NoisePrior) -> Self {
         let pass = Pass::nothing();
@@ -120,9 +101,9 @@ impl Fit {
     }
 }
 
-/// Where to start.
+/// Where a fit starts.
 #[derive(Debug, Clone)]
-pub(crate) struct From {
+pub(crate) struct InitialValues {
     pub(crate) model: Model,
     pub(crate) noise: Option<Noise>,
     pub(crate) free_headings: Option<Vec<f64>>,
@@ -139,19 +120,19 @@ pub fn fit(
     stated: dataset::TruthNoise,
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
-) -> Result<Fit, EstimationError> {
-    let from = From { model: nominal.clone(), noise: None, free_headings: None };
+) -> Result<Solution, EstimationError> {
+    let from = InitialValues { model: nominal.clone(), noise: None, free_headings: None };
     fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
 }
 
 pub(crate) fn fit_from(
     records: &Records<'_>,
     selections: &[Selection],
-    from: From,
+    from: InitialValues,
     prior: &NoisePrior,
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
-) -> Result<Fit, EstimationError> {
+) -> Result<Solution, EstimationError> {
     if selections.iter().all(|selection| selection.propagations.iter().all(Vec::is_empty)) {
         return Err(EstimationError::NoMeasurements);
     }
@@ -162,8 +143,8 @@ pub(crate) fn fit_from(
     let basis = free_basis(options.columns.len(), &options.fixed);
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
-        // Sizes first, by medians, which outliers do not move; then outliers can be told.
-        for round in 1..=MAX_STARTS {
+        // The noise is scaled to the median, which is robust to outliers, before these are rejected.
+        for round in 1..=MAX_UNGATED_STEPS {
             let pass_options = PassOptions { innovations: true, gate: OutlierGate::Off, ..PassOptions::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &basis)?;
@@ -176,9 +157,12 @@ pub(crate) fn fit_from(
             }
             let middle = squares.len() / 2;
             let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            noise = noise.scaled((*median / CHI_SQUARE_MEDIAN).clamp(1e-6, 1e6), MIN_SIGMA * MIN_SIGMA);
-            // A long way with few measurements bends the path: while steps are large, every measurement would be taken for an outlier.
-            if round >= MIN_STARTS && moved < 1.0 {
+            noise = noise.scaled(
+                (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
+                MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
+            );
+            // Where steps are large, a long path with few measurements makes all of them look like outliers.
+            if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
                 break;
             }
         }
@@ -190,9 +174,9 @@ pub(crate) fn fit_from(
     };
     let (mut converged, mut left_basin, mut first) = (false, false, None);
     let (mut damping, mut acceleration) = (StepDamping::default(), Acceleration::default());
-    let keep = Selection::has_long_legs(selections);
+    let keep = Selection::has_long_propagations(selections);
     let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
-    // How far the model has come from where propagation intervals were kept: squares of its steps.
+    // Squared distance of the model from that of the cached propagations.
     let mut moved_since_cached = 0.0;
     for _ in 0..options.max_steps {
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
@@ -200,47 +184,47 @@ pub(crate) fn fit_from(
         let mean = MeanStep::of(&found, options, &basis)?;
         let of_noise = if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
         let columns = options.columns.len();
-        let tamed = damping.tamed(of_noise.by);
-        let own = if acceleration.engages(Size { mean: mean.squared, noise: of_noise.by.amax() }) {
+        let damped = damping.damped(of_noise.by);
+        let own = if acceleration.engages(StepSize { mean: mean.squared, noise: of_noise.by.amax() }) {
             let proposed = stacked(&mean.by, &of_noise.by);
-            let by = acceleration.instead_of(&proposed, &block_diagonal(&mean.information, &of_noise.information));
+            let by = acceleration.mixed(&proposed, &block_diagonal(&mean.information, &of_noise.information));
             let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
             let (moved, own) = take_step(&mut model, &mut headings, &found, options, by.rows(0, columns).into_owned())?;
             acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut noise, by_noise)));
             own
         } else {
-            take_noise_step(&mut noise, tamed);
+            take_noise_step(&mut noise, damped);
             take_step(&mut model, &mut headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
-        left_basin |= moved > FAR.max(*first.get_or_insert(moved));
-        // By kept propagation intervals steps only seem to settle: driven ones have the last word, where the model has gone on since.
+        left_basin |= moved > LEFT_BASIN_STEP.max(*first.get_or_insert(moved));
+        // Convergence with cached propagations is confirmed by integrated ones, unless the model has hardly
+        // moved since.
         moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
-        let mean_settled = if confirms { CONFIRMED } else { SETTLED };
+        let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
         let settles = match options.ends {
             ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
-            ConvergenceCriterion::Likelihood => moved < MEAN_COST && of_noise.squared() < NOISE_COST,
+            ConvergenceCriterion::Likelihood => {
+                moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE
+            }
         };
         if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
             (converged, cached) = (true, cached.or(found.cached.take()));
             break;
         }
-        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < NEAR) };
+        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < CACHED_STEP) };
         confirms = settles;
     }
-    // The last step was so small that propagation intervals follow it as if they were driven.
+    // After so small a step cached propagations are as good as integrated ones.
     let by = cached.as_ref().filter(|_| converged);
     let pass_options =
         PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
-    Ok(Fit { model, noise, free_headings: headings, pass, converged, left_basin })
+    Ok(Solution { model, noise, free_headings: headings, pass, converged, left_basin })
 }
 
-/// The largest turn of a start heading that is still to be followed: it is followed to first order anyway.
-const HEADING_SETTLED_RAD: f64 = 1e-6;
-
-/// A pass at given values of what is common to all, and the instruments for which it is: start headings that nobody saw, and instruments that runs have for
-/// themselves, are followed until they settle; nothing else moves.
+/// A pass at given common values, and its model: start headings that are not measured, and the instruments of
+/// single runs, are iterated until they converge; nothing else moves.
 pub(crate) fn pass_settled(
     records: &Records<'_>,
     selections: &[Selection],
@@ -254,7 +238,7 @@ pub(crate) fn pass_settled(
         let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
         let mut next = model.clone();
         let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
-        if (turned < HEADING_SETTLED_RAD && own < SETTLED) || round == MAX_STARTS {
+        if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
             return Ok((model, found));
         }
         model = next;
@@ -262,7 +246,8 @@ pub(crate) fn pass_settled(
     Err(EstimationError::Diverges)
 }
 
-/// A pass at given values, with its innovations; free headings are those of segments whose instrument sees none, one for each segment.
+/// A pass at given values, with its innovations. `free_headings` has one start heading for each segment,
+/// radians; it is used where headings are not measured.
 #[must_use]
 pub fn pass_with_innovations(
     records: &Records<'_>,
@@ -302,7 +287,7 @@ impl MeanStep {
             return Ok(Self { by: DVector::zeros(options.columns.len()), information: system.matrix, squared: 0.0 });
         }
         let reduced = system.along(basis);
-        let damping = reduced.matrix.diagonal().map(|information| DAMPING * information + MIN_INFORMATION);
+        let damping = reduced.matrix.diagonal().map(|information| RELATIVE_DAMPING * information + ABSOLUTE_DAMPING);
         let damped = reduced.clone().with_precision(damping.iter().copied());
         let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
         let squared = (step.transpose() * &reduced.matrix * &step)[0];
@@ -310,8 +295,8 @@ impl MeanStep {
     }
 }
 
-/// Moves the mean by a step, and the start headings and instruments that follow it; returns what was moved by in the end, and the squared length, over its variance,
-/// of what groups' own instruments moved by.
+/// Moves the mean by a step, with the start headings and the groups' instruments. Returns the step as it was
+/// taken, and the squared step of the groups' instruments over its variance.
 fn take_step(
     model: &mut Model,
     headings: &mut [f64],
@@ -321,33 +306,34 @@ fn take_step(
 ) -> Result<(DVector<f64>, f64), EstimationError> {
     let mut moved = vec![0.0; found.runs.first().ok_or(EstimationError::NoMeasurements)?.gradient.len()];
     for (column, by) in options.columns.iter().zip(step.iter_mut()) {
-        // A drive that a step makes a half or twice as large is none; the next step goes on.
-        *by = if Column::GEOMETRY.contains(column) { by.clamp(-0.5, 0.5) } else { *by };
+        // The next step goes on where this one is cut.
+        *by = if Column::GEOMETRY.contains(column) { by.clamp(-MAX_GEOMETRY_STEP, MAX_GEOMETRY_STEP) } else { *by };
         if !by.is_finite() {
             return Err(EstimationError::Diverges);
         }
         model.advance(*column, *by);
         moved[column.index()] = *by;
     }
-    let own_steps: Vec<DVector<f64>> = found.own.iter().map(|follow| follow.step(&options.columns, &step)).collect();
+    let own_steps: Vec<DVector<f64>> =
+        found.own.iter().map(|response| response.step(&options.columns, &step)).collect();
     for FreeHeading { segment, run, rest, by } in &found.headings {
-        let mut follows: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
+        let mut shift: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
         if let Some(own) = &model.own
-            && let Some(at) = found.own.iter().position(|follow| follow.group == own.grouping.group(*run))
+            && let Some(at) = found.own.iter().position(|response| response.group == own.grouping.group(*run))
         {
-            follows += own
+            shift += own
                 .columns
                 .iter()
                 .zip(own_steps[at].iter())
                 .map(|(column, step)| by[column.index()] * step)
                 .sum::<f64>();
         }
-        headings[*segment] += rest + follows;
+        headings[*segment] += rest + shift;
     }
     let mut size = 0.0;
-    for (follow, by) in found.own.iter().zip(&own_steps) {
-        size += follow.squared(by);
-        model.advance_own(follow.group, by);
+    for (response, by) in found.own.iter().zip(&own_steps) {
+        size += response.squared(by);
+        model.advance_own(response.group, by);
     }
     Ok((step, size))
 }
@@ -371,9 +357,9 @@ impl NoiseStep {
         let Some(mut by) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else {
             return Self::none();
         };
-        // What stands at its floor does not move.
+        // A variance at its lower bound does not fall.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
-            if variance <= MIN_SIGMA * MIN_SIGMA {
+            if variance <= MIN_NOISE_SIGMA * MIN_NOISE_SIGMA {
                 *by = by.max(0.0);
             }
         }
@@ -386,7 +372,8 @@ impl NoiseStep {
     }
 }
 
-/// How much of its step each logarithm of a variance takes: where the data are not as the model says, scoring overshoots, and half steps settle.
+/// Share of its scoring step that the logarithm of each variance takes: scoring overshoots where the model is
+/// wrong, and shorter steps converge.
 #[derive(Debug, Clone, Copy)]
 struct StepDamping {
     last: Vector4<f64>,
@@ -401,10 +388,13 @@ impl Default for StepDamping {
 
 impl StepDamping {
     /// The step to take instead of `step`.
-    fn tamed(&mut self, step: Vector4<f64>) -> Vector4<f64> {
+    fn damped(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
-            self.share[k] =
-                if step[k] * self.last[k] < 0.0 { 0.5 * self.share[k] } else { (1.3 * self.share[k]).min(1.0) };
+            self.share[k] = if step[k] * self.last[k] < 0.0 {
+                STEP_DECREASE * self.share[k]
+            } else {
+                (STEP_INCREASE * self.share[k]).min(1.0)
+            };
         }
         self.last = step;
         step.component_mul(&self.share)
@@ -413,10 +403,10 @@ impl StepDamping {
 
 /// Moves the noise, by so much at the most; returns by how much.
 fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
-    let by = by * (LARGEST_NOISE_STEP / by.amax()).min(1.0);
+    let by = by * (MAX_NOISE_STEP / by.amax()).min(1.0);
     let before = *noise;
     for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
-        *variance = (*variance * by.exp()).max(MIN_SIGMA * MIN_SIGMA);
+        *variance = (*variance * by.exp()).max(MIN_NOISE_SIGMA * MIN_NOISE_SIGMA);
     }
     Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
 }
@@ -434,7 +424,8 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all
 }
 
-/// The heading with which a segment that is seen without one starts, roughly: the turn that lays its reckoned path onto what was seen.
+/// Approximate start heading of a segment without measured headings, radians: the rotation of its
+/// dead-reckoned path onto the measured one.
 pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
     let Some(first) = segment
         .measurements
@@ -454,11 +445,11 @@ pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
         dot += pose.x_m * x_m + pose.y_m * y_m;
         cross += pose.x_m * y_m - pose.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));
-        // Reckoning is good at the start; half a metre of way shows the heading to a degree.
-        if longest_m > 0.5 || heading_rad == 0.0 {
+        // Dead reckoning is best near the start.
+        if longest_m > START_HEADING_BASELINE_M || heading_rad == 0.0 {
             heading_rad = unwrap_near(cross.atan2(dot), 0.0);
         }
-        if longest_m > 0.5 {
+        if longest_m > START_HEADING_BASELINE_M {
             break;
         }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, Innovation, NoiseScore, PassOptions};
+use crate::filter::{Filter, InnovationComponent, NoiseScore, PassOptions};
 use crate::group_extrinsics::GroupResponse;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
@@ -13,10 +13,8 @@ use crate::normal_equations::NormalEquations;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
 use crate::records::{Records, Segment, Start};
+use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
-
-/// From so many intervals of propagation intervals on, or kept propagation intervals, which take a millisecond, runs are filtered on all cores; without terms, all segments.
-pub(super) const PROPAGATIONS_AT_ONCE: usize = 4096;
 
 /// The result of a pass.
 #[derive(Debug, Clone)]
@@ -24,27 +22,27 @@ pub struct Pass {
     /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
     pub runs: Vec<NormalEquations>,
     /// The whitened innovations, phase by phase, in the order of segments and measurements.
-    pub innovations: Vec<Vec<Innovation>>,
-    /// Measurements left out as outliers in the first phase: segment and look.
+    pub innovations: Vec<Vec<InnovationComponent>>,
+    /// Outliers of the first phase: segment and measurement.
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
     pub(crate) noise: NoiseScore,
-    /// How the free headings of segments without one follow a step of the parameters.
+    /// Response of the free start headings to a step of the parameters.
     pub(crate) headings: Vec<FreeHeading>,
-    /// How the instruments that groups have for themselves follow one.
+    /// Response of the groups' own instruments to one.
     pub(crate) own: Vec<GroupResponse>,
-    /// The propagation intervals, where they are to be kept.
+    /// The propagations, where they were recorded.
     pub(crate) cached: Option<CachedPropagation>,
 }
 
-/// How the free start heading of a segment follows a step of the parameters.
+/// Response of a segment's free start heading to a step of the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct FreeHeading {
     pub(crate) segment: usize,
     pub(crate) run: (usize, usize),
-    /// Without one.
+    /// Its own step, radians.
     pub(crate) rest: f64,
-    /// By each column.
+    /// Its step by each column.
     pub(crate) by: Vec<f64>,
 }
 
@@ -109,7 +107,7 @@ pub(crate) fn pass(
             let mut found = Vec::with_capacity(segments.len());
             for number in segments.clone() {
                 let unobservable = propagations[number].is_empty();
-                // Terms remember what was driven on the way to the next displacement, seen or not.
+                // The state of terms goes on over displacements that are not taken.
                 let remember = !terms.is_empty() && pass_options.by.is_none();
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
@@ -126,7 +124,7 @@ pub(crate) fn pass(
         let work = |propagation: &PropagationInterval| {
             if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
         };
-        let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= PROPAGATIONS_AT_ONCE;
+        let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= MIN_PARALLEL_WORK;
         let found: Vec<Vec<OfSegment>> = if at_once && terms.is_empty() {
             let of = |number: usize| {
                 (!propagations[number].is_empty())
@@ -139,7 +137,7 @@ pub(crate) fn pass(
             };
             runs.iter().zip(&mut result.runs).map(in_run).collect()
         } else if at_once {
-            // Chains of a run follow each other, and terms remember; each run starts anew.
+            // Segments of a run follow each other, as terms have a state; each run starts anew.
             let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>,
                           (segments, equations): (&Range<usize>, &mut NormalEquations)| {
                 of_run(segments, equations, terms)
@@ -177,7 +175,7 @@ pub(crate) fn pass(
     result
 }
 
-/// The segments of each run, which follow each other.
+/// The segments of each run, which are consecutive.
 fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
     let mut start = 0;
     let of = |segments: &[Segment<'_>]| {
@@ -188,11 +186,11 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
     segments.chunk_by(|a, b| a.run == b.run).map(of).collect()
 }
 
-/// What one segment says in one phase, beside its normal equation.
+/// What one segment gives in one phase, beside its normal equation.
 struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,
-    innovations: Vec<Innovation>,
+    innovations: Vec<InnovationComponent>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
     cached: Option<SegmentCache>,

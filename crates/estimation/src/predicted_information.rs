@@ -1,7 +1,8 @@
-//! The likelihood of runs that nobody has driven yet: what they would say of the parameters, and how surely dead reckoning would end where it should.
+//! Predicted information of planned runs: on the parameters, and the variance of where dead reckoning ends.
 //!
-//! Information needs a path and instants of measurements, no measured values: a fitted model, or a nominal one, with records made up along a program gives the normal
-//! equation that driving it would add (to first order; Atkinson & Donev 1992, optimum designs for models linear in their parameters).
+//! Information needs a path and the instants of measurements, not their values. A fitted or nominal model
+//! with synthetic records of a program gives, to first order, the normal equation that the program would add.
+//! Reference: Atkinson & Donev 1992 (optimum designs for models linear in their parameters).
 
 use dataset::Session;
 use nalgebra::{Matrix3, Vector3};
@@ -9,42 +10,54 @@ use nalgebra::{Matrix3, Vector3};
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::noise::Noise;
-use crate::optimizer::{ConvergenceCriterion, Fit, NOISE_SETTLED, start_heading};
+use crate::optimizer::{ConvergenceCriterion, Solution, start_heading};
 use crate::pass::Pass;
+use crate::settings::NOISE_STEP_TOLERANCE;
 use crate::thinning::Selection;
 
 impl<'a> ModelFit<'a> {
-    /// A model with its noise on records that it was not fitted to; the three geometry parameters are free.
+    /// A model and its noise on records that it was not fitted to; the three geometry parameters are free.
     #[must_use]
     pub fn from_parameters(model: Model, noise: Noise, sessions: &[Session<'a>]) -> Self {
-        let fit =
-            Self::before_any_step(sessions, model.clone(), ConvergenceCriterion::NoiseShare(NOISE_SETTLED), false);
+        let fit = Self::before_any_step(
+            sessions,
+            model.clone(),
+            ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
+            false,
+        );
         let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
-        let reused = Fit { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
-        Self { fit: reused, ..fit }
+        let reused =
+            Solution { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
+        Self { solution: reused, ..fit }
     }
 }
 
 impl ModelFit<'_> {
-    /// The same model on records of other runs, its further terms without size: their measurements are taken as this fit takes its own.
+    /// The same model on records of planned runs, with its terms at zero. Measurements are thinned as in this
+    /// fit.
     #[must_use]
     pub fn on_planned_runs<'b>(&self, sessions: &[Session<'b>]) -> ModelFit<'b> {
-        let model =
-            Model { term_values: vec![0.0; self.fit.model.term_values.len()], own: None, ..self.fit.model.clone() };
-        let mut foreseen = ModelFit::from_parameters(model, self.fit.noise, sessions);
-        foreseen.selections = Selection::of(&foreseen.records, self.thinning, &self.nominal).into();
-        foreseen.thinning = self.thinning;
-        foreseen.nominal = self.nominal.clone();
-        foreseen.columns = self.columns.clone();
-        foreseen
+        let model = Model {
+            term_values: vec![0.0; self.solution.model.term_values.len()],
+            own: None,
+            ..self.solution.model.clone()
+        };
+        let mut planned = ModelFit::from_parameters(model, self.solution.noise, sessions);
+        planned.selections = Selection::of(&planned.records, self.thinning, &self.nominal).into();
+        planned.thinning = self.thinning;
+        planned.nominal = self.nominal.clone();
+        planned.columns = self.columns.clone();
+        planned
     }
 
-    /// For each segment of two measurements, how dead reckoning from the first scatters about the second by the noise alone: variances along, across (m²) and of the
-    /// heading (rad²) in the frame of the second look, both measurements' errors included. In the order of [`Self::dead_reckoned`] where every segment is such a one.
+    /// Variances of dead reckoning from the first measurement of a segment about its second, by noise alone:
+    /// along and across (m²) and of the heading (rad²), in the frame of the second measurement. Both
+    /// measurements' errors are included. Segments of other than two measurements are left out; the order is
+    /// that of [`Self::dead_reckoned`].
     #[must_use]
     pub fn end_variances(&self) -> Vec<Vector3<f64>> {
         let Some(selection) = self.selections.first() else { return Vec::new() };
-        let [wheel, turn, xy, theta] = self.fit.noise.variance;
+        let [wheel, turn, xy, theta] = self.solution.noise.variance;
         let measurements = Vector3::new(xy, xy, theta);
         selection
             .propagations

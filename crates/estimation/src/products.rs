@@ -1,21 +1,23 @@
-//! The sums of a segment's innovations, and the elimination of a start heading that nobody saw.
+//! The sums of a segment's innovations, and the elimination of a start heading that is not measured.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::normal_equations::NormalEquations;
+use crate::settings::MIN_VARIANCE_PRODUCT;
 
-/// Which columns' products a normal equation has. Outer products grow with the square of the columns; candidates that are tested one by one need none with
-/// each other.
+/// Which columns' products a normal equation has. Outer products grow with the square of the columns;
+/// candidates that are tested one by one need none with each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Products {
-    /// So many columns come first, which have products with all.
+    /// Number of the first columns, which have products with all.
     common: usize,
     /// For each further column, the first of those of its part: it has products with these.
     first: Vec<usize>,
 }
 
 impl Products {
-    /// Of so many columns, the last of which come in parts: those of a part have products with what comes before all parts, and with each other.
+    /// Of so many columns, the last of which come in parts: those of a part have products with what comes
+    /// before all parts, and with each other.
     pub(crate) fn of(columns: usize, parts: &[usize]) -> Self {
         let common = columns - parts.iter().sum::<usize>();
         let mut first = Vec::new();
@@ -25,9 +27,6 @@ impl Products {
         Self { common, first }
     }
 }
-
-/// A product of variances is kept within this and its inverse: the next factor, of 10⁻¹⁰⁰ at the least, leaves it a number.
-const MIN_PRODUCT: f64 = 1e-200;
 
 /// Normal equation of one segment, its free heading last.
 pub(crate) struct Sums<'p> {
@@ -39,7 +38,8 @@ pub(crate) struct Sums<'p> {
     own: Vec<f64>,
     gradient: Vec<f64>,
     chi_square: f64,
-    /// Logarithms of variances, and a product of some that is still to be taken: a logarithm of many costs no more than one of one.
+    /// Sum of the logarithms of variances, and a product whose logarithm is still to be added: one logarithm
+    /// serves many.
     log_det: f64,
     det: f64,
     count: f64,
@@ -100,7 +100,7 @@ impl<'p> Sums<'p> {
         }
         self.chi_square += v * v * per_s;
         self.det *= s;
-        if !(MIN_PRODUCT..=MIN_PRODUCT.recip()).contains(&self.det) {
+        if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
             self.log_det += self.det.ln();
             self.det = 1.0;
         }
@@ -125,7 +125,8 @@ impl<'p> Sums<'p> {
         information
     }
 
-    /// The normal equation with the free heading at its best, and how that follows the others: at rest, and by each column.
+    /// The normal equation with the free heading eliminated, and the heading's response: its own step, and
+    /// that by each column.
     pub(crate) fn eliminated(&self, run: (usize, usize), columns: usize) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
         let mut equations = NormalEquations {
             run,

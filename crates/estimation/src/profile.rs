@@ -1,7 +1,10 @@
-//! Profile intervals: how far a parameter can be moved, with everything else at its best, before the likelihood falls by what chance explains.
+//! Profile-likelihood intervals: the values of a parameter at which the likelihood, maximised over all
+//! others, falls by a given amount.
 //!
-//! Where the cost is no parabola (few measurements, an instrument whose place trades against the wheels) they lie lopsided about the estimate, as they should.
-//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an interval by less than a part in the number of measurements.
+//! Where the cost is no parabola (few measurements, a sensor position that is correlated with the wheels)
+//! they are asymmetric about the estimate.
+//! Reference: Venzon & Moolgavkar 1988. The noise is held at its estimate: its own profile would widen an
+//! interval by less than a part in the number of measurements.
 
 use nalgebra::DVector;
 
@@ -10,22 +13,17 @@ use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::normal_equations::NormalEquations;
 use crate::optimizer::{FitOptions, fit_from};
-
-/// Half of χ² with one degree of freedom at 95 %: the rise of the cost at the ends of an interval.
-pub const RISE_95: f64 = 1.920_729;
-
-/// An end is found when the cost is right to this share of its rise, which is a thousandth of a standard deviation.
-const RIGHT: f64 = 2e-3;
-const MAX_STEPS: u32 = 30;
+use crate::settings::{MAX_PROFILE_STEPS, MIN_PROFILE_RISE, PROFILE_RISE_TOLERANCE};
 
 impl ModelFit<'_> {
-    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by `rise` ([`RISE_95`]).
+    /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by
+    /// `rise` ([`crate::RISE_95`]).
     ///
     /// # Errors
     /// [`EstimationError`] when the column is not free, or a refit diverges.
     pub fn profile(&self, column: Column, rise: f64) -> Result<(f64, f64), EstimationError> {
         let position = self.columns.iter().position(|of| *of == column);
-        let sigma = position.zip(self.fit.information(&self.columns)).and_then(|(position, information)| {
+        let sigma = position.zip(self.solution.information(&self.columns)).and_then(|(position, information)| {
             let (_, covariance) = information.solve()?;
             Some(covariance[(position, position)].sqrt())
         });
@@ -40,28 +38,29 @@ impl ModelFit<'_> {
     }
 
     fn cost(&self) -> f64 {
-        self.fit.pass.runs.iter().map(NormalEquations::cost).sum()
+        self.solution.pass.runs.iter().map(NormalEquations::cost).sum()
     }
 
-    /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the parabola through the last step.
+    /// The step at which the cost reaches `level`: the cost is nearly a parabola, so its root is that of the
+    /// parabola through the last step.
     fn end(&self, column: Column, position: usize, first: f64, level: f64) -> Result<f64, EstimationError> {
         let best = self.cost();
         let mut by = first;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_PROFILE_STEPS {
             let risen = self.cost_with(column, position, by)? - best;
             let wanted = level - best;
-            if (risen - wanted).abs() < RIGHT * wanted {
+            if (risen - wanted).abs() < PROFILE_RISE_TOLERANCE * wanted {
                 break;
             }
-            // A cost that hardly rises is followed outwards by no more than a factor of two at a time.
-            by *= (wanted / risen.max(0.25 * wanted)).sqrt();
+            // A cost that rises little moves the end outwards by a factor of two at the most.
+            by *= (wanted / risen.max(MIN_PROFILE_RISE * wanted)).sqrt();
         }
         Ok(by)
     }
 
     /// The least cost with one column moved and held there.
     fn cost_with(&self, column: Column, position: usize, by: f64) -> Result<f64, EstimationError> {
-        let mut from = self.here();
+        let mut from = self.current_values();
         from.model.advance(column, by);
         let mut fixed = self.fixed();
         fixed.push(DVector::from_fn(self.columns.len(), |row, _| f64::from(u8::from(row == position))));

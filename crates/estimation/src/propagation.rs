@@ -1,8 +1,9 @@
-//! What a propagation interval comes to by the counts and the terms, and what it depends on; kept from pass to pass where propagation intervals are long.
+//! The motion of a propagation interval by counts and terms, with its derivatives; cached from pass to pass
+//! where intervals are long.
 //!
-//! One of many wheel intervals takes many times as long to be driven as its measurement to be taken, and it depends on the model alone, not on the noise. Near the model
-//! at which it was driven it is, with the derivatives that it has anyway, motion + Σ ∂motion/∂p · Δp, up to squares of Δp. Steps of a fit that are small are taken by
-//! kept propagation intervals; where they end is settled by propagation intervals that are driven.
+//! Integrating many wheel intervals takes longer than taking the measurement at their end, and depends on the
+//! model alone, not on the noise. Near the model of the cache the motion is motion + Σ ∂motion/∂p · Δp, up to
+//! squares of Δp. Small steps of a fit use cached propagations; convergence is confirmed by integrated ones.
 
 use std::ops::Range;
 
@@ -23,30 +24,31 @@ pub(crate) struct Moved {
     pub(crate) by_geometry: [Vector3<f64>; 3],
 }
 
-/// Where a filter has its propagation intervals from.
+/// Where a filter has its propagations from.
 pub(crate) enum PropagationSource<'f> {
-    /// They are driven.
+    /// They are integrated.
     Integrated,
-    /// They are driven, and kept.
+    /// They are integrated, and recorded.
     Recorded(SegmentCache),
-    /// They have been kept, by a model that differs from that in force by this.
+    /// They are cached, by a model that differs from that in force by this change.
     Cached(&'f SegmentCache, &'f Change),
 }
 
-/// What the propagation intervals of a segment came to.
+/// The propagations of a segment.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentCache {
     moved: Vec<Moved>,
-    /// How many parameters the terms have.
+    /// Number of parameters of the terms.
     parameters: usize,
     /// Derivatives of each propagation interval by them.
     by_terms: Vec<Vector3<f64>>,
-    /// What they add to the measurement at the start, and to that after each propagation interval, in the frame of the body.
+    /// What they add to the measurement at the start, and to that after each propagation, in the frame of the
+    /// body.
     by_measurement: Vec<Pose>,
 }
 
 impl PropagationSource<'_> {
-    /// So many, to be driven with terms of so many parameters, and kept.
+    /// An empty recording of a number of propagations, with terms of a number of parameters.
     pub(crate) fn cached(propagations: usize, parameters: usize) -> Self {
         Self::Recorded(SegmentCache {
             moved: Vec::with_capacity(propagations),
@@ -56,7 +58,7 @@ impl PropagationSource<'_> {
         })
     }
 
-    /// Those that were kept.
+    /// The recording, if it is one.
     pub(crate) fn into_cached(self) -> Option<SegmentCache> {
         if let Self::Recorded(cached) = self { Some(cached) } else { None }
     }
@@ -72,33 +74,33 @@ impl SegmentCache {
     }
 }
 
-/// The propagation intervals of all segments, phase by phase, and the model by which they were driven.
+/// The propagations of all segments, phase by phase, and the model by which they were integrated.
 #[derive(Debug, Clone)]
 pub(crate) struct CachedPropagation {
     pub(crate) model: Model,
     pub(crate) phases: Vec<Vec<Option<SegmentCache>>>,
 }
 
-/// How a model differs from that by which propagation intervals were driven.
+/// Difference of a model from that of the cache.
 #[derive(Debug, Clone)]
 pub(crate) struct Change {
     /// Of the geometry parameters, relative: left, right, separation.
-    lengths: [f64; 3],
+    geometry: [f64; 3],
     term_values: Vec<f64>,
 }
 
 impl CachedPropagation {
-    /// How a model differs from theirs.
+    /// Difference of a model from that of the cache.
     pub(crate) fn change_to(&self, model: &Model) -> Change {
-        let lengths = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
-        let (from, to) = (lengths(&self.model), lengths(model));
+        let geometry = |of: &Model| [of.m_per_rad.left, of.m_per_rad.right, of.separation_m];
+        let (from, to) = (geometry(&self.model), geometry(model));
         Change {
-            lengths: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
+            geometry: [0, 1, 2].map(|k| f64::ln(to[k] / from[k])),
             term_values: model.term_values.iter().zip(&self.model.term_values).map(|(to, from)| to - from).collect(),
         }
     }
 
-    /// Those of a segment in a phase, for a model that differs so much.
+    /// The propagations of a segment in a phase, for a model with this difference.
     pub(crate) fn reused<'k>(&'k self, phase: usize, segment: usize, change: &'k Change) -> PropagationSource<'k> {
         self.phases[phase][segment]
             .as_ref()
@@ -106,7 +108,7 @@ impl CachedPropagation {
     }
 }
 
-/// Where the displacements of a run have led: the next one's terms go on from there.
+/// State at the end of a displacement: the terms of the next one go on from it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CarriedState {
     /// The next segment's frame in that of the first.
@@ -115,7 +117,8 @@ pub(crate) struct CarriedState {
     pub(crate) previous: Option<WheelInterval>,
 }
 
-/// The mean model along one segment: what counts and terms say of its motion, and what the terms add to its measurements. One for the filter and for dead reckoning.
+/// The mean model along one segment, for the filter and for dead reckoning: its motion by counts and terms,
+/// and what the terms add to its measurements.
 pub(crate) struct Propagator<'f, 'a> {
     segment: &'f Segment<'a>,
     pub(crate) model: &'f Model,
@@ -126,9 +129,9 @@ pub(crate) struct Propagator<'f, 'a> {
     wheel_rad: Wheels<f64>,
     previous: Option<WheelInterval>,
     continues: bool,
-    /// What the terms last said, by each of their parameters.
+    /// The terms' latest gradients, by each of their parameters.
     pub(crate) gradients: Vec<Pose>,
-    /// Where propagation intervals come from.
+    /// Where propagations come from.
     pub(crate) propagations: PropagationSource<'f>,
     /// Derivatives of the propagation interval in force by the terms' parameters.
     pub(crate) propagation_by_terms: Derivatives,
@@ -158,18 +161,18 @@ impl<'f, 'a> Propagator<'f, 'a> {
         self.continues = true;
     }
 
-    /// How far the centre went in the runs before and in this one, metres.
+    /// Distance driven in the session so far, metres.
     pub(crate) const fn session_m(&self) -> f64 {
         self.session_m
     }
 
-    /// Where this segment ended, the instrument standing at a pose of the segment's frame.
+    /// The state at the end of this segment, at a pose of the instrument in the segment's frame.
     pub(crate) fn carried(&self, chain_from_sensor: Pose) -> CarriedState {
         let run_from_chain = self.run_from_chain * chain_from_sensor;
         CarriedState { run_from_chain, session_m: self.session_m, previous: self.previous }
     }
 
-    /// Forgets what terms remember of the run before, unless the segment goes on.
+    /// Resets the state of the terms, unless the segment goes on from the one before.
     #[inline(always)]
     pub(crate) fn restart(&mut self) {
         if !self.continues {
@@ -179,14 +182,15 @@ impl<'f, 'a> Propagator<'f, 'a> {
         }
     }
 
-    /// Motion of the drive's centre in an interval, per second.
+    /// Velocity of the drive's centre in an interval.
     #[inline(always)]
     pub(crate) fn twist(&self, interval: &WheelInterval) -> Twist {
         let Increment { distance_m, turn_rad } = self.model.increment(interval.wheel_rad);
         Twist { v_m_s: distance_m / interval.dt_s, omega_rad_s: turn_rad / interval.dt_s }
     }
 
-    /// What the terms add to the measurement after so many propagation intervals, at a pose of the drive's centre, in the frame of the body; it stands in [`Self::gradients`].
+    /// What the terms add to the measurement after a number of propagations, at a pose of the drive's centre,
+    /// in the frame of the body. The result is in [`Self::gradients`].
     #[inline(always)]
     pub(crate) fn measurement(&mut self, pose: Pose, propagations: usize, t_s: f64, twist: Twist) {
         if self.gradients.is_empty() {
@@ -204,7 +208,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
         }
     }
 
-    /// The motion of a propagation interval from a pose of the drive's centre, and in [`Self::propagation_by_terms`] how it depends on the terms' sizes.
+    /// The motion of a propagation interval from a pose of the drive's centre; its derivatives by the terms'
+    /// values are in [`Self::propagation_by_terms`].
     #[inline(always)]
     pub(crate) fn moved(&mut self, pose: Pose, number: usize, propagation: &PropagationInterval) -> Moved {
         if let PropagationSource::Cached(cached, change) = self.propagations {
@@ -226,7 +231,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             motion.y_m += by.y * change;
             motion.theta_rad += by.z * change;
         };
-        by_geometry.iter().zip(change.lengths).for_each(|(by, change)| add(*by, change));
+        by_geometry.iter().zip(change.geometry).for_each(|(by, change)| add(*by, change));
         let by_terms = &cached.by_terms[number * cached.parameters..][..cached.parameters];
         for (column, (by, change)) in by_terms.iter().zip(&change.term_values).enumerate() {
             add(*by, *change);
@@ -254,7 +259,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
         let mut moved = Moved { motion: Pose::IDENTITY, by_geometry: [Vector3::zeros(); 3] };
         self.propagation_by_terms.clear();
         let run_from_start = Frame::from(self.run_from_chain * pose);
-        // Those of terms that are only tested have no size, and there are many.
+        // Terms that are only tested are many, and have the value zero.
         let sized = self.model.term_values.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
         for interval in &self.segment.intervals[propagation.intervals.clone()] {
             let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -263,7 +268,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             let half_rad = 0.5 * turn_rad;
             let (sin, cos) = sin_cos(before.theta_rad + half_rad);
             let chord = sinc(half_rad);
-            // In the frame of the step's middle; a turn acts on half of the way.
+            // In the frame of the step's middle; a turn acts on half of the distance.
             let middle = |g: &Pose, by_turn: &Vector3<f64>| {
                 Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
             };
@@ -291,7 +296,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 *by = turned(*by, step) + of_step;
             }
             moved.motion = Pose::new(before.x_m + step.x, before.y_m + step.y, before.theta_rad + step.z);
-            // As if the rest of the propagation interval led back to its start: one turn at the end of the propagation interval then does for those of all intervals.
+            // As if the rest of the interval led back to its start: one turn at the end then does for all
+            // steps.
             let by_turn = by_turn + Vector3::new(moved.motion.y_m, -moved.motion.x_m, 0.0);
             let propagations = self
                 .propagation_by_terms
@@ -313,7 +319,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
         moved
     }
 
-    /// The pose of the drive's centre after some intervals, by exact arcs of what counts and terms say together; without derivatives.
+    /// The pose of the drive's centre after some intervals, by exact arcs of counts and terms together;
+    /// without derivatives.
     pub(crate) fn dead_reckon(&mut self, mut pose: Pose, intervals: Range<usize>) -> Pose {
         let Model { m_per_rad, separation_m, .. } = *self.model;
         for interval in &self.segment.intervals[intervals] {
@@ -330,7 +337,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
         pose
     }
 
-    /// What the terms last said, at their parameters' values.
+    /// The sum of the terms' latest gradients, times their values.
     pub(crate) fn sum_of_terms(&self) -> Pose {
         self.gradients.iter().zip(&self.model.term_values).fold(Pose::IDENTITY, |sum, (gradient, size)| {
             Pose::new(
@@ -363,7 +370,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
     }
 }
 
-/// A derivative carried over a step: a heading that is off turns what comes after.
+/// A derivative carried over a step: a heading error turns the motion after it.
 #[inline(always)]
 fn turned(by: Vector3<f64>, step: Vector3<f64>) -> Vector3<f64> {
     Vector3::new(by.x - step.y * by.z, by.y + step.x * by.z, by.z)

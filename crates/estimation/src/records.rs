@@ -1,32 +1,30 @@
-//! Runs as segments: how the wheels turned, cut at the instants at which the instrument looked, and what it saw.
+//! Runs as segments: how the wheels turned between measurements, and what the instrument measured.
 //!
-//! Poses and positions make one segment a run and start free at its first measurement; where the log does not reach from one measurement to the next, a new segment begins. A
-//! displacement is a segment of its own: it starts where the instrument stood, which is known exactly in its own frame. Displacements that follow each other
-//! lead through the run: what goes with the heading in the room, or remembers, goes on from one to the next.
+//! Poses and positions make one segment a run, with a free start at the first measurement. A gap of the log
+//! between two measurements begins a new segment. A displacement is a segment of its own, which starts at the
+//! origin of its own frame. Displacements of a run go on from each other: the heading in the room and the
+//! state of terms are carried from one to the next.
 
 use dataset::{Run, RunInfo, Session, TruthSample};
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
-use crate::wheel_angles::{SAME_INSTANT_S, WheelAngleInterpolator, WheelInterval};
+use crate::settings::{
+    AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S,
+};
+use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
-/// A motion whose chord is less than this share of its way hardly shows where it went.
-const MIN_CHORD: f64 = 0.3;
-
-/// Errors of displacements that are worth finding last for about three of them: e^(−1/3) is 0.7.
-const FADES: f64 = 0.7;
-
-/// What the instrument saw.
+/// A pose that the instrument measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MeasuredPose {
     pub(crate) t_s: f64,
     pub(crate) x_m: f64,
     pub(crate) y_m: f64,
     pub(crate) theta_rad: Option<f64>,
-    /// How many intervals of the segment end before it.
+    /// Number of intervals of the segment before it.
     pub(crate) after: usize,
-    /// Variances of position and heading over those of a measurement without a stated precision of its own.
+    /// Variances of position and heading, over those of a measurement that states none of its own.
     pub(crate) variance_factor: [f64; 2],
 }
 
@@ -53,24 +51,25 @@ pub struct Segment<'a> {
     pub(crate) measurements: Vec<MeasuredPose>,
     /// Angle of each wheel at the first interval, by its counter, radians.
     pub(crate) wheel_rad: Wheels<f64>,
-    /// What the session's runs drove before, metres by nominal values.
+    /// Distance driven in the session before, metres, by nominal values.
     pub(crate) session_m: f64,
 }
 
 impl Segment<'_> {
-    /// It is a displacement: the instrument says how it moved between two instants, not where it is.
+    /// Is it a displacement, which measures a motion between two instants instead of a pose?
     #[must_use]
     pub fn is_displacement(&self) -> bool {
         self.start == Start::Origin
     }
 
-    /// Do what this segment and the next hold belong to one series, in which an instrument's errors may last? Displacements of one run do; poses of two segments have
-    /// a gap between them that no counts lead over.
+    /// Are this segment and the next of one series, in which errors may be autocorrelated? Displacements of
+    /// one run are; poses of two segments have a gap between them.
     pub(crate) fn is_in_series_with(&self, next: &Self) -> bool {
         self.is_displacement() && next.is_displacement() && self.run == next.run
     }
 
-    /// For each measurement, when the measurement before was and how far each wheel turned since, radians; for a first measurement that nothing leads to, nothing.
+    /// For each measurement the time of the one before, seconds, and how far each wheel turned since,
+    /// radians; no turn for a first measurement.
     #[must_use]
     pub fn since_previous_measurement(&self) -> Vec<(f64, Wheels<f64>)> {
         let start_s = match self.start {
@@ -88,18 +87,17 @@ impl Segment<'_> {
         self.measurements.iter().map(of).collect()
     }
 
-    /// For each measurement, whether a wheel changed its speed since the measurement before, or in the half second before this one where that is longer, by more than a fifth of the
-    /// fastest that either went in the segment.
+    /// For each measurement, whether a wheel changed its speed since the measurement before, or within
+    /// `SPEED_CHANGE_WINDOW_S` where that is longer, by more than `SPEED_CHANGE_RATIO` of the fastest
+    /// speed in the segment.
     #[must_use]
     pub fn changes_of_speed(&self) -> Vec<bool> {
-        const BEFORE_S: f64 = 0.5;
-        const SHARE: f64 = 0.2;
         let speed = |interval: &WheelInterval| {
             interval.wheel_rad.map(|rad| if interval.dt_s > 0.0 { rad / interval.dt_s } else { 0.0 })
         };
         let fastest = self.intervals.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
         let changes = |(measurement, (before_s, _)): (&MeasuredPose, (f64, Wheels<f64>))| {
-            let from_s = (measurement.t_s - BEFORE_S).min(before_s);
+            let from_s = (measurement.t_s - SPEED_CHANGE_WINDOW_S).min(before_s);
             let near = self.intervals[..measurement.after]
                 .iter()
                 .rev()
@@ -110,12 +108,13 @@ impl Segment<'_> {
                 high = high.zip_with(of, f64::max);
             }
             let change = high.zip_with(low, |high, low| high - low);
-            change.left.max(change.right) > SHARE * fastest
+            change.left.max(change.right) > SPEED_CHANGE_RATIO * fastest
         };
         self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
     }
 
-    /// The pose of the first measurement, with its time and the intervals before it, and the time and the pose of the last; `None` where a measurement has no heading.
+    /// The first measured pose with its time and the number of intervals before it, and the time and pose of
+    /// the last; `None` where a heading is missing.
     #[allow(clippy::type_complexity)]
     pub(crate) fn ends(&self) -> Option<(Pose, (f64, usize), (f64, Pose))> {
         let pose =
@@ -160,8 +159,8 @@ pub struct Records<'a> {
 }
 
 impl<'a> Records<'a> {
-    /// The segments of sessions. Standard deviations that rows state for themselves weigh relative to that of the instrument: what the first session states, or what is
-    /// plausible.
+    /// The segments of sessions. Standard deviations that rows state count relative to that of the
+    /// instrument: the one that the first session states, or the prior.
     #[must_use]
     pub fn of(sessions: &[Session<'a>]) -> Self {
         let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
@@ -205,19 +204,19 @@ impl<'a> Records<'a> {
         records
     }
 
-    /// The records of a part of one run, as those of that run among others.
+    /// The records of a part of a run, under the indices of that run.
     pub(crate) fn belonging_to(mut self, run: (usize, usize)) -> Self {
         self.segments.iter_mut().for_each(|segment| segment.run = run);
         self
     }
 
-    /// How many looks there are, starts left out.
+    /// How many measurements there are.
     #[must_use]
     pub fn measurements(&self) -> usize {
         self.segments.iter().map(|segment| segment.measurements.len()).sum()
     }
 
-    /// How far a wheel goes from measurement to measurement by a model, on average, metres.
+    /// Mean distance that a wheel rolls between measurements, metres, by a model.
     #[must_use]
     pub fn distance_between_measurements_m(&self, model: &Model) -> f64 {
         let of = |interval: &WheelInterval| {
@@ -229,19 +228,21 @@ impl<'a> Records<'a> {
         distance_m / measurements
     }
 
-    /// When a measurement of a segment was, seconds from the run's start.
+    /// Time of a measurement of a segment, seconds from the run's start.
     #[must_use]
     pub fn measurement_s(&self, segment: usize, measurement: usize) -> Option<f64> {
         Some(self.segments.get(segment)?.measurements.get(measurement)?.t_s)
     }
 
-    /// Final errors of dead reckoning in a run, from the first measurement of each segment to its last: of the position, metres, and of the heading, radians.
+    /// Final errors of dead reckoning in a run, from the first measurement of each segment to its last: of
+    /// the position, metres, and of the heading, radians.
     pub(crate) fn end_errors(&self, run: (usize, usize), model: &Model) -> impl Iterator<Item = (f64, f64)> {
         self.segments.iter().filter(move |segment| segment.run == run).filter_map(|segment| segment.end_error(model))
     }
 
-    /// The heading of the instrument on the robot, roughly, from the directions in which it and the wheels say that the robot went between measurements, each weighed
-    /// by its length; a spin has none, and an arc errs as much one way as its mirror image the other.
+    /// Approximate heading of the sensor on the robot, radians: from the directions of the measured and the
+    /// dead-reckoned motions between measurements, weighted by length. A spin has no direction; arcs to both
+    /// sides cancel.
     pub(crate) fn sensor_heading_rad(&self, model: &Model) -> f64 {
         let (mut dot, mut cross) = (0.0, 0.0);
         for segment in &self.segments {
@@ -260,8 +261,8 @@ impl<'a> Records<'a> {
                         distance_m += increment.distance_m.abs();
                         moved = moved * increment.arc();
                     }
-                    // Where a loop ends, it ends by its errors: they have no direction.
-                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD * distance_m {
+                    // The end of a loop has no direction but that of its errors.
+                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD_RATIO * distance_m {
                         let measured = measured.to(pose);
                         dot += moved.x_m * measured.x_m + moved.y_m * measured.y_m;
                         cross += measured.x_m * moved.y_m - measured.y_m * moved.x_m;
@@ -273,7 +274,7 @@ impl<'a> Records<'a> {
         if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
     }
 
-    /// How far from where a segment begins the robot was seen at the most, metres; root mean square over the segments.
+    /// Largest measured distance from the start of a segment, metres; root mean square over the segments.
     #[must_use]
     pub fn extent_m(&self) -> f64 {
         let squares: f64 = self
@@ -284,32 +285,33 @@ impl<'a> Records<'a> {
                     (Start::MeasuredPose, Some(first)) => (first.x_m, first.y_m),
                     _ => (0.0, 0.0),
                 };
-                let far = segment
+                let squared_m2 = segment
                     .measurements
                     .iter()
                     .map(|measurement| (measurement.x_m - x_m).powi(2) + (measurement.y_m - y_m).powi(2));
-                far.fold(0.0, f64::max)
+                squared_m2.fold(0.0, f64::max)
             })
             .sum();
         let segments = self.segments.len().max(1) as f64;
         (squares / segments).sqrt()
     }
 
-    /// Are the measurements of two segments of one series, so that one may resemble the other: measurements of one segment, or displacements of one run?
+    /// Are two segments of one series, so that their errors may be autocorrelated?
     #[must_use]
     pub fn are_in_series(&self, segment: usize, next: usize) -> bool {
         let both = self.segments.get(segment).zip(self.segments.get(next));
         segment == next || both.is_some_and(|(segment, next)| segment.is_in_series_with(next))
     }
 
-    /// What the product of two innovations counts for whether errors last, one being so many measurements after the other. What lasts after a measurement is in the filter's state:
-    /// the next measurement shows it. Nothing follows displacements, and all that come later resemble the one before, the less the later.
+    /// Weight of a pair of innovations, `lag` measurements apart, in the test of autocorrelation. Within a
+    /// segment the filter's state carries an error on, so that lag 1 shows it. Displacements have no such
+    /// state, and all lags count, with falling weight.
     #[must_use]
     pub fn weight_of_pair(&self, segment: usize, next: usize, lag: i32) -> f64 {
         if segment == next {
             f64::from(u8::from(lag == 1))
         } else if self.are_in_series(segment, next) {
-            FADES.powi(lag - 1)
+            AUTOCORRELATION_DECAY.powi(lag - 1)
         } else {
             0.0
         }
@@ -321,20 +323,20 @@ impl<'a> Records<'a> {
         self.segments.get(segment).is_some_and(|segment| segment.continues)
     }
 
-    /// Times between measurements that follow each other, of displacements between their ends, seconds.
+    /// Times between consecutive measurements, seconds; for displacements between their ends.
     pub fn times_between(&self) -> impl Iterator<Item = f64> + '_ {
         let series = self.segments.chunk_by(Segment::is_in_series_with);
         series.flat_map(|series| {
             let ends_s: Vec<f64> =
                 series.iter().flat_map(|segment| &segment.measurements).map(|measurement| measurement.t_s).collect();
-            // Displacements may end together, or in any order; what is no time is not between.
+            // Displacements may end together, or in any order.
             let between_s = ends_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|between_s| *between_s > 0.0);
             between_s.collect::<Vec<f64>>()
         })
     }
 }
 
-/// What the instrument measured in a run, no interval before it yet.
+/// What the instrument measured in a run; intervals are not counted yet.
 fn measured_poses(run: &dataset::RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
     let Run { truth, truth_sigma, .. } = run.run();
     if truth.is_empty() {
@@ -436,7 +438,7 @@ fn add_displacements<'a>(
                 after: intervals.len(),
                 variance_factor: [1.0; 2],
             };
-            let continues = (measured.t0_s - last_s).abs() <= SAME_INSTANT_S;
+            let continues = (measured.t0_s - last_s).abs() <= TIME_TOLERANCE_S;
             last_s = measured.t1_s;
             segments.push(Segment {
                 start: Start::Origin,

@@ -1,17 +1,20 @@
-//! Which looks the likelihood takes: all, or measurements so far apart that their errors have nothing to do with each other.
+//! Which measurements the likelihood takes: all of them, or some whose errors are not autocorrelated.
 //!
-//! The errors of an instrument that tracks the robot often last for seconds: lens distortion, a marker's own frame, a filter inside. A likelihood that takes such
-//! measurements one by one believes each, and fits the wheels to the instrument's errors. Thinned measurements are honest. What the measurements in between know is not thrown away:
-//! the same is done in several phases, each shifted by a share of the spacing, and the costs are averaged (a composite likelihood; Varin, Reid & Firth 2011).
+//! The errors of a tracking instrument often last for seconds: lens distortion, the marker's frame, a filter
+//! inside. A likelihood that takes such measurements for independent fits the wheels to them. Thinning takes
+//! measurements at a spacing. It is repeated in several phases, each shifted by a share of the spacing, and
+//! the costs are averaged, so that no measurement is lost (composite likelihood).
 //!
-//! Of measurements, those in between are passed over, and the way from one taken to the next is whole. A displacement cannot be lengthened, as its instrument would err twice:
-//! displacements in between are left out, way and all. The other phases take those, all of them where each phase takes one in as many as there are phases, or more.
+//! Poses between two that are taken are passed over, and the motion between these two is whole. A
+//! displacement that is passed over is lost to its phase, with its motion; other phases take it.
+//! Reference: Varin, Reid & Firth 2011.
 
 use nalgebra::Vector3;
 
 use crate::covariances::Covariances;
 use crate::model::Model;
 use crate::records::{Records, Segment, Start};
+use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
 
 /// How measurements are thinned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,14 +30,15 @@ impl Thinning {
     pub const NONE: Self = Self { every_s: 0.0, phases: 1 };
 }
 
-/// From one measurement to the next that is taken.
+/// The motion from one measurement to the next that is taken.
 #[derive(Debug, Clone)]
 pub(crate) struct PropagationInterval {
     pub(crate) intervals: std::ops::Range<usize>,
     /// The measurement before; 0 for a displacement.
     pub(crate) from: usize,
     pub(crate) measurement: usize,
-    /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a turn noise of 1 rad²/rad.
+    /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a
+    /// turn noise of 1 rad²/rad.
     pub(crate) noise: Covariances<2>,
 }
 
@@ -46,7 +50,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// The selections of all phases.
+    /// The selections of all phases; propagation noise is that of the `nominal` drive.
     #[must_use]
     pub fn of(records: &Records<'_>, thinning: Thinning, nominal: &Model) -> Vec<Self> {
         let offset = |phase: usize| phase as f64 / thinning.phases as f64;
@@ -64,7 +68,8 @@ impl Selection {
             .collect()
     }
 
-    /// One of several blocks of each run: by its segments where it has as many, else by the measurements of each.
+    /// One of several blocks of each run: by its segments where it has as many, else by the measurements of
+    /// each.
     pub(crate) fn block(&self, records: &Records<'_>, block: usize, blocks: usize) -> Self {
         let mut propagations = vec![Vec::new(); self.propagations.len()];
         let mut first = 0;
@@ -85,19 +90,17 @@ impl Selection {
         Self { propagations }
     }
 
-    /// Whether driving the propagation intervals takes long, and longer than all else in a pass. So many intervals leave errors so small that propagation intervals follow a step of that size to first
-    /// order; where few measurements are followed over a few intervals, they need not.
-    pub(crate) fn has_long_legs(all: &[Self]) -> bool {
-        /// Pieces of a propagation interval, on average.
-        const LONG: usize = 3;
-        /// Pieces in all: some ten milliseconds.
-        const MANY: usize = 100_000;
+    /// Whether integrating the propagations takes longer than all else in a pass, so that caching them is
+    /// worth it. With that many intervals a standard deviation is so small a step that cached propagations
+    /// follow it to first order.
+    pub(crate) fn has_long_propagations(all: &[Self]) -> bool {
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
-        intervals >= MANY && intervals >= LONG * propagations().count()
+        intervals >= MIN_CACHED_INTERVALS && intervals >= MIN_INTERVALS_PER_CACHED_PROPAGATION * propagations().count()
     }
 
-    /// How many looks it takes of a series that has any, on average; starts left out. A series is a segment of measurements, or the displacements of one run.
+    /// Mean number of measurements of a series that has any, without its start. A series is a segment of
+    /// poses, or the displacements of one run.
     #[must_use]
     pub fn mean_measurements(&self, records: &Records<'_>) -> f64 {
         let (mut series, mut measurements) = (0.0, 0.0);
@@ -124,15 +127,15 @@ fn taken_of_series(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec<Vec
     }
 }
 
-/// The displacements that are taken: none ends sooner than `every_s` after the end of the one before, the first later than that of the run by a share of
-/// that. A run so short that it has none left gives its last: it is as good as that of any other.
+/// The displacements that are taken. None ends sooner than `every_s` after the one before. The first ends
+/// later than the run's first by the share `offset` of `every_s`. A run that has none left gives its last.
 fn displacements_taken(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec<Vec<usize>> {
     let end_s = |segment: &Segment<'_>| segment.measurements.first().map(|measurement| measurement.t_s);
     let mut due_s = series.first().and_then(end_s).map_or(0.0, |first_s| first_s + every_s * offset);
     let mut taken: Vec<Vec<usize>> = series
         .iter()
         .map(|segment| match end_s(segment) {
-            Some(end_s) if every_s == 0.0 || end_s >= due_s - 1e-9 => {
+            Some(end_s) if every_s == 0.0 || end_s >= due_s - TIME_TOLERANCE_S => {
                 due_s = end_s + every_s;
                 vec![0]
             }
@@ -147,8 +150,9 @@ fn displacements_taken(series: &[Segment<'_>], every_s: f64, offset: f64) -> Vec
     taken
 }
 
-/// The measurements of a segment after its first that are taken: none nearer than `every_s` to the one before, the first later by a share of that, and always the last, which takes the
-/// place of one that is too near to it.
+/// The measurements of a segment that are taken after its first. None is nearer than `every_s` to the one
+/// before, and the first is later by the share `offset` of `every_s`. The last is always taken, in the place
+/// of one that is too near to it.
 fn taken(segment: &Segment<'_>, every_s: f64, offset: f64) -> Vec<usize> {
     let (Some(start), Some(last)) = (segment.measurements.first(), segment.measurements.last()) else {
         return Vec::new();
@@ -159,7 +163,7 @@ fn taken(segment: &Segment<'_>, every_s: f64, offset: f64) -> Vec<usize> {
     let mut due_s = start.t_s + every_s * (1.0 + offset);
     let mut taken = Vec::new();
     for (number, measurement) in segment.measurements.iter().enumerate().skip(1) {
-        if measurement.t_s >= due_s - 1e-9 {
+        if measurement.t_s >= due_s - TIME_TOLERANCE_S {
             taken.push(number);
             due_s = measurement.t_s + every_s;
         }
@@ -195,7 +199,8 @@ fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<
         .collect()
 }
 
-/// The covariance of a propagation interval's motion for unit noises. It is that of the nominal drive: an estimate of the geometry parameters must not gain by what it does to covariances.
+/// Covariance of a propagation interval's motion for unit noises, by the nominal drive: the geometry must not
+/// be estimated by its effect on covariances.
 fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
     const WHEEL: usize = 0;
     const TURN: usize = 1;
@@ -208,7 +213,8 @@ fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Mod
         let (sin, cos) = (theta_rad + 0.5 * turn_rad).sin_cos();
         let (dx_m, dy_m) = (distance_m * cos, distance_m * sin);
         noise.carry(-dy_m, dx_m);
-        // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on half of the way.
+        // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on
+        // half of the distance.
         for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {
             let by_turn = side / nominal.separation_m;
             let column = Vector3::new(0.5 * (cos - dy_m * by_turn), 0.5 * (sin + dx_m * by_turn), by_turn);

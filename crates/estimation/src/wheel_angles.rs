@@ -1,16 +1,14 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
-//! An outside instrument looks when it likes. Between two rows of the log the wheels are taken to turn at constant speeds, so that every method that
-//! compares the wheels with such measurements integrates the same motion. A log whose rows jitter begins a little after its run does: half of an interval before
-//! the first row and after the last, the speeds of the interval there go on.
+//! An outside instrument has a clock of its own. Between two rows of the log the wheels are taken to turn at
+//! constant speeds, so that every method that compares the wheels with such measurements integrates the same
+//! motion. A log whose rows jitter begins a little after its run does: half of an interval before the first
+//! row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
-/// An instant may miss a row by the rounding of its file.
-pub(crate) const SAME_INSTANT_S: f64 = 1e-9;
-/// How far out of the log an instant may be, as a share of the interval there: farther, another row would have been written.
-const OUTSIDE: f64 = 0.5;
+use crate::settings::{MAX_EXTRAPOLATION, TIME_TOLERANCE_S};
 
 /// A stretch of constant wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +32,8 @@ pub struct WheelAngleInterpolator<'a> {
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
-    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a turn.
+    /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a
+    /// turn.
     ///
     /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
     #[must_use]
@@ -76,15 +75,15 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous: run.info().continuous })
     }
 
-    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does not span them, or has gaps and more than
-    /// one of its intervals lies between them.
+    /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
+    /// not span them, or has gaps and more than one of its intervals lies between them.
     #[must_use]
     pub fn steps(&self, from_s: f64, to_s: f64) -> Option<Vec<Wheels<f64>>> {
         let (first, last) = (self.row_at(from_s)?, self.row_at(to_s)?);
         let from = self.turn_at(first, from_s)?;
         let to = self.turn_at(last, to_s)?;
-        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + SAME_INSTANT_S)
-            ..self.t_s.partition_point(|t_s| *t_s < to_s - SAME_INSTANT_S);
+        let within = self.t_s.partition_point(|t_s| *t_s <= from_s + TIME_TOLERANCE_S)
+            ..self.t_s.partition_point(|t_s| *t_s < to_s - TIME_TOLERANCE_S);
         if to_s < from_s || !(self.continuous || within.is_empty()) {
             return None;
         }
@@ -98,7 +97,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some(inner.chain([to]).map(step).collect())
     }
 
-    /// Whether [`Self::steps`] says anything between two instants.
+    /// Whether the log spans two instants, as [`Self::steps`] needs it.
     #[must_use]
     pub fn spans(&self, from_s: f64, to_s: f64) -> bool {
         self.steps(from_s, to_s).is_some()
@@ -110,7 +109,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         &self.turn_rad
     }
 
-    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its twist.
+    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its
+    /// twist.
     #[must_use]
     pub const fn first_rad(&self) -> Wheels<f64> {
         self.first_rad
@@ -125,10 +125,10 @@ impl<'a> WheelAngleInterpolator<'a> {
         Wheels { left: self.turn_rad.left[row], right: self.turn_rad.right[row] }
     }
 
-    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of the outer interval where it is close outside of the
-    /// log; `None` farther out.
+    /// The row whose interval says how the wheels turned at an instant: the last at or before it, or that of
+    /// the outer interval where it is close outside of the log; `None` farther out.
     fn row_at(&self, t_s: f64) -> Option<usize> {
-        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + SAME_INSTANT_S);
+        let before = self.t_s.partition_point(|row_s| *row_s <= t_s + TIME_TOLERANCE_S);
         self.row_of(before, t_s)
     }
 
@@ -136,18 +136,18 @@ impl<'a> WheelAngleInterpolator<'a> {
     fn row_of(&self, before: usize, t_s: f64) -> Option<usize> {
         let rows_s = self.t_s;
         let last = rows_s.len() - 1;
-        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= SAME_INSTANT_S {
+        if (1..=last).contains(&before) || (t_s - rows_s[last]).abs() <= TIME_TOLERANCE_S {
             return Some(before - 1);
         }
         let (row, outside_s) =
             if before == 0 { (0, rows_s[0] - t_s) } else { (last.checked_sub(1)?, t_s - rows_s[last]) };
         let next_s = rows_s.get(row + 1).filter(|_| self.continuous)?;
-        (outside_s <= OUTSIDE * (next_s - rows_s[row])).then_some(row)
+        (outside_s <= MAX_EXTRAPOLATION * (next_s - rows_s[row])).then_some(row)
     }
 
     fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
         let since_s = t_s - self.t_s[row];
-        if since_s.abs() <= SAME_INSTANT_S {
+        if since_s.abs() <= TIME_TOLERANCE_S {
             return Some(self.row_rad(row));
         }
         let next_s = *self.t_s.get(row + 1)?;
@@ -160,7 +160,7 @@ impl<'a> WheelAngleInterpolator<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Cursor<'t, 'a> {
     track: &'t WheelAngleInterpolator<'a>,
-    /// The row of the last instant asked for.
+    /// The row of the last instant.
     row: usize,
 }
 
@@ -168,7 +168,7 @@ impl Cursor<'_, '_> {
     /// Goes to the row of an instant; false where the log does not span it.
     fn seek(&mut self, t_s: f64) -> bool {
         let rows_s = self.track.t_s;
-        let is_before = |row_s: f64| row_s <= t_s + SAME_INSTANT_S;
+        let is_before = |row_s: f64| row_s <= t_s + TIME_TOLERANCE_S;
         let mut before = if is_before(rows_s[self.row]) { self.row + 1 } else { 0 };
         while before < rows_s.len() && is_before(rows_s[before]) {
             before += 1;
@@ -186,8 +186,8 @@ impl Cursor<'_, '_> {
         self.track.turn_at(self.row, t_s)
     }
 
-    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is appended, where the log does not reach from one to the
-    /// other without a gap.
+    /// Appends the stretches of constant speed from one instant to a later one; false, and nothing is
+    /// appended, where the log does not reach from one to the other without a gap.
     pub(crate) fn intervals(&mut self, from_s: f64, to_s: f64, intervals: &mut Vec<WheelInterval>) -> bool {
         let before = intervals.len();
         let Some(mut angle) = self.angle_rad(from_s) else { return false };
@@ -200,7 +200,7 @@ impl Cursor<'_, '_> {
             intervals.push(WheelInterval { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
             (at_s, angle) = (t_s, next);
         };
-        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - SAME_INSTANT_S {
+        while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - TIME_TOLERANCE_S {
             row += 1;
             push(rows_s[row], self.track.row_rad(row), row - 1);
         }
@@ -258,11 +258,11 @@ mod tests {
     }
 
     #[test]
-    fn outside_of_the_log_and_across_gaps_nothing_is_said() {
+    fn outside_of_the_log_and_across_gaps_there_are_no_steps() {
         for (from_s, to_s) in [(-0.6, 1.0), (1.0, 5.1), (2.0, 1.0)] {
             assert_eq!(steps(ticks(), true, from_s, to_s), None, "{from_s} {to_s}");
         }
-        // Nor is anything said beside the log of what has gaps.
+        // A log with gaps is not extrapolated.
         assert_eq!(steps(ticks(), false, -0.1, 0.5), None);
         assert_eq!(steps(ticks(), false, 1.0, 2.0), Some(vec![(10.0, -10.0)]));
         assert_eq!(steps(ticks(), false, 1.2, 1.8).map(|steps| steps.len()), Some(1));

@@ -9,7 +9,8 @@ use kinematics::{Increment, Pose, Wheels};
 const RADIUS_M: f64 = 0.08;
 const SEPARATION_M: f64 = 0.363;
 
-/// Four runs of straights and bends, the left wheel 0.4 % larger than nominal, measured every second with errors of `error_m` of the row.
+/// Four runs of straights and bends, the left wheel 0.4 % larger than nominal, measured every second with
+/// errors of `error_m` of the row.
 fn dataset(error_m: impl Fn(usize) -> f64, sigma_m: impl Fn(usize) -> Option<f64>) -> Dataset {
     let run = |number: usize| {
         let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
@@ -27,7 +28,8 @@ fn dataset(error_m: impl Fn(usize) -> f64, sigma_m: impl Fn(usize) -> Option<f64
             let rad = Wheels { left: 3.0 - turn, right: 3.0 + turn };
             angles.left.push(angles.left[row] + rad.left);
             angles.right.push(angles.right[row] + rad.right);
-            // Wheels that scatter by 2 mm a row: without, their noise is next to nothing and its prior decides it.
+            // Wheels that scatter by 2 mm a row: without, their noise is next to nothing and its prior
+            // decides it.
             let slip_m = |k: f64| 2e-3 * (7.7 * (41 * number + row) as f64 + 31.1 * k).sin();
             let travel_m =
                 Wheels { left: 1.004 * RADIUS_M * rad.left + slip_m(1.0), right: RADIUS_M * rad.right + slip_m(2.0) };
@@ -56,16 +58,17 @@ fn dataset(error_m: impl Fn(usize) -> f64, sigma_m: impl Fn(usize) -> Option<f64
 /// Left diameter over nominal, and its standard deviation.
 fn left(dataset: &Dataset) -> (f64, f64) {
     let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
-    let information = fit.fit.information(&fit.columns).expect("runs");
+    let information = fit.solution.information(&fit.columns).expect("runs");
     let (_, covariance) = information.solve().expect("determined");
-    (fit.fit.model.m_per_rad.left / RADIUS_M, covariance[(0, 0)].sqrt())
+    (fit.solution.model.m_per_rad.left / RADIUS_M, covariance[(0, 0)].sqrt())
 }
 
 #[test]
 fn a_precision_that_all_rows_state_alike_changes_nothing_but_where_the_noise_is_sought() {
     let stated = left(&dataset(|_| 2e-3, |_| Some(2e-3)));
     let silent = left(&dataset(|_| 2e-3, |_| None));
-    // The logarithm of the noise is sought from ln 2 farther up, with a prior standard deviation of 2 against some hundred innovations: it moves by some 1e-3 of itself.
+    // The logarithm of the noise is sought from ln 2 farther up, with a prior standard deviation of 2 against
+    // some hundred innovations: it moves by some 1e-3 of itself.
     assert!((stated.0 - silent.0).abs() < 0.01 * silent.1, "{stated:?} {silent:?}");
     assert!((silent.0 - 1.004).abs() < 4.0 * silent.1, "{silent:?}");
 }
@@ -81,6 +84,7 @@ fn rows_that_state_a_large_error_weigh_little() {
     // Half of the rows have all but all of the information.
     assert!(honest.1 < 2.0 * good.1, "{honest:?} {good:?}");
     assert!((honest.0 - 1.004).abs() < 4.0 * honest.1, "{honest:?}");
-    // One noise for all knows the wheel less well; a fit that reads the precisions and ignores them would be this one.
+    // One noise for all knows the wheel less well; a fit that reads the precisions and ignores them would be
+    // this one.
     assert!(silent.1 > 3.0 * honest.1, "{silent:?} {honest:?}");
 }

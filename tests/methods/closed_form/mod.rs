@@ -161,7 +161,7 @@ fn late(dataset: &mut Dataset) {
     }
 }
 
-static GENERAL: Linear = Linear { form: Form::General, readings: Readings::ConvergenceCriterion };
+static GENERAL: Linear = Linear { form: Form::General, readings: Readings::EndPoses };
 
 /// A method, what it is driven on here, to what share it is exact, and what must not pass for it.
 type Case = (&'static dyn Method, Vec<Schedule>, f64, &'static [fn(&mut Dataset)]);

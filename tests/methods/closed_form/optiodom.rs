@@ -9,7 +9,7 @@ use dataset::Dataset;
 use dataset::import::importer;
 
 use super::{as_optiodom, lengths, swapped_counts};
-use crate::support::real_data;
+use crate::support::real_data::real_data;
 
 fn optiodom(session: &Path) -> Dataset {
     let mut imported = importer("optiodom").expect("the importer").read(session).expect("a session");

@@ -5,7 +5,7 @@
 //! method that beats it would say that it is too high. Ratios are mean squared error over bound with the
 //! Monte-Carlo error of the numerator; limits are z scores of 4.5, a false positive of 7e-6 each.
 
-use bench::{FisherInformation, Innovation, Moments};
+use bench::{FisherInformation, LinearizedInnovation, Moments};
 use calib::methods::direct::Direct;
 use calib::{MedianMad, Method, Parameter};
 use dataset::{Dataset, Run, Session};
@@ -81,16 +81,16 @@ fn lengths_m(geometry: DriveGeometry) -> Vector3<f64> {
 
 /// What one run says to the oracle, by its motions.
 struct Oracle {
-    kinds: Vec<(MotionProgram, Innovation)>,
+    kinds: Vec<(MotionProgram, LinearizedInnovation)>,
     covariance: Matrix3<f64>,
 }
 
 impl Oracle {
     fn new(scenario: &Scenario) -> Self {
-        let mut kinds: Vec<(MotionProgram, Innovation)> = Vec::new();
+        let mut kinds: Vec<(MotionProgram, LinearizedInnovation)> = Vec::new();
         let mut information = Matrix3::zeros();
         for program in scenario.programs() {
-            let innovations = Innovation::of_run(scenario, &program).expect("bounded");
+            let innovations = LinearizedInnovation::of_run(scenario, &program).expect("bounded");
             assert_eq!(innovations.len(), 1, "read at the start and the end");
             information += innovations[0].information();
             kinds.push((program, innovations[0]));

@@ -9,7 +9,7 @@ mod batch;
 mod efficiency;
 mod noise_model;
 
-use bench::{FisherInformation, Innovation, NoBound};
+use bench::{FisherInformation, LinearizedInnovation, NoBound};
 use calib::Parameter;
 use dataset::{Protocol, ProtocolSettings, Run};
 use effects::{ContactPatchWheelbase, Effect, SlipSpeed, WheelMismatch, WheelScale, Wheelbase};
@@ -155,7 +155,7 @@ fn slopes_are_central_differences_and_would_not_pass_wrong() {
     let spin = [Motion::Spin { turn_rad: std::f64::consts::TAU }];
     let arc = [Motion::Arc { radius_m: 0.7, turn_rad: -2.0 }, Motion::Straight { length_m: 1.0 }];
     for motions in [&straight[..], &spin, &arc, &square(4.0)] {
-        let innovations = Innovation::of_run(&scenario, &program(motions)).expect("bounded");
+        let innovations = LinearizedInnovation::of_run(&scenario, &program(motions)).expect("bounded");
         let slope = innovations[0].slope;
         let h = 1e-7;
         let end = |left: f64, right: f64, separation: f64| {
@@ -245,7 +245,7 @@ fn what_the_covariance_tells_of_the_geometry_is_little() {
     let lengths =
         Matrix3::from_diagonal(&Vector3::new(diameter_m.left, diameter_m.right, geometry.wheel_separation_m()));
     let in_covariance = |program: &MotionProgram| {
-        let measurement = |scenario: &Scenario| Innovation::of_run(scenario, program).expect("bounded")[0];
+        let measurement = |scenario: &Scenario| LinearizedInnovation::of_run(scenario, program).expect("bounded")[0];
         let change = |parameter: usize| {
             let h = 1e-5;
             let at = |share: f64| {
@@ -314,7 +314,7 @@ fn looks_are_those_of_the_simulator() {
     ]);
     let measurements_s = |scenario: &Scenario| -> Vec<f64> {
         // The first measurement finds the start and is no innovation.
-        let innovations = Innovation::of_run(scenario, &motions).expect("bounded");
+        let innovations = LinearizedInnovation::of_run(scenario, &motions).expect("bounded");
         std::iter::once(0.0).chain(innovations.iter().map(|innovation| innovation.t_s)).collect()
     };
     let seen_s = |scenario: &Scenario| -> Vec<f64> {

@@ -5,7 +5,7 @@
 //! z score with the sample's own error, at 5: a false positive of 6e-7 each, 1e-4 over the file. Rejected by
 //! the same score: no scatter inside arcs, and roundings that are independent.
 
-use bench::Innovation;
+use bench::LinearizedInnovation;
 use dataset::{Dataset, Run};
 use effects::{ContactPatchWheelbase, Effect, Quantization};
 use kinematics::{Pose, Rule, wrap_to_pi};
@@ -116,7 +116,7 @@ fn largest_z(misses: &[Vector3<f64>], covariance: &Matrix3<f64>) -> f64 {
 
 /// Holds one scenario on one program; gives the misses and the filter's covariance for what must be rejected.
 fn hold(scenario: &Scenario, motions: &[Motion]) -> (Vec<Vector3<f64>>, Matrix3<f64>) {
-    let innovations = Innovation::of_run(scenario, &program(motions)).expect("bounded");
+    let innovations = LinearizedInnovation::of_run(scenario, &program(motions)).expect("bounded");
     assert_eq!(innovations.len(), 1, "the end seen from the start");
     let misses = misses(scenario, motions);
     let z = largest_z(&misses, &innovations[0].covariance);

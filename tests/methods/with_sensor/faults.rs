@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use scenario::{Instrument, Log};
 
 use super::{lengths, motion_capture, relative, shipped, with_instrument_sigma};
-use crate::support::real_data;
+use crate::support::real_data::real_data;
 
 /// The robot of [`motion_capture`] on circles as in OptiOdom's sessions, seen without error.
 fn circles() -> sim_yair::Simulation {

@@ -9,7 +9,7 @@ use dataset::Dataset;
 use dataset::import::importer;
 use kinematics::{Pose, Wheels};
 
-use crate::support::real_data;
+use crate::support::real_data::real_data;
 
 /// The two configurations that the data have: the laser turned by 90°, and ahead.
 const LOGS: [&str; 2] = ["l90", "lstraight"];

@@ -12,7 +12,7 @@ use kinematics::{Increment, OdometryCovariance, Pose, Side, Wheels, sinc, sinc_d
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 
 use super::error::NoBound;
-use super::innovation::Innovation;
+use super::innovation::LinearizedInnovation;
 use super::model::Model;
 use super::timeline::{Event, Timeline, Travel};
 
@@ -41,11 +41,11 @@ pub(super) struct Filter<'a> {
     slope: Matrix3xX<f64>,
     first_rounding: Wheels<usize>,
     largest_var: Vector3<f64>,
-    innovations: Vec<Innovation>,
+    innovations: Vec<LinearizedInnovation>,
 }
 
 impl<'a> Filter<'a> {
-    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<Vec<Innovation>, NoBound> {
+    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<Vec<LinearizedInnovation>, NoBound> {
         let first_rounding = Wheels { left: ROUNDING, right: ROUNDING + timeline.phases.left.len() };
         let size = first_rounding.right + timeline.phases.right.len();
         let mut covariance = DMatrix::zeros(size, size);
@@ -145,7 +145,7 @@ impl<'a> Filter<'a> {
         let covariance = self.covariance.fixed_view::<3, 3>(POSE, POSE) + seen;
         let precision = self.invert(&covariance).ok_or(NoBound::NoError { t_s })?;
         let slope: Matrix3<f64> = self.slope.fixed_columns::<3>(POSE).transpose();
-        self.innovations.push(Innovation { t_s, slope, covariance, precision });
+        self.innovations.push(LinearizedInnovation { t_s, slope, covariance, precision });
 
         let by_pose = self.covariance.columns(POSE, 3).into_owned();
         let gain = &by_pose * precision;

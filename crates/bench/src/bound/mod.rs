@@ -27,11 +27,11 @@ use scenario::Scenario;
 
 pub use error::NoBound;
 use filter::Filter;
-pub use innovation::Innovation;
+pub use innovation::LinearizedInnovation;
 use model::Model;
 use timeline::Timeline;
 
-impl Innovation {
+impl LinearizedInnovation {
     /// The innovations of one run, in order. Its first measurement finds where it starts and is none.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Innovation {
 }
 
 /// What the measurements of a run add, one by one.
-fn innovations(model: &Model, motions: &[Motion]) -> Result<Vec<Innovation>, NoBound> {
+fn innovations(model: &Model, motions: &[Motion]) -> Result<Vec<LinearizedInnovation>, NoBound> {
     Filter::run(model, &Timeline::of(model, motions))
 }
 
@@ -88,7 +88,7 @@ impl FisherInformation {
         let mut matrix = Matrix3::zeros();
         for (program, runs) in kinds {
             let innovations = innovations(&model, &program.motions)?;
-            matrix += runs * innovations.iter().map(Innovation::information).sum::<Matrix3<f64>>();
+            matrix += runs * innovations.iter().map(LinearizedInnovation::information).sum::<Matrix3<f64>>();
         }
         let diameter_m = model.geometry.wheel_diameter_m();
         Ok(Self {

@@ -1,56 +1,47 @@
 //! `circular`: the bidirectional circular path test, circles driven both ways and their radii measured.
 //!
-//! Model: on a circle of signed radius R (positive counter-clockwise) the contacts go (R ± B/2)Θ, so that with e = E_d = D_R/D_L and the wheels' turns φ
-//! (2R + B)/(2R − B) = e φ_R/φ_L. Both ways at one commanded ratio q of the outer to the inner wheel give (2R_ccw + B)/(2R_ccw − B) = e q and
-//! (2R_cw + B)/(2R_cw − B) = q/e with unsigned radii: B follows from their product, e² from their quotient ([`base_and_ratio`]).
-//! Derived here: q is the run's own, from its counts, and not the command's (ρ + b/2)/(ρ − b/2); runs are cut into overlapping legs of a quarter turn or the
-//! next reading, R = chord/(2 sin Θ/2) for each; e and B are the least squares of R over all legs, which is the closed form when the legs of a way agree.
-//! A leg that the wheels' ratio changes within is left out, so that spirals of steps serve too.
-//! Assumptions: constant wheel ratio within a leg; the instrument sees the drive's centre (one that sits a lever to the left makes counter-clockwise circles
-//! small and clockwise ones large, which is read as unequal wheels); the mean diameter is right: D_L = 2D/(e + 1), D_R = 2D e/(e + 1).
-//! Observability: e, and B in metres whatever the scale of the wheels. Blind to their common scale, which changes how far round a circle goes, not its radius.
-//! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no small-angle form.
+//! Model: on a circle of signed radius R (positive counter-clockwise) the contacts go (R ± B/2)Θ, so that
+//! with e = E_d = D_R/D_L and the wheels' turns φ (2R + B)/(2R − B) = e φ_R/φ_L. Both ways at one commanded
+//! ratio q of the outer to the inner wheel give (2R_ccw + B)/(2R_ccw − B) = e q and (2R_cw + B)/(2R_cw − B) =
+//! q/e with unsigned radii: B follows from their product, e² from their quotient ([`base_and_ratio`]).
+//! Derived here: q is the run's own, from its counts, and not the command's (ρ + b/2)/(ρ − b/2); runs are cut
+//! into overlapping arcs of a quarter turn or the next reading, R = chord/(2 sin Θ/2) for each; e and B are
+//! the least squares of R over all arcs, which is the closed form when the arcs of a direction agree. An arc
+//! within which the wheels' ratio changes is left out, so that spirals of steps serve too.
+//! Assumptions: constant wheel ratio within an arc; the instrument is at the drive's centre (one that is to
+//! the left makes counter-clockwise circles small and clockwise ones large, which is read as unequal wheels);
+//! the mean diameter is right: D_L = 2D/(e + 1), D_R = 2D e/(e + 1).
+//! Observability: e, and B in metres whatever the scale of the wheels. Blind to their common scale, which
+//! changes how far round a circle goes, not its radius.
+//! Reference: Abbas, Arif, Hussain 2006 (bidirectional circular path test); exact for circles of any size, no
+//! small-angle form.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Wheels, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
+use crate::settings::{CIRCULAR_MAX_STEPS, CIRCULAR_TOLERANCE, MAX_RATIO_CHANGE, MIN_ARC_RAD, MIN_ARC_SINE};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Circular;
 
-/// A leg is the shortest stretch between two readings that turns by this: a quarter turn less what its rounding and a wrong wheelbase may take off.
-const LEG_RAD: f64 = 1.4;
-
-/// |sin Θ/2| of a leg at least this, 60° to 300°: a leg that nearly closes shows no radius.
-const MIN_SINE: f64 = 0.5;
-
-/// The wheels' ratio may differ by this share between the halves of a leg: twice the rounding of a coarse counter (1 mm on 100 mm of inner wheel).
-const CONSTANT_RATIO: f64 = 0.02;
-
-/// Rounds of Gauss–Newton; three are enough, and the method says when they were not.
-const ROUNDS: u32 = 30;
-
-/// A change of the answer by less than this share is none.
-const SETTLED: f64 = 1e-13;
-
 /// An arc of constant wheel ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct PropagationInterval {
+struct Arc {
     /// Signed radius, metres: positive counter-clockwise.
     radius_m: f64,
     /// Turn of each wheel, radians.
     wheel_rad: Wheels<f64>,
 }
 
-impl PropagationInterval {
+impl Arc {
     /// What the radius should be, metres, with its slopes over e and B.
     fn predicted(&self, ratio: f64, separation_m: f64) -> (f64, Vector2<f64>) {
         let Wheels { left, right } = self.wheel_rad;
@@ -61,12 +52,14 @@ impl PropagationInterval {
     }
 }
 
-/// Wheelbase (metres) and E_d from the mean radii of both ways (metres, unsigned) and the ratio of the outer to the inner wheel's turn in each: the method's
-/// closed form. `None` when the circles are no wider than the wheelbase allows.
+/// Wheelbase (metres) and E_d from the mean radii of both ways (metres, unsigned) and the ratio of the outer
+/// to the inner wheel's turn in each: the method's closed form. `None` when the circles are no wider than the
+/// wheelbase allows.
 #[must_use]
 pub fn base_and_ratio(ccw: (f64, f64), cw: (f64, f64)) -> Option<(f64, f64)> {
     let ((r_ccw_m, q_ccw), (r_cw_m, q_cw)) = (ccw, cw);
-    // (2R₁ + B)(2R₂ + B) = P (2R₁ − B)(2R₂ − B): the smaller root of a quadratic, in the form that does not cancel.
+    // (2R₁ + B)(2R₂ + B) = P (2R₁ − B)(2R₂ − B): the smaller root of a quadratic, in the form that does not
+    // cancel.
     let product = q_ccw * q_cw;
     let (half, free) = ((r_ccw_m + r_cw_m) * (product + 1.0), product - 1.0);
     let root = (half * half - 4.0 * r_ccw_m * r_cw_m * free * free).sqrt();
@@ -90,7 +83,7 @@ struct Reading {
     theta_rad: f64,
     wheel_rad: Wheels<f64>,
     /// Heading by the nominal robot, whole turns counted, radians.
-    reckoned_rad: f64,
+    dead_reckoned_rad: f64,
 }
 
 fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Option<Vec<Reading>> {
@@ -101,42 +94,45 @@ fn readings(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -
         last_s = Some(t_s);
         wheel_rad = steps.iter().fold(wheel_rad, |sum, step| sum.zip_with(*step, |sum, step| sum + step));
         let travel_m = wheel_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
-        let reckoned_rad = geometry.increment(travel_m).turn_rad;
-        readings.push(Reading { place: pose.position(), theta_rad: pose.theta_rad, wheel_rad, reckoned_rad });
+        let dead_reckoned_rad = geometry.increment(travel_m).turn_rad;
+        readings.push(Reading { place: pose.position(), theta_rad: pose.theta_rad, wheel_rad, dead_reckoned_rad });
     }
     Some(readings)
 }
 
-/// The legs of one run; or why it has none.
-fn legs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<PropagationInterval>, &'static str> {
+/// The arcs of one run; or why it has none.
+fn arcs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Result<Vec<Arc>, &'static str> {
     let readings = readings(run, robot, geometry).ok_or("the run has no odometry")?;
-    let (mut legs, mut bent, mut end) = (Vec::new(), false, 0);
+    let (mut arcs, mut bent, mut end) = (Vec::new(), false, 0);
     for (start, first) in readings.iter().enumerate() {
         end = end.max(start + 1);
-        while readings.get(end).is_some_and(|last| (last.reckoned_rad - first.reckoned_rad).abs() < LEG_RAD) {
+        while readings
+            .get(end)
+            .is_some_and(|last| (last.dead_reckoned_rad - first.dead_reckoned_rad).abs() < MIN_ARC_RAD)
+        {
             end += 1;
         }
         let Some(last) = readings.get(end) else { break };
         // Whole turns come from the odometry.
-        let turn_rad = unwrap_near(last.theta_rad - first.theta_rad, last.reckoned_rad - first.reckoned_rad);
+        let turn_rad = unwrap_near(last.theta_rad - first.theta_rad, last.dead_reckoned_rad - first.dead_reckoned_rad);
         let sine = (0.5 * turn_rad).sin();
-        if sine.abs() < MIN_SINE {
+        if sine.abs() < MIN_ARC_SINE {
             continue;
         }
         let turned = |a: &Reading, b: &Reading| b.wheel_rad.zip_with(a.wheel_rad, |b, a| b - a);
         let middle = &readings[usize::midpoint(start, end)];
         let (one, other) = (turned(first, middle), turned(middle, last));
         let (one, other) = (one.right * other.left, one.left * other.right);
-        if (one - other).abs() > CONSTANT_RATIO * one.abs().max(other.abs()) {
+        if (one - other).abs() > MAX_RATIO_CHANGE * one.abs().max(other.abs()) {
             bent = true;
             continue;
         }
         let wheel_rad = turned(first, last);
         let forward = (wheel_rad.left + wheel_rad.right).signum();
-        legs.push(PropagationInterval { radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine), wheel_rad });
+        arcs.push(Arc { radius_m: forward * first.place.distance_m(last.place) / (2.0 * sine), wheel_rad });
     }
-    match (legs.is_empty(), bent) {
-        (false, _) => Ok(legs),
+    match (arcs.is_empty(), bent) {
+        (false, _) => Ok(arcs),
         (true, true) => Err("its radius changes all the way: no quarter turn is an arc"),
         (true, false) => Err(
             "no two readings are 60 to 300 degrees of the circle apart: read the pose on the way, every half turn or sooner",
@@ -166,8 +162,8 @@ impl Method for Circular {
                 if !matches!(run.info().protocol, Some(Protocol::CircleCw | Protocol::CircleCcw)) {
                     continue;
                 }
-                match legs(run, session.robot, &geometry) {
-                    Ok(legs) => runs.push(legs),
+                match arcs(run, session.robot, &geometry) {
+                    Ok(arcs) => runs.push(arcs),
                     Err(why) => runs_rejected.push(Rejected { run: run.info().id.clone(), why: why.to_owned() }),
                 }
             }
@@ -179,8 +175,8 @@ impl Method for Circular {
             );
             return Err(CalibError::NotApplicable { method: Self::NAME, why });
         }
-        let ways = [1.0, -1.0].map(|sign: f64| runs.iter().flatten().any(|leg| leg.radius_m * sign > 0.0));
-        if ways != [true, true] {
+        let directions = [1.0, -1.0].map(|sign: f64| runs.iter().flatten().any(|arc| arc.radius_m * sign > 0.0));
+        if directions != [true, true] {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
@@ -200,7 +196,8 @@ impl Method for Circular {
             covariance,
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
-                why: "a factor common to both wheels changes how far round a circle goes, not its radius; the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length",
+                why: "a factor common to both wheels changes how far round a circle goes, not its radius; \
+                      the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length",
             }],
             runs_used: runs.len(),
             runs_rejected,
@@ -210,7 +207,7 @@ impl Method for Circular {
     }
 }
 
-/// Least squares of the legs' radii over e and B.
+/// Least squares of the arcs' radii over e and B.
 struct Fit {
     ratio: f64,
     separation_m: f64,
@@ -218,14 +215,14 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(runs: &[Vec<PropagationInterval>], nominal_separation_m: f64) -> Self {
+    fn of(runs: &[Vec<Arc>], nominal_separation_m: f64) -> Self {
         let mut fit = Self { ratio: 1.0, separation_m: nominal_separation_m, settled: false };
-        for _ in 0..ROUNDS {
+        for _ in 0..CIRCULAR_MAX_STEPS {
             let (normal, right) = fit.normal(runs);
             let Some(step) = normal.try_inverse().map(|inverse| inverse * right) else { break };
             fit.ratio += step.x;
             fit.separation_m += step.y;
-            if step.x.abs() < SETTLED && step.y.abs() < SETTLED * fit.separation_m.abs() {
+            if step.x.abs() < CIRCULAR_TOLERANCE && step.y.abs() < CIRCULAR_TOLERANCE * fit.separation_m.abs() {
                 fit.settled = true;
                 break;
             }
@@ -234,22 +231,23 @@ impl Fit {
     }
 
     /// The normal equations' matrix and right side.
-    fn normal<'l>(&self, legs: impl IntoIterator<Item = &'l Vec<PropagationInterval>>) -> (Matrix2<f64>, Vector2<f64>) {
+    fn normal<'l>(&self, arcs: impl IntoIterator<Item = &'l Vec<Arc>>) -> (Matrix2<f64>, Vector2<f64>) {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for leg in legs.into_iter().flatten() {
-            let (predicted_m, slope) = leg.predicted(self.ratio, self.separation_m);
+        for arc in arcs.into_iter().flatten() {
+            let (predicted_m, slope) = arc.predicted(self.ratio, self.separation_m);
             normal += slope * slope.transpose();
-            right += slope * (leg.radius_m - predicted_m);
+            right += slope * (arc.radius_m - predicted_m);
         }
         (normal, right)
     }
 
-    /// Covariance of e and B from the scatter between the runs, which have one equation each for two unknowns.
-    fn covariance(&self, runs: &[Vec<PropagationInterval>]) -> Option<DMatrix<f64>> {
+    /// Covariance of e and B from the scatter between the runs, which have one equation each for two
+    /// unknowns.
+    fn covariance(&self, runs: &[Vec<Arc>]) -> Option<DMatrix<f64>> {
         let dynamic = |matrix: Matrix2<f64>| DMatrix::from_column_slice(2, 2, matrix.as_slice());
         let (normal, _) = self.normal(runs);
         let scores: Vec<_> =
-            runs.iter().map(|legs| DVector::from_column_slice(self.normal([legs]).1.as_slice())).collect();
+            runs.iter().map(|arcs| DVector::from_column_slice(self.normal([arcs]).1.as_slice())).collect();
         scatter_between_runs(&dynamic(normal), &scores, 2)
     }
 }
@@ -258,10 +256,10 @@ impl Fit {
 mod tests {
     use super::*;
 
-    fn leg(radius_m: f64, ratio: f64, separation_m: f64) -> PropagationInterval {
+    fn arc(radius_m: f64, ratio: f64, separation_m: f64) -> Arc {
         // A quarter turn on wheels of 1/(e + 1) and e/(e + 1) metres a radian.
         let arc = |side: f64| (radius_m + side * 0.5 * separation_m) * 1.5;
-        PropagationInterval { radius_m, wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio } }
+        Arc { radius_m, wheel_rad: Wheels { left: arc(-1.0) * (ratio + 1.0), right: arc(1.0) * (ratio + 1.0) / ratio } }
     }
 
     #[test]
@@ -279,31 +277,32 @@ mod tests {
     }
 
     #[test]
-    fn least_squares_is_the_closed_form_where_legs_agree_and_takes_several_radii() {
+    fn least_squares_is_the_closed_form_where_arcs_agree_and_takes_several_radii() {
         let (ratio, base_m) = (0.985, 0.363);
-        let runs = [vec![leg(1.0, ratio, base_m); 3], vec![leg(-1.0, ratio, base_m); 2]];
-        let several = [vec![leg(1.0, ratio, base_m), leg(0.5, ratio, base_m)], vec![leg(-0.7, ratio, base_m)]];
+        let runs = [vec![arc(1.0, ratio, base_m); 3], vec![arc(-1.0, ratio, base_m); 2]];
+        let several = [vec![arc(1.0, ratio, base_m), arc(0.5, ratio, base_m)], vec![arc(-0.7, ratio, base_m)]];
         for runs in [&runs, &several] {
             let fit = Fit::of(runs, 0.3);
             assert!(fit.settled);
             assert!((fit.ratio - ratio).abs() < 1e-12 && (fit.separation_m - base_m).abs() < 1e-12);
         }
         // Backward: both turns and the sign of the path change, the radius does not.
-        let backward = PropagationInterval { wheel_rad: runs[0][0].wheel_rad.map(|rad| -rad), ..runs[0][0] };
+        let backward = Arc { wheel_rad: runs[0][0].wheel_rad.map(|rad| -rad), ..runs[0][0] };
         assert_eq!(backward.predicted(ratio, base_m).0, runs[0][0].predicted(ratio, base_m).0);
     }
 
     #[test]
     fn slopes_are_those_of_central_differences() {
-        let leg = leg(0.8, 1.01, 0.36);
-        let at = |ratio: f64, base_m: f64| leg.predicted(ratio, base_m).0;
+        let arc = arc(0.8, 1.01, 0.36);
+        let at = |ratio: f64, base_m: f64| arc.predicted(ratio, base_m).0;
         let h = 1e-5;
         let by = [
             (at(1.01 + h, 0.36) - at(1.01 - h, 0.36)) / (2.0 * h),
             (at(1.01, 0.36 + h) - at(1.01, 0.36 - h)) / (2.0 * h),
         ];
-        let (_, slope) = leg.predicted(1.01, 0.36);
-        // h²/6 of a third derivative of about 6·0.8·2.8³, and rounding 1e-16/1e-5; an error of 1e-3 of the slope would show.
+        let (_, slope) = arc.predicted(1.01, 0.36);
+        // h²/6 of a third derivative of about 6·0.8·2.8³, and rounding 1e-16/1e-5; an error of 1e-3 of the
+        // slope would show.
         assert!((slope.x - by[0]).abs() < 1e-8 && (slope.y - by[1]).abs() < 1e-8, "{slope} {by:?}");
     }
 }

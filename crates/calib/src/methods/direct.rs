@@ -1,20 +1,25 @@
 //! `direct`: the paper's method, straight runs for the sensitivities and spins for the wheelbase.
 //!
-//! Model: each wheel rolls C metres a count; the contacts are B apart. A straight run of small turn Δθ moves the mark beside a wheel along a chord, from
-//! which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
-//! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses instead of marks, the wheel contacts serve as marks.
-//! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that the outlier rule leaves, wheel by wheel.
-//! Two departures from the print, both derived in docs/paper.md: chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed
-//! (14) holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8), which folds beyond ±90°.
+//! Model: each wheel rolls C metres a count; the contacts are B apart. A straight run of small turn Δθ moves
+//! the mark beside a wheel along a chord, from which the wheel's arc follows (6); C = S/ΔN (9). A spin by θ
+//! gives B = (C_R ΔN_R − C_L ΔN_L)/θ, the signed form of (12) and (13).
+//! Assumptions: constant wheel speeds within a run; marks on the axle's line. Where the dataset has poses
+//! instead of marks, the wheel contacts serve as marks.
+//! Observability: all three parameters; needs straights and spins. The estimates are means over the runs that
+//! the outlier rule leaves, wheel by wheel. Two departures from the print, both derived in docs/paper.md:
+//! chords and spins are signed (the printed (6) is off by ±0.03 % backward at m = 50 mm, the printed (14)
+//! holds counter-clockwise only), and the turn is a two-argument arctangent instead of the arcsine of (8),
+//! which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
 use dataset::{PointReading, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
+use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::{MedianMad, Summary, mean};
+use crate::settings::{MAD_CUT, MAX_MARK_OFFSET_M, MIN_SPIN_RAD};
 
 /// The method with its outlier rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,13 +28,7 @@ pub struct Direct {
     pub outliers: MedianMad,
 }
 
-/// Marks farther from the axle's line than this break (6): at 5 mm a 2° turn shifts the chord by 0.003 mm.
-const MARK_OFF_AXLE_M: f64 = 5e-3;
-
-/// A spin of less than this says little of the wheelbase and its sign is not sure.
-const SMALLEST_SPIN_RAD: f64 = 0.5;
-
-/// What one run says, with its id.
+/// The value of one run, with its id.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunValue<'a> {
     /// The run.
@@ -40,7 +39,8 @@ pub struct RunValue<'a> {
     pub stated_sigma: f64,
 }
 
-/// Standard deviation of one coordinate of a mark, by the instrument's statement, metres; 0 when it states none.
+/// Standard deviation of one coordinate of a mark, by the instrument's statement, metres; 0 when it states
+/// none.
 fn mark_sigma_m(session: &Session<'_>) -> f64 {
     session.truth_noise.sigma_xy_m.unwrap_or(0.0)
 }
@@ -81,10 +81,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
     }
 
     /// The runs of one protocol, each with its wheels' turns and its marks, where both were measured.
-    fn runs(
-        &self,
-        protocol: Protocol,
-    ) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
+    fn runs(&self, protocol: Protocol) -> impl Iterator<Item = Result<(&'a str, Wheels<f64>, Marks), CalibError>> {
         let runs = self.session.runs.iter().filter(move |run| run.info().protocol == Some(protocol));
         runs.filter_map(|run| {
             let measured = self.measured(run).transpose()?;
@@ -97,8 +94,9 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         let half_m = 0.5 * self.geometry.wheel_separation_m();
         let readings = &run.run().point_readings;
         if readings.is_empty() {
-            // Poses: the contacts themselves are the marks. What the wheels turned before and after was not seen.
-            return Ok(ConvergenceCriterion::of(run, self.session.robot, &self.geometry).map(|ends| {
+            // Poses: the contacts themselves are the marks. What the wheels turned before and after was not
+            // measured.
+            return Ok(EndPoses::of(run, self.session.robot, &self.geometry).map(|ends| {
                 let contacts = Wheels { left: Point::new(0.0, half_m), right: Point::new(0.0, -half_m) };
                 let (start, end) = (contacts.map(|p| ends.start * p), contacts.map(|p| ends.end * p));
                 (ends.turned_rad(), Marks { start, end, outside_m: Wheels::both(0.0) })
@@ -109,12 +107,13 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
             return Err(Direct::not_applicable("it needs one marked point on each side of the robot".to_owned()));
         }
-        if body.left.x_m.abs().max(body.right.x_m.abs()) > MARK_OFF_AXLE_M {
+        if body.left.x_m.abs().max(body.right.x_m.abs()) > MAX_MARK_OFFSET_M {
             return Err(Direct::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
         }
         let start = outermost.map(|(point, _)| readings.iter().find(|reading| reading.point == point));
         let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
-        let both = |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
+        let both =
+            |marks: Wheels<Option<&PointReading>>| Some(Wheels { left: marks.left?.room, right: marks.right?.room });
         let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
         // Marks are read while the robot stands, before and after all that its log has.
         let Some(wheel_rad) = run.wheel_turn_rad(self.session.robot) else { return Ok(None) };
@@ -125,7 +124,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
 
 impl Direct {
     /// The method as the table of contents offers it.
-    pub const DEFAULT: Self = Self { outliers: MedianMad { cut: 3.5 } };
+    pub const DEFAULT: Self = Self { outliers: MedianMad { cut: MAD_CUT } };
 
     const NAME: &'static str = "direct";
 
@@ -133,7 +132,8 @@ impl Direct {
         CalibError::NotApplicable { method: Self::NAME, why }
     }
 
-    /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of its pulses.
+    /// Metres per radian of each wheel from every straight run: C of (9) with the wheel's turn in place of
+    /// its pulses.
     ///
     /// # Errors
     /// [`CalibError::NotApplicable`] when marks are where (6) does not hold.
@@ -148,7 +148,8 @@ impl Direct {
                 let turn_rad = marks.turn_rad(0.0);
                 let chord_over_arc = sinc(0.5 * turn_rad);
                 for side in Side::BOTH {
-                    // Signed with the direction of travel: backward runs have negative chords and negative counts.
+                    // Signed with the direction of travel: backward runs have negative chords and negative
+                    // counts.
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * wheel_rad[side].signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };
                     let arc_m = chord_m / chord_over_arc + outward * marks.outside_m[side] * turn_rad;
@@ -162,7 +163,8 @@ impl Direct {
         Ok(values)
     }
 
-    /// The wheelbase from every spin, metres, given metres per radian of each wheel; with it the two wheels' turns over the robot's (∂B/∂C).
+    /// The wheelbase from every spin, metres, given metres per radian of each wheel; with it the two wheels'
+    /// turns over the robot's (∂B/∂C).
     ///
     /// # Errors
     /// [`CalibError::NotApplicable`] when marks are where (14) does not hold.
@@ -179,7 +181,7 @@ impl Direct {
                 // Whole turns come from the counts and the sensitivities already found.
                 let travel_m = wheel_rad.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad);
                 let turn_rad = marks.turn_rad(reader.geometry.increment(travel_m).turn_rad);
-                if turn_rad.abs() > SMALLEST_SPIN_RAD {
+                if turn_rad.abs() > MIN_SPIN_RAD {
                     let value = (travel_m.right - travel_m.left) / turn_rad;
                     let slope = Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad };
                     // Two marks across the axle, read at both ends, give the turn to 2σ/w.
@@ -192,7 +194,7 @@ impl Direct {
         Ok(values)
     }
 
-    /// Which values are typical, and what these say together; the others are noted.
+    /// Which values are no outliers, and their summary; outliers are added to `rejected`.
     fn filter<'v, 'a: 'v>(
         &self,
         values: impl ExactSizeIterator<Item = &'v RunValue<'a>> + Clone,
@@ -206,13 +208,16 @@ impl Direct {
             let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
             rejected.push(Rejected { run: value.run.to_owned(), why });
         }
-        let summary = Summary::of(kept(numbers.iter().copied(), &keep));
+        let summary = Summary::of(retained(numbers.iter().copied(), &keep));
         (keep, summary)
     }
 }
 
-/// The values that are kept.
-fn kept<'v>(values: impl Iterator<Item = f64> + Clone + 'v, keep: &'v [bool]) -> impl Iterator<Item = f64> + Clone + 'v {
+/// The values that are no outliers.
+fn retained<'v>(
+    values: impl Iterator<Item = f64> + Clone + 'v,
+    keep: &'v [bool],
+) -> impl Iterator<Item = f64> + Clone + 'v {
     values.zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| value)
 }
 
@@ -225,7 +230,8 @@ impl Method for Direct {
         "the paper's: straight runs give both sensitivities, spins the wheelbase (points or poses at both ends)"
     }
 
-    /// The paper's runs: 500 mm forward and backward, about a turn each way. It gives no number of spins; 30 are ours.
+    /// The paper's runs: 500 mm forward and backward, about a turn each way. It gives no number of spins; 30
+    /// are ours.
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 0.5, runs: 82 },
@@ -257,13 +263,13 @@ impl Method for Direct {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way".to_owned(),
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way"
+                    .to_owned(),
             });
         };
 
-        let slope = Wheels::from_sides(|side| {
-            mean(kept(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0)
-        });
+        let slope =
+            Wheels::from_sides(|side| mean(retained(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
         let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
         Ok(Calibration {
@@ -275,7 +281,8 @@ impl Method for Direct {
     }
 }
 
-/// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has its own scatter.
+/// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has
+/// its own scatter.
 fn covariance(left: Option<f64>, right: Option<f64>, base: Option<f64>, slope: Wheels<f64>) -> Option<Covariance> {
     let (left, right, base) = (left?, right?, base?);
     let base_var = base + slope.left * slope.left * left + slope.right * slope.right * right;
@@ -304,7 +311,10 @@ mod tests {
     fn marks_after(increment: Increment, outside_m: Wheels<f64>) -> Marks {
         let half_m = 0.5 * 0.363;
         let start_pose = Pose::new(0.3, -0.2, 0.8);
-        let body = Wheels { left: Point::new(0.0, half_m + outside_m.left), right: Point::new(0.0, -half_m - outside_m.right) };
+        let body = Wheels {
+            left: Point::new(0.0, half_m + outside_m.left),
+            right: Point::new(0.0, -half_m - outside_m.right),
+        };
         let end_pose = start_pose * increment.arc();
         Marks { start: body.map(|p| start_pose * p), end: body.map(|p| end_pose * p), outside_m }
     }
@@ -318,7 +328,8 @@ mod tests {
                 let marks = marks_after(increment, outside_m);
                 let measured_rad = marks.turn_rad(0.0);
                 assert!((measured_rad - turn_rad).abs() < 1e-14);
-                let arc_m = Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
+                let arc_m =
+                    Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
                 for side in Side::BOTH {
                     let chord_m = marks.start[side].distance_m(marks.end[side]) * distance_m.signum();
                     let outward = if side == Side::Left { 1.0 } else { -1.0 };
@@ -331,8 +342,9 @@ mod tests {
 
     #[test]
     fn paper_eq_6_unsigned_is_off_backward() {
-        // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03 % at m = 50 mm means Δθ = 1.5 mrad,
-        // the turn that the paper's wheels (1.0334 and 1.0322) make over 500 pulses: 0.6/363 = 1.65 mrad.
+        // With chords unsigned a backward run takes the mark's offset the wrong way: 2·m·Δθ of 500 mm; ±0.03
+        // % at m = 50 mm means Δθ = 1.5 mrad, the turn that the paper's wheels (1.0334 and 1.0322) make over
+        // 500 pulses: 0.6/363 = 1.65 mrad.
         let marks = marks_after(Increment { distance_m: -0.5, turn_rad: 1.65e-3 }, Wheels::both(0.05));
         let arc_m: f64 = -0.5 - 0.5 * 0.363 * 1.65e-3;
         let chord_m = marks.start.left.distance_m(marks.end.left);

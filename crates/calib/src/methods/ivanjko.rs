@@ -1,38 +1,36 @@
 //! `ivanjko`: gains of the wheels from where straight runs end, the wheelbase from how far spins turn.
 //!
-//! Model: dead reckoning of the run's own log (exact arcs) under r_L, r_R, B. Step 1: r_L and r_R minimise Σ |end seen − end reckoned|² over the straight
-//! runs, in the frame of the start. Step 2: with them u = r_R φ_R − r_L φ_L is what a spin by θ says B θ is; per direction B = Σ u²/Σ u θ, the least squares
-//! of the heading over the gain, and the result is the mean of the directions. The steps alternate until nothing changes (B bends the straight runs a little).
-//! Assumptions: the heading at the start is right: a wrong one moves a straight end sideways as unequal wheels do. Wheels that roll.
-//! Observability: all three parameters; needs straights and spins. Ends alone are used, of poses or of marks read at standstills.
-//! Derived here: Gauss–Newton in place of a general minimiser (with two numbers a run for two gains it ends in the same minimum), and the covariance, from
-//! the scatter of the ends and of the spins' wheelbases, with the slopes of each step over the other's result.
-//! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves out a wheel, is not offered.
+//! Model: dead reckoning of the run's own log (exact arcs) under r_L, r_R, B. Step 1: r_L and r_R minimise Σ
+//! |end measured − end dead reckoned|² over the straight runs, in the frame of the start. Step 2: with them u
+//! = r_R φ_R − r_L φ_L is B θ of a spin by θ; per direction B = Σ u²/Σ u θ, the least squares of the heading
+//! over the gain, and the result is the mean of the directions. The steps alternate until nothing changes (B
+//! bends the straight runs a little).
+//! Assumptions: the heading at the start is right: a wrong one moves a straight end sideways as unequal
+//! wheels do. Wheels that roll.
+//! Observability: all three parameters; needs straights and spins. Ends alone are used, of poses or of marks
+//! read at standstills.
+//! Derived here: Gauss–Newton in place of a general minimiser (with two numbers a run for two gains it ends
+//! in the same minimum), and the covariance, from the scatter of the ends and of the spins' wheelbases, with
+//! the slopes of each step over the other's result.
+//! Reference: Ivanjko, Komšić, Petrović 2007, the variant of three parameters; the one of two, which leaves
+//! out a wheel, is not offered.
 
 use dataset::{NominalRobot, Protocol, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::robust::Summary;
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use crate::settings::{IVANJKO_MAX_ROUNDS, IVANJKO_TOLERANCE, MIN_SPIN_RAD};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ivanjko;
-
-/// A spin of less than this says little of the wheelbase and its sign is not sure.
-const SMALLEST_SPIN_RAD: f64 = 0.5;
-
-/// Rounds of both steps; a handful are enough, and the method says when they were not.
-const ROUNDS: u32 = 50;
-
-/// A change by less than this share is none.
-const SETTLED: f64 = 1e-12;
 
 impl Ivanjko {
     /// The method as the table of contents offers it.
@@ -45,105 +43,108 @@ impl Ivanjko {
     }
 }
 
-/// A straight run with its end as it was seen.
+/// A straight run with its measured end.
 struct Straight {
     /// How the wheels turned, row by row, radians.
     steps_rad: Vec<Wheels<f64>>,
     /// In the frame of the start, metres.
-    seen_m: Vector2<f64>,
+    measured_m: Vector2<f64>,
 }
 
 impl Straight {
-    /// What is missing to the end that was seen, and the slopes of the reckoned end over r_L and r_R and over B.
+    /// Measured minus dead-reckoned end, metres, and the slopes of the latter over r_L and r_R and over B.
     fn missing(&self, at: &GeometryParameters) -> (Vector2<f64>, Matrix2<f64>, Vector2<f64>) {
         let mut end = DeadReckoned::at(Pose::IDENTITY);
         for step in &self.steps_rad {
             end.advance(at, *step);
         }
         let slopes = end.by_geometry.fixed_rows::<2>(0);
-        let missing_m = self.seen_m - Vector2::new(end.pose.x_m, end.pose.y_m);
+        let missing_m = self.measured_m - Vector2::new(end.pose.x_m, end.pose.y_m);
         (missing_m, slopes.fixed_columns::<2>(0).into_owned(), slopes.column(2).into_owned())
     }
 }
 
-/// A spin with its turn as it was seen.
+/// A spin with its measured turn.
 #[derive(Debug, Clone, Copy)]
 struct Spin {
     wheel_rad: Wheels<f64>,
     /// Modulo whole turns, radians.
-    seen_rad: f64,
+    measured_rad: f64,
 }
 
 impl Spin {
     /// B θ by the wheels (metres) and θ with its whole turns (radians).
     fn of_wheels(&self, at: &GeometryParameters) -> (f64, f64) {
         let travel_m = self.wheel_rad.right * at.m_per_rad.right - self.wheel_rad.left * at.m_per_rad.left;
-        (travel_m, unwrap_near(self.seen_rad, travel_m / at.separation_m))
+        (travel_m, unwrap_near(self.measured_rad, travel_m / at.separation_m))
     }
 }
 
-/// Step 1 linearised: normal matrix over r_L and r_R, what each run asks for, and how the answer moves with B.
+/// Step 1 linearised: normal matrix over r_L and r_R, each run's score, the correction of both, and its slope
+/// over B.
 struct Step1 {
     normal: Matrix2<f64>,
     scores: Vec<DVector<f64>>,
-    asked: Vector2<f64>,
+    correction: Vector2<f64>,
     radii_by_base: Vector2<f64>,
 }
 
 impl Step1 {
     fn of(straights: &[Straight], at: &GeometryParameters) -> Option<Self> {
-        let (mut normal, mut asked, mut by_base) = (Matrix2::zeros(), Vector2::zeros(), Vector2::zeros());
+        let (mut normal, mut correction, mut by_base) = (Matrix2::zeros(), Vector2::zeros(), Vector2::zeros());
         let mut scores = Vec::with_capacity(straights.len());
         for straight in straights {
             let (missing, slopes, base_slope) = straight.missing(at);
             normal += slopes.transpose() * slopes;
             let score = slopes.transpose() * missing;
-            asked += score;
+            correction += score;
             by_base -= slopes.transpose() * base_slope;
             scores.push(DVector::from_column_slice(score.as_slice()));
         }
         let inverse: Matrix2<f64> = normal.try_inverse()?;
-        Some(Self { normal, scores, asked: inverse * asked, radii_by_base: inverse * by_base })
+        Some(Self { normal, scores, correction: inverse * correction, radii_by_base: inverse * by_base })
     }
 }
 
-/// Step 2: the wheelbase of one direction, metres, by the least squares of the heading over its gain; `None` without spins that way.
+/// Step 2: the wheelbase of one direction, metres, by the least squares of the heading over its gain; `None`
+/// without spins in that direction.
 fn separation_m(spins: &[Spin], at: &GeometryParameters, sign: f64) -> Option<f64> {
-    let of_way = spins.iter().map(|spin| spin.of_wheels(at)).filter(|(_, turn_rad)| turn_rad * sign > 0.0);
-    let (squares, products) = of_way.fold((0.0, 0.0), |(squares, products), (travel_m, turn_rad)| {
+    let of_direction = spins.iter().map(|spin| spin.of_wheels(at)).filter(|(_, turn_rad)| turn_rad * sign > 0.0);
+    let (squares, products) = of_direction.fold((0.0, 0.0), |(squares, products), (travel_m, turn_rad)| {
         (squares + travel_m * travel_m, products + travel_m * turn_rad)
     });
     (products > 0.0).then_some(squares / products)
 }
 
 fn mean_m(spins: &[Spin], at: &GeometryParameters) -> Option<f64> {
-    let ways: Vec<f64> = [1.0, -1.0].into_iter().filter_map(|sign| separation_m(spins, at, sign)).collect();
-    (!ways.is_empty()).then(|| ways.iter().sum::<f64>() / ways.len() as f64)
+    let directions: Vec<f64> = [1.0, -1.0].into_iter().filter_map(|sign| separation_m(spins, at, sign)).collect();
+    (!directions.is_empty()).then(|| directions.iter().sum::<f64>() / directions.len() as f64)
 }
 
-/// Covariance of r_L, r_R and B. Each step's own scatter, and each step's answer moves with the other's.
+/// Covariance of r_L, r_R and B. Each step has its own scatter, and its result moves with the other's.
 fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<Matrix3<f64>> {
     let normal = DMatrix::from_column_slice(2, 2, step.normal.as_slice());
     let radii = scatter_between_runs(&normal, &step.scores, 1)?;
-    let (mut base_var, mut base_by, mut ways) = (0.0, Vector2::zeros(), 0.0);
+    let (mut base_var, mut base_by, mut directions) = (0.0, Vector2::zeros(), 0.0);
     for sign in [1.0, -1.0] {
-        let of_way: Vec<_> = spins
+        let of_direction: Vec<_> = spins
             .iter()
             .map(|spin| (spin, spin.of_wheels(at)))
             .filter(|(_, (_, turn_rad))| turn_rad * sign > 0.0)
             .collect();
-        if of_way.is_empty() {
+        if of_direction.is_empty() {
             continue;
         }
-        let base: Vec<f64> = of_way.iter().map(|(_, (travel_m, turn_rad))| travel_m / turn_rad).collect();
+        let base: Vec<f64> = of_direction.iter().map(|(_, (travel_m, turn_rad))| travel_m / turn_rad).collect();
         base_var += Summary::of(base.iter().copied())?.mean_variance()?;
-        for (spin, (_, turn_rad)) in &of_way {
-            base_by += Vector2::new(-spin.wheel_rad.left, spin.wheel_rad.right) / (turn_rad * of_way.len() as f64);
+        for (spin, (_, turn_rad)) in &of_direction {
+            base_by +=
+                Vector2::new(-spin.wheel_rad.left, spin.wheel_rad.right) / (turn_rad * of_direction.len() as f64);
         }
-        ways += 1.0;
+        directions += 1.0;
     }
     // The mean over the directions.
-    let (base_var, base_by) = (base_var / (ways * ways), base_by / ways);
+    let (base_var, base_by) = (base_var / (directions * directions), base_by / directions);
     let mut coupling = Matrix3::identity();
     coupling.fixed_view_mut::<2, 1>(0, 2).copy_from(&-step.radii_by_base);
     coupling.fixed_view_mut::<1, 2>(2, 0).copy_from(&-base_by.transpose());
@@ -154,9 +155,10 @@ fn covariance(step: &Step1, spins: &[Spin], at: &GeometryParameters) -> Option<M
     Some(inverse * own * inverse.transpose())
 }
 
-/// The first and the last look at a run within its log, and how the wheels turned in between, row by row; `None` without two.
+/// The first and the last measured pose of a run within its log, and how the wheels turned in between, row by
+/// row; `None` without two.
 ///
-/// The wheels are taken at the measurements' instants: an instrument that stops looking before the log ends has not seen what they turned since.
+/// The wheels are taken at the measurements' instants: what they turn after the last one is not measured.
 fn whole(run: &RunView<'_>, robot: &NominalRobot, nominal: &DriveGeometry) -> Option<(Pose, PoseMeasurement)> {
     let measurements = PoseMeasurements::at(run, &WheelAngleInterpolator::of(run, robot)?, nominal, Spacing::ENDS)?;
     let PoseMeasurements { start, mut later, .. } = measurements;
@@ -172,7 +174,8 @@ impl Method for Ivanjko {
         "straight runs' ends give both wheels, spins the wheelbase, by least squares over the log"
     }
 
-    /// Straight runs and half turns each way; the numbers are those of the study that published its logs (Sousa et al. 2022: 1.5 m, 5 of each kind).
+    /// Straight runs and half turns each way; the numbers are those of the study that published its logs
+    /// (Sousa et al. 2022: 1.5 m, 5 of each kind).
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 1.5, runs: 6 },
@@ -183,7 +186,8 @@ impl Method for Ivanjko {
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
         let (mut straights, mut spins) = (Vec::new(), Vec::new());
-        let mut at = GeometryParameters { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
+        let mut at =
+            GeometryParameters { m_per_rad: geometry.m_per_rad(), separation_m: geometry.wheel_separation_m() };
         for session in sessions {
             for run in &session.runs {
                 let Some((start, end)) = whole(run, session.robot, &geometry) else { continue };
@@ -192,12 +196,12 @@ impl Method for Ivanjko {
                 let wheel_rad = steps_rad.iter().fold(Wheels::both(0.0), sum);
                 match run.info().protocol {
                     Some(Protocol::Straight) if wheel_rad != Wheels::both(0.0) => {
-                        let seen = start.to(end);
-                        straights.push(Straight { steps_rad, seen_m: Vector2::new(seen.x_m, seen.y_m) });
+                        let measured = start.to(end);
+                        straights.push(Straight { steps_rad, measured_m: Vector2::new(measured.x_m, measured.y_m) });
                     }
                     Some(Protocol::Spin) => {
-                        let spin = Spin { wheel_rad, seen_rad: end.theta_rad - start.theta_rad };
-                        if spin.of_wheels(&at).1.abs() >= SMALLEST_SPIN_RAD {
+                        let spin = Spin { wheel_rad, measured_rad: end.theta_rad - start.theta_rad };
+                        if spin.of_wheels(&at).1.abs() >= MIN_SPIN_RAD {
                             spins.push(spin);
                         }
                     }
@@ -219,15 +223,16 @@ impl Method for Ivanjko {
             });
         }
         let (mut converged, mut last) = (false, None);
-        for _ in 0..ROUNDS {
+        for _ in 0..IVANJKO_MAX_ROUNDS {
             let Some(step) = Step1::of(&straights, &at) else { break };
-            at.m_per_rad.left += step.asked.x;
-            at.m_per_rad.right += step.asked.y;
+            at.m_per_rad.left += step.correction.x;
+            at.m_per_rad.right += step.correction.y;
             let Some(base_m) = mean_m(&spins, &at) else { break };
-            let changed = (step.asked.amax() / at.m_per_rad.left).abs().max((base_m / at.separation_m - 1.0).abs());
+            let changed =
+                (step.correction.amax() / at.m_per_rad.left).abs().max((base_m / at.separation_m - 1.0).abs());
             at.separation_m = base_m;
             last = Some(step);
-            if changed < SETTLED {
+            if changed < IVANJKO_TOLERANCE {
                 converged = true;
                 break;
             }

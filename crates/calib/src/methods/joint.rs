@@ -1,21 +1,26 @@
-//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument measured.
+//! `joint`, the default: maximum likelihood of whole runs in state space, from whatever the instrument
+//! measured.
 //!
-//! Model: [`estimation`]: counts predict, measurements correct; geometry, the noise of wheels and instrument and every start pose are estimated.
-//! Assumptions: the instrument's errors are independent. That is tested: while innovations are autocorrelated, measurements are taken farther
-//! apart. Extrinsics and latency of the instrument join when they predict runs that they were not fitted to.
-//! Observability: any path; what the measurements do not determine is named and kept at its nominal value. Ends of closed paths hide the common scale, paths without
-//! turns the wheel separation.
-//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin, Reid & Firth 2011 (composite likelihood).
+//! Model: [`estimation`]: counts predict, measurements correct; geometry, the noise of wheels and instrument
+//! and every start pose are estimated.
+//! Assumptions: the instrument's errors are independent. That is tested: while innovations are
+//! autocorrelated, measurements are taken farther apart. Extrinsics and latency of the instrument join when
+//! they predict runs that they were not fitted to.
+//! Observability: any path; what the measurements do not determine is named and kept at its nominal value.
+//! Ends of closed paths hide the common scale, paths without turns the wheel separation.
+//! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin,
+//! Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
-use motion_programs::Schedule;
-use estimation::{Grouping, Column, FitSettings, ModelFit, LargeFit, Model, OneStepError, fit_large};
+use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, OneStepError, fit_large};
 use kinematics::Pose;
+use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Method, Extrinsics, NotObservable, GroupInstrument, Rejected, drive, nominal,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, Rejected,
+    covariance_of_lengths, drive, nominal,
 };
 
 /// The method with the settings of its fit.
@@ -31,11 +36,13 @@ impl Joint {
 
     const NAME: &'static str = "joint";
 
-    /// Calibrates from datasets of any size, in the memory of a part of them; `notice` gets each dataset's number and what was noticed of it. Where
-    /// [`estimation::is_large`] says no, [`Method::calibrate`] does better: it takes all measurements for every choice.
+    /// Calibrates from datasets of any size, in the memory of a part of them; `notice` gets each dataset's
+    /// number and what was noticed of it. Where [`estimation::is_large`] says no, [`Method::calibrate`] does
+    /// better: it takes all measurements for every choice.
     ///
     /// # Errors
-    /// [`LargeCalibrationError`] when the datasets cannot be read, hold no measurements, or the fit of the pieces diverges.
+    /// [`LargeCalibrationError`] when the datasets cannot be read, hold no measurements, or the fit of the
+    /// subsamples diverges.
     pub fn calibrate_large(
         &self,
         datasets: &mut [Blocks],
@@ -89,13 +96,33 @@ impl Method for Joint {
     }
 }
 
+/// The drive of a fit, with what the measurements do not determine of it; `covariance` is
+/// [`ModelFit::covariance`].
+///
+/// # Errors
+/// [`CalibError::NotADrive`] where the values of the fit are none.
+pub fn calibrated_drive(
+    fit: &ModelFit<'_>,
+    covariance: Option<&Covariance>,
+    ticks_per_rev: Option<f64>,
+) -> Result<Calibration, CalibError> {
+    let Model { m_per_rad, separation_m, .. } = fit.solution.model;
+    let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
+    let diameter_m = geometry.wheel_diameter_m();
+    let lengths_m = [diameter_m.left, diameter_m.right, separation_m];
+    Ok(Calibration {
+        covariance: covariance
+            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m)),
+        not_observable: not_observable(fit),
+        runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
+        converged: fit.solution.converged,
+        ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
+    })
+}
+
 /// The fit as a calibration of sessions with these names.
 fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
-    let Model { m_per_rad, separation_m, .. } = fit.fit.model;
-    let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
     let covariance = fit.covariance(&mut []);
-    let diameter_m = geometry.wheel_diameter_m();
-    let sizes = [diameter_m.left, diameter_m.right, separation_m];
     let at = |column: Column| fit.columns.iter().position(|of| *of == column);
     let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
     let instrument = fit.mean_instrument();
@@ -107,23 +134,16 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
     });
     let latency_sigma_s = at(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
     Ok(Calibration {
-        covariance: covariance
-            .as_ref()
-            .map(|covariance| Covariance::from_fn(3, 3, |i, j| covariance[(i, j)] * sizes[i] * sizes[j])),
         extrinsics,
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
-        not_observable: not_observable(fit),
-        runs_used: fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         runs_rejected: rejected(fit),
-        converged: fit.fit.converged,
-        ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
+        ..calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?
     })
 }
 
 /// What the measurements do not determine of the geometry.
-#[must_use]
-pub fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
+fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
     fit.unobservable
         .iter()
         .map(|direction| {
@@ -140,7 +160,7 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
         run: id(*run),
         why: "it has no wheels, or fewer than two measurements of the instrument within its log".to_owned(),
     });
-    let far = fit.fit.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
+    let far = fit.solution.pass.runs.iter().filter(|run| run.count == 0.0).map(|run| Rejected {
         run: id(run.run),
         why: "what the instrument measured lies far outside of what wheels and noise explain".to_owned(),
     });
@@ -149,7 +169,7 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
 
 /// The instruments of groups, by the sessions' names.
 fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
-    let Some(own) = &fit.fit.model.own else { return Vec::new() };
+    let Some(own) = &fit.solution.model.own else { return Vec::new() };
     let name = |(session, run): (usize, usize)| {
         let session_name = names[session].to_owned();
         match own.grouping {

@@ -1,23 +1,28 @@
 //! `jung_chung`: UMBmark's squares, by their final headings instead of their final positions.
 //!
-//! Model: on a square driven by nominal odometry every side turns the robot by β (unequal wheels) and every corner falls short by α (wrong wheelbase). The
-//! final heading, true minus odometry, is ε = 4(β + α) clockwise and 4(β − α) counter-clockwise: α = (ε_cw − ε_ccw)/8, β = (ε_cw + ε_ccw)/8, with ε the
-//! mean over a direction's runs. E_b = (π/2)/(π/2 − α), and R = L/β is the radius on which a side of length L bends, so that
-//! E_d = (R + B/2)/(R − B/2) = (1 + q)/(1 − q) with q = B β/(2L). B = E_b b stands in q where UMBmark has the nominal b: the coupling of the two errors.
-//! Assumptions: the mean diameter is right; corners are turned on the spot, sides by equal turns of nominally equal wheels.
-//! Observability: a heading is a ratio of lengths, θ = (r_R φ_R − r_L φ_L)/B, so E_d and B over the mean diameter are found exactly, with no small-angle
-//! form, and the scale common to wheels *and* base not at all. It bends no heading; distances are off by it.
-//! Reference: Jung & Chung 2011/2012. Theirs is R = (L/2)/sin(β/2), which takes the side for the chord: β²/24 of q, not kept. A published implementation
-//! (OptiOdom's) adds π b β/(4L) to α; unequal wheels do not turn a corner wrongly while their mean is kept, so it is left out (docs/calibration.md).
+//! Model: on a square driven by nominal odometry every side turns the robot by β (unequal wheels) and every
+//! corner falls short by α (wrong wheelbase). The final heading, true minus odometry, is ε = 4(β + α)
+//! clockwise and 4(β − α) counter-clockwise: α = (ε_cw − ε_ccw)/8, β = (ε_cw + ε_ccw)/8, with ε the mean over
+//! a direction's runs. E_b = (π/2)/(π/2 − α), and R = L/β is the radius on which a side of length L bends, so
+//! that E_d = (R + B/2)/(R − B/2) = (1 + q)/(1 − q) with q = B β/(2L). B = E_b b stands in q where UMBmark
+//! has the nominal b: the coupling of the two errors.
+//! Assumptions: the mean diameter is right; corners are turned on the spot, sides by equal turns of nominally
+//! equal wheels.
+//! Observability: a heading is a ratio of lengths, θ = (r_R φ_R − r_L φ_L)/B, so E_d and B over the mean
+//! diameter are found exactly, with no small-angle form, and the scale common to wheels *and* base not at
+//! all. It bends no heading; distances are off by it.
+//! Reference: Jung & Chung 2011/2012. Theirs is R = (L/2)/sin(β/2), which takes the side for the chord: β²/24
+//! of q, not kept. A published implementation (OptiOdom's) adds π b β/(4L) to α; unequal wheels do not turn a
+//! corner wrongly while their mean is kept, so it is left out (docs/calibration.md).
 
 use std::f64::consts::FRAC_PI_2;
 
 use dataset::{Protocol, Session};
-use motion_programs::Schedule;
 use kinematics::{Wheels, wrap_to_pi};
+use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::Summary;
 
 /// The method; it has nothing to choose.
@@ -55,9 +60,9 @@ impl Method for JungChung {
         let mut side_m = None;
         for session in sessions {
             for run in &session.runs {
-                let of_way = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
-                let Some((_, errors_rad)) = of_way else { continue };
-                let Some(ends) = ConvergenceCriterion::of(run, session.robot, &geometry) else { continue };
+                let of_direction = errors_rad.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol));
+                let Some((_, errors_rad)) = of_direction else { continue };
+                let Some(ends) = EndPoses::of(run, session.robot, &geometry) else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
@@ -67,10 +72,11 @@ impl Method for JungChung {
                         "its squares must all have the same side_m; calibrate them apart",
                     ));
                 }
-                // The wheels at the measurements' instants: what they turned after the last one was not seen.
+                // The wheels at the measurements' instants: what they turned after the last one was not
+                // measured.
                 let turned_m = ends.turned_rad().zip_with(geometry.m_per_rad(), |rad, m_per_rad| m_per_rad * rad);
-                let reckoned_rad = geometry.increment(turned_m).turn_rad;
-                errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - reckoned_rad));
+                let dead_reckoned_rad = geometry.increment(turned_m).turn_rad;
+                errors_rad.push(wrap_to_pi(ends.end.theta_rad - ends.start.theta_rad - dead_reckoned_rad));
             }
         }
         let [cw, ccw] = errors_rad.map(|(_, errors_rad)| Summary::of(errors_rad.iter().copied()));
@@ -84,7 +90,8 @@ impl Method for JungChung {
         let separation_m = geometry.wheel_separation_m() * FRAC_PI_2 / (FRAC_PI_2 - alpha_rad);
         let q = mismatch(separation_m, side_m, beta_rad);
         let covariance = cw.mean_variance().zip(ccw.mean_variance()).map(|(cw_var, ccw_var)| {
-            // Rows: left and right diameter, separation; columns: α, β. D_L = (1 − q) D and D_R = (1 + q) D, of mean D and ratio (1 + q)/(1 − q).
+            // Rows: left and right diameter, separation; columns: α, β. D_L = (1 − q) D and D_R = (1 + q) D,
+            // of mean D and ratio (1 + q)/(1 − q).
             let by_alpha = separation_m / (FRAC_PI_2 - alpha_rad);
             let q_by = [0.5 * by_alpha * beta_rad / side_m, 0.5 * separation_m / side_m];
             let slopes = [-mean_m * q_by[0], -mean_m * q_by[1], mean_m * q_by[0], mean_m * q_by[1], by_alpha, 0.0];
@@ -97,7 +104,8 @@ impl Method for JungChung {
             covariance,
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
-                why: "a heading is a ratio of lengths: wheels and wheelbase larger by one factor turn alike; the nominal mean diameter is kept: measure a straight run of known length first",
+                why: "a heading is a ratio of lengths: wheels and wheelbase larger by one factor turn alike; \
+                      the nominal mean diameter is kept: measure a straight run of known length first",
             }],
             runs_used: cw.count + ccw.count,
             ..Calibration::new(Self::NAME, drive(Self::NAME, diameter_m, separation_m)?, robot.ticks_per_rev)
@@ -105,7 +113,8 @@ impl Method for JungChung {
     }
 }
 
-/// Half of the wheels' relative difference, q of E_d = (1 + q)/(1 − q): B/2 over the radius on which a side bends by β.
+/// Half of the wheels' relative difference, q of E_d = (1 + q)/(1 − q): B/2 over the radius on which a side
+/// bends by β.
 fn mismatch(separation_m: f64, side_m: f64, beta_rad: f64) -> f64 {
     0.5 * separation_m * beta_rad / side_m
 }
@@ -114,7 +123,8 @@ fn mismatch(separation_m: f64, side_m: f64, beta_rad: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// With B in place of b the published R = (L/2)/sin(β/2) differs from L/β by β²/24 of itself: 4e-8 at a milliradian, 1e-4 at 3°.
+    /// With B in place of b the published R = (L/2)/sin(β/2) differs from L/β by β²/24 of itself: 4e-8 at a
+    /// milliradian, 1e-4 at 3°.
     #[test]
     fn the_published_radius_is_the_arc_to_second_order() {
         for beta_rad in [1e-3_f64, -0.02, 0.05] {

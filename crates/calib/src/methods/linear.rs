@@ -1,22 +1,27 @@
 //! `linear`: linear least squares on any path, first the headings, then the positions.
 //!
-//! Model: Δs = c11 φ_R + c12 φ_L and Δθ = c21 φ_R + c22 φ_L. Step 1: θ_N − θ_0 = [Σ Δφ_R, Σ Δφ_L]·[c21; c22]. Step 2, with the headings of step 1 along the
-//! log: p_N − p_0 = [Σ Δφ_R e(θ), Σ Δφ_L e(θ)]·[c11; c12] with e(θ) the direction of the path, the chord of an exact arc between two rows. The physical form
-//! has three parameters, c11 = r_R/2, c12 = r_L/2, c21 = r_R/B, c22 = −r_L/B: r_L/r_R = −c22/c21 from step 1, then r_R alone, B = r_R/c21.
-//! Assumptions: wheels that roll; headings without noise in step 2. Heading noise of variance σ² (of the start's reading, and of the path against the log)
-//! turns what was seen against its regressor: wheels and base come out short by σ²/2 of themselves. It does not average out over runs.
-//! Observability: all parameters where paths turn both ways or both turn and go straight, and end away from their start. On closed paths the physical
-//! form keeps the mean diameter and says that it is blind to the common scale; the general one needs curves: on straights and whole spins c11 and c12 are one.
-//! Derived here: what of a run is an equation ([`Readings`]), the refusals, the covariance (residuals of a run taken together, scatter between runs), and the
-//! geometry that the general form comes nearest to.
+//! Model: Δs = c11 φ_R + c12 φ_L and Δθ = c21 φ_R + c22 φ_L. Step 1: θ_N − θ_0 = [Σ Δφ_R, Σ Δφ_L]·[c21; c22].
+//! Step 2, with the headings of step 1 along the log: p_N − p_0 = [Σ Δφ_R e(θ), Σ Δφ_L e(θ)]·[c11; c12] with
+//! e(θ) the direction of the path, the chord of an exact arc between two rows. The physical form has three
+//! parameters, c11 = r_R/2, c12 = r_L/2, c21 = r_R/B, c22 = −r_L/B: r_L/r_R = −c22/c21 from step 1, then r_R
+//! alone, B = r_R/c21.
+//! Assumptions: wheels that roll; headings without noise in step 2. Heading noise of variance σ² (of the
+//! start's reading, and of the path against the log) turns the measured displacement against its regressor:
+//! wheels and base come out short by σ²/2 of themselves. It does not average out over runs.
+//! Observability: all parameters where paths turn both ways or both turn and go straight, and end away from
+//! their start. On closed paths the physical form keeps the mean diameter and says that it is blind to the
+//! common scale; the general one needs curves: on straights and whole spins c11 and c12 are one.
+//! Derived here: what of a run is an equation ([`Readings`]), the refusals, the covariance (residuals of a
+//! run taken together, scatter between runs), and the geometry that the general form comes nearest to.
 //! Reference: Antonelli, Chiaverini, Fusco 2005 (general form); Antonelli & Chiaverini 2007 (physical form).
 
 use dataset::{NominalRobot, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Side, Wheels, sinc, unwrap_near};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
+use crate::settings::{CLOSED_PATH_RATIO, COLLINEARITY_TOLERANCE, DIFFERENCE_STEP};
 use estimation::WheelAngleInterpolator;
 
 /// How many parameters the model has.
@@ -31,9 +36,10 @@ pub enum Form {
 /// What of a run is an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Readings {
-    /// Its last pose seen from its first, where the robot stands: the papers' form.
-    ConvergenceCriterion,
-    /// Every pose seen from the first: for single long runs, and to see the scale on closed paths. Clocks that differ then enter the headings.
+    /// Its last pose in the frame of its first, where the robot stands: the papers' form.
+    EndPoses,
+    /// Every pose in the frame of the first: for single long runs, and to determine the scale on closed
+    /// paths. Differences of the clocks then enter the headings.
     All,
 }
 
@@ -57,18 +63,9 @@ pub struct Gains {
     pub covariance: Option<DMatrix<f64>>,
 }
 
-/// Two regressors are one when 1 − |cosine| of the angle between them is less: wheels whose turns differ by less than 1.4 % of themselves over all runs.
-const COLLINEAR: f64 = 1e-4;
-
-/// Paths whose ends are nearer to their starts than this share of what the wheels went are closed: they do not show the scale.
-const CLOSED: f64 = 0.05;
-
-/// Step of central differences of the paths over step 1's result, as a share of it: h² of a smooth function is left, 1e-8.
-const DIFFERENCE: f64 = 1e-4;
-
 impl Linear {
     /// The method as the table of contents offers it: the physical form on the runs' ends.
-    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::ConvergenceCriterion };
+    pub const DEFAULT: Self = Self { form: Form::Physical, readings: Readings::EndPoses };
 
     const NAME: &'static str = "linear";
 
@@ -82,7 +79,7 @@ struct Driven {
     equations: Vec<Equation>,
 }
 
-/// A pose seen from the run's first.
+/// A pose in the frame of the run's first.
 struct Equation {
     /// How the wheels turned since the equation before, row by row, radians.
     steps_rad: Vec<Wheels<f64>>,
@@ -90,9 +87,9 @@ struct Equation {
     wheel_rad: Wheels<f64>,
     /// The same with every row counted forward.
     rolled_rad: Wheels<f64>,
-    /// Turn seen, whole turns counted, radians.
+    /// Measured turn, whole turns counted, radians.
     turn_rad: f64,
-    /// Displacement seen in the frame of the first pose, metres.
+    /// Measured displacement in the frame of the first pose, metres.
     moved_m: Vector2<f64>,
 }
 
@@ -100,11 +97,11 @@ impl Driven {
     fn of(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry, readings: Readings) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, robot)?;
         // Poses outside of the log have no odometry to be compared with.
-        let mut seen: Vec<(f64, Pose)> = run.observed_poses();
-        seen.retain(|(t_s, _)| track.steps(*t_s, *t_s).is_some());
-        let ((start_s, start), after) = seen.split_first()?;
+        let mut poses: Vec<(f64, Pose)> = run.observed_poses();
+        poses.retain(|(t_s, _)| track.steps(*t_s, *t_s).is_some());
+        let ((start_s, start), after) = poses.split_first()?;
         let chosen = match readings {
-            Readings::ConvergenceCriterion => &after[after.len().checked_sub(1)?..],
+            Readings::EndPoses => &after[after.len().checked_sub(1)?..],
             Readings::All => after,
         };
         let (mut last_s, mut wheel_rad, mut rolled_rad) = (*start_s, Wheels::both(0.0), Wheels::both(0.0));
@@ -126,7 +123,8 @@ impl Driven {
         (!equations.is_empty()).then_some(Self { equations })
     }
 
-    /// Step 2's regressors at every equation: Σ Δφ e(θ) of each wheel, radians, in the frame of the first pose.
+    /// Step 2's regressors at every equation: Σ Δφ e(θ) of each wheel, radians, in the frame of the first
+    /// pose.
     fn paths(&self, turn_per_rad: Wheels<f64>) -> Vec<Wheels<Vector2<f64>>> {
         let (mut at, mut theta_rad) = (Wheels::both(Vector2::zeros()), 0.0);
         let mut after = |equation: &Equation| {
@@ -143,7 +141,7 @@ impl Driven {
     }
 }
 
-/// Step 1's answer with what the covariance needs of it.
+/// The result of step 1, with what its covariance needs.
 struct Headings {
     /// c22 (left, negative) and c21 (right).
     turn_per_rad: Wheels<f64>,
@@ -179,7 +177,7 @@ impl Headings {
     /// Slope of a function of c21 and c22 over both, by central differences.
     fn slopes<T>(&self, of: impl Fn(Wheels<f64>) -> T, difference: impl Fn(T, T, f64) -> T) -> [T; 2] {
         [Side::Right, Side::Left].map(|side| {
-            let size = DIFFERENCE * self.turn_per_rad[side].abs();
+            let size = DIFFERENCE_STEP * self.turn_per_rad[side].abs();
             let (mut more, mut less) = (self.turn_per_rad, self.turn_per_rad);
             more[side] += size;
             less[side] -= size;
@@ -191,16 +189,18 @@ impl Headings {
 /// Two normal equations; `None` when their regressors are one.
 fn solve(normal: &Matrix2<f64>, right: &Vector2<f64>) -> Option<Vector2<f64>> {
     let cosine = normal[(0, 1)] / (normal[(0, 0)] * normal[(1, 1)]).sqrt();
-    if cosine.is_nan() || 1.0 - cosine.abs() < COLLINEAR {
+    if cosine.is_nan() || 1.0 - cosine.abs() < COLLINEARITY_TOLERANCE {
         return None;
     }
     Some(normal.try_inverse()? * right)
 }
 
-/// Covariance of the solution of Σ g = 0 over runs from the scatter of the runs' scores g, with `slopes` −Σ ∂g/∂p. `taken` is how many runs' worth of
-/// equations the parameters take: n/(n − taken) is the correction of a sample's variance. `None` when nothing is left over.
+/// Covariance of the solution of Σ g = 0 over runs from the scatter of the runs' scores g, with `slopes` −Σ
+/// ∂g/∂p. `taken` is how many runs' worth of equations the parameters take: n/(n − taken) is the correction
+/// of a sample's variance. `None` when nothing is left over.
 ///
-/// Whatever is correlated inside of a run (its start's reading, its random walk) stays inside of a score: only runs have to be independent.
+/// Whatever is correlated inside of a run (its start's reading, its random walk) stays inside of a score:
+/// only runs have to be independent.
 pub(super) fn scatter_between_runs(
     slopes: &DMatrix<f64>,
     scores: &[DVector<f64>],
@@ -237,7 +237,7 @@ impl Scale {
         let normal: f64 = pairs().map(|(_, path)| path.norm_squared()).sum();
         let travelled = |rad: Wheels<f64>| 0.5 * (rad.right * at.right - rad.left * at.left);
         let travelled: f64 = pairs().map(|(equation, _)| travelled(equation.rolled_rad).powi(2)).sum();
-        if normal.is_nan() || normal <= CLOSED * CLOSED * travelled {
+        if normal.is_nan() || normal <= CLOSED_PATH_RATIO * CLOSED_PATH_RATIO * travelled {
             return None;
         }
         let separation_m = pairs().map(|(equation, path)| path.dot(&equation.moved_m)).sum::<f64>() / normal;
@@ -272,7 +272,7 @@ impl Linear {
     /// The general form: all four gains, each free.
     ///
     /// # Errors
-    /// [`CalibError`] when the paths do not tell the wheels apart, in headings or in positions.
+    /// [`CalibError`] when the paths do not determine both wheels, in headings or in positions.
     pub fn gains(&self, sessions: &[Session<'_>]) -> Result<Gains, CalibError> {
         let (_, _, runs) = self.runs(sessions)?;
         let headings = Headings::of(&runs)?;
@@ -286,7 +286,7 @@ impl Linear {
         }
         let rolled = |equation: &Equation| equation.rolled_rad.left.powi(2) + equation.rolled_rad.right.powi(2);
         let rolled: f64 = runs.iter().flat_map(|run| &run.equations).map(rolled).sum();
-        let open = normal.trace() > CLOSED * CLOSED * rolled;
+        let open = normal.trace() > CLOSED_PATH_RATIO * CLOSED_PATH_RATIO * rolled;
         let Some(solution) = solve(&normal, &right).filter(|_| open) else {
             let why = "the paths close, or are of one shape for both wheels, so that no gain shows, or only their sum; drive open curves, or use the physical form";
             return Err(Self::unobservable(Parameter::LeftWheelDiameter, why));
@@ -370,7 +370,8 @@ impl Linear {
         })
     }
 
-    /// The geometry nearest to the general form: diameters of c11 and c12, and the base that turns both wheels together as c21 and c22 do.
+    /// The geometry nearest to the general form: diameters of c11 and c12, and the base that turns both
+    /// wheels together as c21 and c22 do.
     fn general(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, _) = nominal(Self::NAME, sessions)?;
         let Gains { distance_m_per_rad: c1, turn_per_rad: c2, covariance } = self.gains(sessions)?;

@@ -1,21 +1,27 @@
 //! `segments`: the drive that brings dead reckoning nearest to the truth all along the path, on any path.
 //!
-//! Model: from a run's first pose on, dead reckoning is compared with the truth at the end of every segment of a given length, and at the run's end; the
-//! error is not set back in between. Minimised is Σ |p̂ − p|² + d²·(θ̂ − θ)² over segments and runs, by Levenberg–Marquardt with exact derivatives, from the
-//! nominal values on. The print has positions alone: d is the segment's length, over which a heading error makes a position error of d·(θ̂ − θ).
-//! Assumptions: the instrument sees the drive's centre. Errors need not be independent: sigma is the scatter over runs.
-//! Observability: all three on paths with straights and turns, looked at on the way. Without heading errors in the sum spins show nothing of the separation.
-//! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends by Rprop and stops before the minimum.
+//! Model: from a run's first pose on, dead reckoning is compared with the truth at the end of every segment
+//! of a given length, and at the run's end; the error is not set back in between. Minimised is Σ |p̂ − p|² +
+//! d²·(θ̂ − θ)² over segments and runs, by Levenberg–Marquardt with exact derivatives, from the nominal
+//! values on. The print has positions alone: d is the segment's length, over which a heading error makes a
+//! position error of d·(θ̂ − θ).
+//! Assumptions: the instrument is at the drive's centre. Errors need not be independent: sigma is the scatter
+//! over runs.
+//! Observability: all three on paths with straights and turns that are measured along the path. Without
+//! heading errors in the sum, spins do not determine the separation.
+//! Reference: Sousa, Petry, Costa et al. 2022 (OptiOdom; J Intell Robot Syst 105, 39), whose program descends
+//! by Rprop and stops before the minimum.
 
 use dataset::Session;
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Wheels};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
+use motion_programs::Schedule;
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
-use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters, unobservable};
+use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned, unobservable};
+use crate::settings::{HEADING_WEIGHT_M, MIN_SENSITIVITY, SEGMENT_M};
 
 /// The method with its segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,9 +40,6 @@ pub struct Cost {
     /// Its derivatives by left diameter, right diameter and separation, metres.
     pub gradient_m: Vector3<f64>,
 }
-
-/// A direction in which relative changes of the three geometry parameters move the path by so much less than in the best one is not seen.
-const MIN_SENSITIVITY: f64 = 1e-3;
 
 /// Errors of all paths as a function of the three geometry parameters over their nominal values.
 #[derive(Debug, Clone)]
@@ -57,16 +60,18 @@ impl PathErrors<'_> {
         3 * self.paths.iter().map(|path| path.later.len()).sum::<usize>()
     }
 
-    /// Calls `visit` with path, error (m, m, weighted rad) and its derivatives by the factors, at the end of every segment.
+    /// Calls `visit` with path, error (m, m, weighted rad) and its derivatives by the factors, at the end of
+    /// every segment.
     fn for_each_end(&self, mut visit: impl FnMut(usize, Vector3<f64>, Matrix3<f64>)) {
         let geometry_parameters = self.geometry_parameters();
         let weight = Vector3::new(1.0, 1.0, self.heading_m);
         for (number, path) in self.paths.iter().enumerate() {
             let mut dead_reckoned = DeadReckoned::at(path.start);
-            for PoseMeasurement { wheel_rad, pose: seen } in &path.later {
+            for PoseMeasurement { wheel_rad, pose: measured } in &path.later {
                 wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
                 let DeadReckoned { pose, by_geometry } = dead_reckoned;
-                let error = Vector3::new(pose.x_m - seen.x_m, pose.y_m - seen.y_m, pose.theta_rad - seen.theta_rad);
+                let error =
+                    Vector3::new(pose.x_m - measured.x_m, pose.y_m - measured.y_m, pose.theta_rad - measured.theta_rad);
                 let by_factors = by_geometry * Matrix3::from_diagonal(&self.nominal);
                 visit(number, error.component_mul(&weight), Matrix3::from_diagonal(&weight) * by_factors);
             }
@@ -100,7 +105,7 @@ impl LeastSquaresProblem<f64, Dyn, U3> for PathErrors<'_> {
     }
 }
 
-/// What one run says of the factors: its normal matrix and its gradient.
+/// Normal matrix and gradient of one run over the factors.
 #[derive(Debug, Clone, Copy)]
 struct Share {
     normal: Matrix3<f64>,
@@ -119,8 +124,9 @@ impl PathErrors<'_> {
 }
 
 impl Segments {
-    /// The method as the table of contents offers it: the segments of the authors' program, and headings for their effect over one.
-    pub const DEFAULT: Self = Self { segment_m: 0.5, heading_m: 0.5 };
+    /// The method as the table of contents offers it: the segments of the authors' program, and headings for
+    /// their effect over one.
+    pub const DEFAULT: Self = Self { segment_m: SEGMENT_M, heading_m: HEADING_WEIGHT_M };
 
     const NAME: &'static str = "segments";
 
@@ -162,8 +168,9 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
     Err(CalibError::Unobservable { method: Segments::NAME, parameter, why })
 }
 
-/// Covariance of the factors by leaving out one run at a time: the sandwich A⁻¹(Σ g gᵀ)A⁻¹ with each run's leverage taken into account. `None` for a single run,
-/// and where the others do not determine the factors without one.
+/// Covariance of the factors by leaving out one run at a time: the sandwich A⁻¹(Σ g gᵀ)A⁻¹ with each run's
+/// leverage taken into account. `None` for a single run, and where the others do not determine the factors
+/// without one.
 fn covariance(shares: &[Share], normal: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let runs = shares.len() as f64;
     let without: Vec<Vector3<f64>> = shares
@@ -193,7 +200,8 @@ impl Method for Segments {
         "any path with straights and turns, seen as poses: least errors of dead reckoning at the ends of its segments"
     }
 
-    /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by their ends alone.
+    /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by
+    /// their ends alone.
     fn protocol(&self) -> Vec<Schedule> {
         vec![
             Schedule::Straights { length_m: 0.5, runs: 40 },
@@ -215,11 +223,9 @@ impl Method for Segments {
         let normal: Matrix3<f64> = shares.iter().map(|share| share.normal).sum();
         observable(&normal)?;
 
-        let to_lengths = Matrix3::from_diagonal(&nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)));
-        let covariance = covariance(&shares, &normal).map(|covariance| {
-            let covariance = to_lengths * covariance * to_lengths;
-            Covariance::from_column_slice(3, 3, covariance.as_slice())
-        });
+        let lengths_m = nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)).into();
+        let covariance = covariance(&shares, &normal)
+            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m));
         let GeometryParameters { m_per_rad, separation_m } = errors.geometry_parameters();
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
         Ok(Calibration {
@@ -241,26 +247,31 @@ mod tests {
     const NOMINAL: [f64; 3] = [0.08, 0.08, 0.363];
     const TRUTH: [f64; 3] = [0.0811, 0.0797, 0.366];
 
-    /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns as `turn_rad` says, seen to within `error`.
+    /// Runs of a robot with the geometry parameters of [`TRUTH`], of straights and turns, measured to within
+    /// `error`.
     fn runs(count: u32, turn_rad: f64, straight_rad: f64, error: f64) -> Vec<PoseMeasurements<'static>> {
-        let geometry_parameters = GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
+        let geometry_parameters =
+            GeometryParameters { m_per_rad: Wheels { left: TRUTH[0], right: TRUTH[1] }, separation_m: TRUTH[2] };
         (0..count)
             .map(|run| {
                 let start = Pose::new(0.1, 0.2, f64::from(run));
                 let mut dead_reckoned = DeadReckoned::at(start);
                 let later = (0..6_u32)
-                    .map(|leg| {
-                        let way = if run % 2 == 0 { turn_rad } else { -turn_rad };
-                        let wheel_rad = if leg % 2 == 0 {
+                    .map(|interval| {
+                        let turn_rad_of_run = if run % 2 == 0 { turn_rad } else { -turn_rad };
+                        let wheel_rad = if interval % 2 == 0 {
                             vec![Wheels::both(straight_rad); 3]
                         } else {
-                            vec![Wheels { left: -way, right: way }; 2]
+                            vec![Wheels { left: -turn_rad_of_run, right: turn_rad_of_run }; 2]
                         };
                         wheel_rad.iter().for_each(|rad| dead_reckoned.advance(&geometry_parameters, *rad));
                         // No pattern that the geometry parameters could follow, and the same every time.
-                        let off = |k: f64| error * (12.9898 * f64::from(7 * run + leg) + 78.233 * k).sin();
+                        let off = |k: f64| error * (12.9898 * f64::from(7 * run + interval) + 78.233 * k).sin();
                         let Pose { x_m, y_m, theta_rad } = dead_reckoned.pose;
-                        PoseMeasurement { wheel_rad, pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)) }
+                        PoseMeasurement {
+                            wheel_rad,
+                            pose: Pose::new(x_m + off(1.0), y_m + off(2.0), theta_rad + off(3.0)),
+                        }
                     })
                     .collect();
                 PoseMeasurements { run: "run", start, later }
@@ -298,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn without_errors_the_lengths_come_back() {
+    fn without_errors_the_geometry_comes_back() {
         let factors = found(&runs(4, 2.0, 3.0, 0.0));
         let truth = Vector3::from(TRUTH).component_div(&Vector3::from(NOMINAL));
         // Residuals of a few roundings of a metre, on derivatives of a metre and more.
@@ -325,7 +336,8 @@ mod tests {
         let refitted: Matrix3<f64> =
             without.iter().map(|factors| (factors - mean) * (factors - mean).transpose()).sum::<Matrix3<f64>>()
                 * (5.0 / 6.0);
-        // One step instead of a whole descent: errors of 2e-3 on paths of metres leave per mille of the second order.
+        // One step instead of a whole descent: errors of 2e-3 on paths of metres leave per mille of the
+        // second order.
         let off = (one_step - refitted).norm() / refitted.norm();
         assert!(off < 0.01, "{off}");
         // The sandwich that forgets each run's leverage would not pass.

@@ -1,34 +1,34 @@
-//! `tachometer`: the speed that each wheel's encoder gives against the ground speed that a reference tachometer measures beside it.
+//! `tachometer`: the speed that each wheel's encoder gives against the ground speed that a reference
+//! tachometer measures beside it.
 //!
-//! Model: a wheel that turns by φ goes r φ, C = r · 2π/ticks. With v_k the mean ground speed of a wheel between the reference's samples k−1 and k, and φ_k
-//! its angle at the sample, interpolated in the log, a run says r = Σ ±v_k (t_k − t_{k−1}) / Σ |φ_k − φ_{k−1}|, the sign being that of the wheel's turn.
-//! The result is the mean over the runs, wheel by wheel.
-//! Assumptions: wheels roll; the tachometer reads the contact's own track; the log is about as dense as the reference. A reference that samples the speed
-//! at an instant instead of its mean is as good for runs that begin and end at rest: the sum is then the trapezoid rule.
-//! Observability: both wheels, their common scale included. Blind to the wheelbase, which keeps its nominal value; spins measure it (`direct`, `ivanjko`).
-//! Reference: Goel, Roumeliotis, Sukhatme 1999 (encoders calibrated against a precision tachometer). The ratio of sums is ours: a slope through the origin
-//! would be drawn towards zero by the rounding of the counts, which enters its regressor.
+//! Model: a wheel that turns by φ goes r φ, C = r · 2π/ticks. With v_k the mean ground speed of a wheel
+//! between the reference's samples k−1 and k, and φ_k its angle at the sample, interpolated in the log, a run
+//! says r = Σ ±v_k (t_k − t_{k−1}) / Σ |φ_k − φ_{k−1}|, the sign being that of the wheel's turn. The result
+//! is the mean over the runs, wheel by wheel.
+//! Assumptions: wheels roll; the tachometer reads the contact's own track; the log is about as dense as the
+//! reference. A reference that samples the speed at an instant instead of its mean is as good for runs that
+//! begin and end at rest: the sum is then the trapezoid rule.
+//! Observability: both wheels, their common scale included. Blind to the wheelbase, which keeps its nominal
+//! value; spins measure it (`direct`, `ivanjko`).
+//! Reference: Goel, Roumeliotis, Sukhatme 1999 (encoders calibrated against a precision tachometer). The
+//! ratio of sums is ours: a slope through the origin would be drawn towards zero by the rounding of the
+//! counts, which enters its regressor.
 
 use dataset::{NominalRobot, RunView, Session};
-use motion_programs::Schedule;
 use kinematics::{Side, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::scatter_between_runs;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
+use crate::settings::{MAX_ROW_INTERVAL_RATIO, MIN_WHEEL_TURN_RAD};
 use estimation::WheelAngleInterpolator;
 
 /// The method; it has nothing to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tachometer;
-
-/// A wheel that turned by less says nothing: its end is interpolated between two rows.
-const SMALLEST_TURN_RAD: f64 = 1.0;
-
-/// Rows of the log may be this many reference intervals apart.
-const COARSEST_LOG: f64 = 2.0;
 
 impl Tachometer {
     /// The method as the table of contents offers it.
@@ -37,7 +37,7 @@ impl Tachometer {
     const NAME: &'static str = "tachometer";
 }
 
-/// Travel of each wheel for one radian, metres, by one run; or why it says nothing.
+/// Travel of each wheel for one radian, metres, by one run; or why it determines none.
 fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'static str> {
     let track = WheelAngleInterpolator::of(run, robot).ok_or("the run has no odometry")?;
     let rows_s = &run.odometry().t_s;
@@ -45,7 +45,7 @@ fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'s
     for samples in run.run().wheel_reference.windows(2) {
         let (from_s, to_s) = (samples[0].t_s, samples[1].t_s);
         let Some(steps) = track.steps(from_s, to_s) else { continue };
-        if longest_gap_s(rows_s, from_s, to_s) > COARSEST_LOG * (to_s - from_s) {
+        if longest_gap_s(rows_s, from_s, to_s) > MAX_ROW_INTERVAL_RATIO * (to_s - from_s) {
             return Err("its odometry has rows too far apart for the tachometer's samples; log more often");
         }
         for side in Side::BOTH {
@@ -56,13 +56,14 @@ fn m_per_rad(run: &RunView<'_>, robot: &NominalRobot) -> Result<Wheels<f64>, &'s
             }
         }
     }
-    if turned_rad.left.min(turned_rad.right) < SMALLEST_TURN_RAD {
+    if turned_rad.left.min(turned_rad.right) < MIN_WHEEL_TURN_RAD {
         return Err("a wheel turned by less than a radian while the tachometer measured");
     }
     Ok(travel_m.zip_with(turned_rad, |travel_m, turned_rad| travel_m / turned_rad))
 }
 
-/// The longest time between two rows of a log from the last one before an interval to the first one after it, seconds.
+/// The longest time between two rows of a log from the last one before an interval to the first one after it,
+/// seconds.
 fn longest_gap_s(rows_s: &[f64], from_s: f64, to_s: f64) -> f64 {
     let first = rows_s.partition_point(|row_s| *row_s <= from_s).saturating_sub(1);
     let last = rows_s.partition_point(|row_s| *row_s < to_s).min(rows_s.len() - 1);

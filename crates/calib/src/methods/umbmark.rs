@@ -1,22 +1,26 @@
 //! `umbmark`: squares driven both ways and measured at their ends.
 //!
-//! Model: errors of type A (wrong wheelbase: every corner turns too far by α) and of type B (unequal wheels: every side bends by β). With ε the end position, true
-//! minus odometry, in the start's frame (first leg along +x, counter-clockwise turns to the left), averaged over the runs of a direction:
-//! α = (x_cw + x_ccw)/(−4L), β = (x_cw − x_ccw)/(−4L), and to first order also α = (y_cw − y_ccw)/(−4L), β = (y_cw + y_ccw)/(−4L).
-//! Then E_b = (π/2)/(π/2 − α), R = (L/2)/sin(β/2), E_d = (R + b/2)/(R − b/2), which is (1+q)/(1−q) with q = (b/L) sin(β/2) and needs no R.
-//! Assumptions: the mean diameter is right (D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1)); corners are turned on the spot.
-//! Observability: the wheelbase and the ratio of the wheels. Blind to their common scale, which shows up as a wrong wheelbase: measure the scale first.
+//! Model: errors of type A (wrong wheelbase: every corner turns too far by α) and of type B (unequal wheels:
+//! every side bends by β). With ε the end position, true minus odometry, in the start's frame (first leg
+//! along +x, counter-clockwise turns to the left), averaged over the runs of a direction: α = (x_cw +
+//! x_ccw)/(−4L), β = (x_cw − x_ccw)/(−4L), and to first order also α = (y_cw − y_ccw)/(−4L), β = (y_cw +
+//! y_ccw)/(−4L). Then E_b = (π/2)/(π/2 − α), R = (L/2)/sin(β/2), E_d = (R + b/2)/(R − b/2), which is
+//! (1+q)/(1−q) with q = (b/L) sin(β/2) and needs no R.
+//! Assumptions: the mean diameter is right (D_L = 2D/(E_d+1), D_R = 2D/(1/E_d+1)); corners are turned on the
+//! spot.
+//! Observability: the wheelbase and the ratio of the wheels. Blind to their common scale, which shows up as a
+//! wrong wheelbase: measure the scale first.
 //! Reference: Borenstein & Feng 1995 (UMBmark), 1996 (eq. for E_b and E_d; b is the nominal wheelbase).
 
 use std::f64::consts::FRAC_PI_2;
 
 use dataset::{Protocol, Session};
-use motion_programs::Schedule;
 use kinematics::{Pose, Rule, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, NotObservable, Parameter, drive, nominal};
-use crate::pose_measurements::ConvergenceCriterion;
+use crate::pose_measurements::EndPoses;
 use crate::robust::Summary;
 
 /// Which coordinate of the end errors α and β are taken from.
@@ -74,30 +78,35 @@ impl Method for Umbmark {
         let mut side_m = None;
         for session in sessions {
             for run in &session.runs {
-                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol)) else {
+                let Some((_, errors)) = errors.iter_mut().find(|(protocol, _)| run.info().protocol == Some(*protocol))
+                else {
                     continue;
                 };
-                // Marks are read at standstills, before and after the whole log; poses from the first measurement to the last, and what lies outside was not seen.
+                // Marks are read at standstills, before and after the whole log. Poses span the log from the
+                // first measurement to the last.
                 let by_marks = run.run().truth.is_empty();
-                let ends = if by_marks { None } else { ConvergenceCriterion::of(run, session.robot, &geometry) };
-                let observed = if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
+                let ends = if by_marks { None } else { EndPoses::of(run, session.robot, &geometry) };
+                let observed =
+                    if by_marks { run.observed_ends() } else { ends.as_ref().map(|ends| (ends.start, ends.end)) };
                 let Some((world_from_start, world_from_end)) = observed else { continue };
                 let Some(run_side_m) = run.info().settings.side_m else {
                     return Err(Self::not_applicable(format!("run {} does not say its side_m", run.info().id)));
                 };
                 // Settings, not measurements: compared exactly.
                 if *side_m.get_or_insert(run_side_m) != run_side_m {
-                    return Err(Self::not_applicable("its squares must all have the same side_m; calibrate them apart"));
+                    return Err(Self::not_applicable(
+                        "its squares must all have the same side_m; calibrate them apart",
+                    ));
                 }
                 // In the start's frame the odometry starts at the origin and the first leg points along +x.
-                let seen = world_from_start.to(world_from_end);
+                let measured = world_from_start.to(world_from_end);
                 let mut dead_reckoned = ends.map(|ends| ends.dead_reckoned(&geometry));
                 if by_marks {
                     let visit = |_, pose| dead_reckoned = Some(pose);
                     run.dead_reckon(session.robot, &geometry, Rule::Midpoint, Pose::IDENTITY, visit);
                 }
                 if let Some(dead_reckoned) = dead_reckoned {
-                    errors.push((seen.x_m - dead_reckoned.x_m, seen.y_m - dead_reckoned.y_m));
+                    errors.push((measured.x_m - dead_reckoned.x_m, measured.y_m - dead_reckoned.y_m));
                 }
             }
         }
@@ -123,7 +132,8 @@ impl Method for Umbmark {
         let by_alpha = separation_m / (FRAC_PI_2 - corner.alpha_rad);
         let by_beta = mean_m * base_m / side_m * 0.5 * (0.5 * corner.beta_rad).cos();
         let covariance = corner.variances.map(|(var, cov)| {
-            // α and β are half sum and half difference of the same two means: equal variances, and a covariance where one direction scatters more.
+            // α and β are half sum and half difference of the same two means: equal variances, and a
+            // covariance where one direction scatters more.
             let jacobian = Matrix3x2::new(0.0, -by_beta, 0.0, by_beta, by_alpha, 0.0);
             let covariance = jacobian * Matrix2::new(var, cov, cov, var) * jacobian.transpose();
             Covariance::from_column_slice(3, 3, covariance.as_slice())
@@ -153,9 +163,10 @@ fn corner_errors(form: Form, side_m: f64, cw: Direction, ccw: Direction) -> Corn
         Form::Y => (cw.y_m, ccw.y_m, -1.0),
     };
     let four = -4.0 * side_m;
-    let variances = cw.mean_variance().zip(ccw.mean_variance()).map(|(cw_var, ccw_var)| {
-        ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four))
-    });
+    let variances = cw
+        .mean_variance()
+        .zip(ccw.mean_variance())
+        .map(|(cw_var, ccw_var)| ((cw_var + ccw_var) / (four * four), (cw_var - ccw_var) / (four * four)));
     CornerErrors {
         alpha_rad: (cw.mean + sign * ccw.mean) / four,
         beta_rad: (cw.mean - sign * ccw.mean) / four,

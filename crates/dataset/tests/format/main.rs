@@ -5,3 +5,5 @@ mod bad_input;
 mod blocks;
 mod real_data;
 mod round_trip;
+#[path = "../../../../tests/support/real_data.rs"]
+mod support;

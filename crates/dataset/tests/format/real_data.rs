@@ -2,25 +2,12 @@
 //! are.
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dataset::import::{Imported, importer};
 use dataset::{Dataset, Existing, Protocol, RunInfo, WheelLog, read, write};
 
-/// Real logs, or `None` with a word about it; with `YAIR_REQUIRE_DATA=1` they must be there.
-#[allow(clippy::print_stdout)]
-fn real_data(test: &str, part: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("YAIR_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let folder = root.join(part);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("YAIR_REQUIRE_DATA").is_ok_and(|value| value == "1");
-    assert!(!required, "{test}: no real data in {} (YAIR_REQUIRE_DATA=1 is set)", folder.display());
-    println!("skipped: {test}: no real data (set YAIR_DATA)");
-    None
-}
+use crate::support::real_data;
 
 fn import(format: &str, source: &Path) -> Vec<Imported> {
     importer(format).expect("a known format").read(source).expect("importable")

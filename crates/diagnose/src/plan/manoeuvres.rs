@@ -328,7 +328,7 @@ pub(crate) fn equations_of(
     manoeuvres
         .iter()
         .filter_map(|manoeuvre| {
-            let dataset = planned(manoeuvre, setting, &fit.fit.model);
+            let dataset = planned(manoeuvre, setting, &fit.solution.model);
             let planned = fit.on_planned_runs(&[dataset.session()]);
             Some((*manoeuvre, total(&planned.scan(&mut terms(all)).runs)?))
         })

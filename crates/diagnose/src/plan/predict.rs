@@ -52,9 +52,9 @@ pub(super) fn predictions(
                 let all: Vec<Candidate> =
                     without.candidates.iter().chain([&rival_columns.candidate]).cloned().collect();
                 let own = (0..rival_columns.columns.len())
-                    .map(|k| Column::Term(without.fit.fit.model.term_values.len() + k).index());
+                    .map(|k| Column::Term(without.fit.solution.model.term_values.len() + k).index());
                 let columns: Vec<usize> = rivals.frame.free.iter().copied().chain(own).collect();
-                run.of(&without.fit.fit.model, &all, &columns, (&step, &covariance))
+                run.of(&without.fit.solution.model, &all, &columns, (&step, &covariance))
             })
             .collect::<Option<_>>()?;
         let components = if setting.sees_heading { 3 } else { 2 };
@@ -116,7 +116,7 @@ struct PlannedRun {
 impl PlannedRun {
     fn new(base: &ModelFit<'_>, part: &Part, setting: &Setting) -> Option<Self> {
         let programs = part.manoeuvre.schedule.with_pairs(1).programs();
-        let model = &base.fit.model;
+        let model = &base.solution.model;
         let driven = |measurements: &[f64]| -> Option<dataset::Dataset> {
             let mut runs = Vec::new();
             for program in &programs {

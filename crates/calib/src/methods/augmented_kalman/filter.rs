@@ -1,30 +1,34 @@
 //! The first filter: the robot's pose and the three systematic factors of its odometry, row by row.
 //!
-//! State (x, y, θ, δ_L, δ_R, δ_B): a wheel travels δ times what its nominal size says, the contacts are δ_B times the nominal separation apart (Martinelli's
-//! δ_R and δ_L, and the third that his robot was spared by a known axle). Wheels add noise of variance k²|s| along a travel s (Chong & Kleeman 1997), poses are
-//! seen with variances σ_xy² and σ_θ². The covariance is kept in parts, P = P₀ + k² P₁ + σ_xy² P₂ + σ_θ² P₃, for the second filter ([`super::noise`]).
+//! State (x, y, θ, δ_L, δ_R, δ_B): a wheel travels δ times what its nominal size says, the contacts are δ_B
+//! times the nominal separation apart (Martinelli's δ_R and δ_L, and the third that his robot was spared by a
+//! known axle). Wheels add noise of variance k²|s| along a travel s (Chong & Kleeman 1997), poses are seen
+//! with variances σ_xy² and σ_θ². The covariance is kept in parts, P = P₀ + k² P₁ + σ_xy² P₂ + σ_θ² P₃, for
+//! the second filter ([`super::noise`]).
 
 use kinematics::{Count, DriveGeometry, GeometryError, OdometryCovariance, Pose, WheelNoise, Wheels, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 use super::noise::{Expected, HEADING, NoiseFilter, POSITION, Variances, WHEELS};
-use crate::dead_reckoning_jacobian::{GeometryParameters, DeadReckoned};
+use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
+use crate::settings::{SETTLED_FACTOR_SIGMA, SETTLED_MOVE_SIGMA};
 
 /// When the factors count as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settling {
     /// Largest standard deviation of a factor.
     pub factor_sigma: f64,
-    /// Since half of the measurements no factor may have moved by more than so many standard deviations of what those measurements could tell.
+    /// Standard deviations, of what the later half of the measurements could determine, that a factor may
+    /// have moved since.
     pub moved_sigmas: f64,
 }
 
 impl Settling {
-    /// A part in five hundred, which is 0.7° a turn; four standard deviations, which chance alone exceeds in one of 5000 constant robots.
-    pub const DEFAULT: Self = Self { factor_sigma: 2e-3, moved_sigmas: 4.0 };
+    /// What the method uses.
+    pub const DEFAULT: Self = Self { factor_sigma: SETTLED_FACTOR_SIGMA, moved_sigmas: SETTLED_MOVE_SIGMA };
 }
 
-/// The factors at an earlier look.
+/// The factors at an earlier measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Checkpoint {
     measurements: u64,
@@ -42,7 +46,8 @@ struct Checkpoint {
 /// let m_per_count = nominal.m_per_count(2000.0)?;
 /// // 1 mm/√m, 1 mm and 2 mrad to begin with, all to be estimated.
 /// let noise = NoiseFilter::new([1e-6, 1e-6, 4e-6].into(), [false; 3]);
-/// let mut filter = AugmentedFilter::new(&nominal, m_per_count, 0.05, noise, Pose::IDENTITY, Wheels::both(0_i64));
+/// let counts = Wheels::both(0_i64);
+/// let mut filter = AugmentedFilter::new(&nominal, m_per_count, 0.05, noise, Pose::IDENTITY, counts);
 /// filter.predict(Wheels { left: 400, right: 410 });
 /// let pose = filter.update(Pose::new(0.10, 0.0, 0.007));
 /// assert!(pose.nis < 12.0 && !filter.is_settled());
@@ -56,7 +61,7 @@ pub struct AugmentedFilter<C> {
     counts: Wheels<C>,
     /// P₀ and what multiplies the three variances, at the last measurement.
     spread: [Matrix6<f64>; 4],
-    leg: PropagationInterval,
+    propagation: PropagationInterval,
     noise: NoiseFilter,
     settling: Settling,
     measurements: u64,
@@ -64,7 +69,8 @@ pub struct AugmentedFilter<C> {
     next_half: Checkpoint,
 }
 
-/// What happened since the last measurement: the pose with its derivatives, and the wheels' noise for k² = 1 m.
+/// What happened since the last measurement: the pose with its derivatives, and the wheels' noise for k² = 1
+/// m.
 #[derive(Debug, Clone, Copy)]
 struct PropagationInterval {
     start: Pose,
@@ -78,10 +84,10 @@ impl PropagationInterval {
     }
 }
 
-/// What a measurement said.
+/// The innovation of a measured pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
-    /// Seen minus predicted: x, y in metres, heading in radians.
+pub struct PoseInnovation {
+    /// Measured minus predicted: x, y in metres, heading in radians.
     pub residual: Vector3<f64>,
     /// Its covariance as the filter expected it.
     pub covariance: Matrix3<f64>,
@@ -90,10 +96,10 @@ pub struct Innovation {
 }
 
 impl<C: Count> AugmentedFilter<C> {
-    /// A filter at a pose that the instrument saw and the counters' readings there.
+    /// A filter at a measured pose and the counters' readings there.
     ///
-    /// `factor_sigma` is how far diameters and separation may be from nominal, relatively (one standard deviation); `m_per_count` is the nominal travel for one
-    /// unit of `counts`, metres.
+    /// `factor_sigma` is how far diameters and separation may be from nominal, relatively (one standard
+    /// deviation); `m_per_count` is the nominal travel for one unit of `counts`, metres.
     #[must_use]
     pub fn new(
         nominal: &DriveGeometry,
@@ -115,7 +121,7 @@ impl<C: Count> AugmentedFilter<C> {
             factors: half.factors,
             counts,
             spread,
-            leg: PropagationInterval::at(world_from_body),
+            propagation: PropagationInterval::at(world_from_body),
             noise,
             settling: Settling::DEFAULT,
             measurements: 0,
@@ -135,10 +141,10 @@ impl<C: Count> AugmentedFilter<C> {
         self
     }
 
-    /// Puts the robot elsewhere, at a pose that the instrument saw: the next run begins. What is known of the factors stays.
+    /// Begins the next run at a measured pose. What is known of the factors stays.
     pub fn restart(&mut self, world_from_body: Pose, counts: Wheels<C>) {
         self.counts = counts;
-        self.leg = PropagationInterval::at(world_from_body);
+        self.propagation = PropagationInterval::at(world_from_body);
         for part in &mut self.spread {
             part.fixed_rows_mut::<3>(0).fill(0.0);
             part.fixed_columns_mut::<3>(0).fill(0.0);
@@ -160,25 +166,30 @@ impl<C: Count> AugmentedFilter<C> {
         let geometry_parameters = self.geometry_parameters();
         let travel_m = geometry_parameters.m_per_rad.zip_with(turned, |m_per_count, counts| m_per_count * counts);
         let one = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(1.0) };
-        self.leg.wheels.propagate(self.leg.dead_reckoned.pose, travel_m, geometry_parameters.separation_m, &one);
-        self.leg.dead_reckoned.advance(&geometry_parameters, turned);
-        self.leg.dead_reckoned.pose
+        self.propagation.wheels.propagate(
+            self.propagation.dead_reckoned.pose,
+            travel_m,
+            geometry_parameters.separation_m,
+            &one,
+        );
+        self.propagation.dead_reckoned.advance(&geometry_parameters, turned);
+        self.propagation.dead_reckoned.pose
     }
 
-    /// Takes a pose that the instrument saw, and corrects pose, factors and noise.
-    pub fn update(&mut self, world_from_body: Pose) -> Innovation {
+    /// Takes a measured pose, and corrects pose, factors and noise.
+    pub fn update(&mut self, world_from_body: Pose) -> PoseInnovation {
         self.spread = self.spread_now();
-        let predicted = self.leg.dead_reckoned.pose;
+        let predicted = self.propagation.dead_reckoned.pose;
         let residual = Vector3::new(
             world_from_body.x_m - predicted.x_m,
             world_from_body.y_m - predicted.y_m,
             wrap_to_pi(world_from_body.theta_rad - predicted.theta_rad),
         );
         let of_pose = |part: &Matrix6<f64>| part.fixed_view::<3, 3>(0, 0).into_owned();
-        let noise_of_look = instrument();
+        let measurement_noise = instrument();
         let expected = Expected {
             fixed: of_pose(&self.spread[0]),
-            slopes: std::array::from_fn(|i| of_pose(&self.spread[i + 1]) + noise_of_look[i]),
+            slopes: std::array::from_fn(|i| of_pose(&self.spread[i + 1]) + measurement_noise[i]),
         };
         let variances = *self.noise.variances();
         let covariance = expected.at(&variances);
@@ -187,14 +198,14 @@ impl<C: Count> AugmentedFilter<C> {
         let inverse = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gain: Matrix6x3<f64> = whole.fixed_columns::<3>(0) * inverse;
         let correction: Vector6<f64> = gain * residual;
-        let mut kept = Matrix6::identity();
-        let mut corrected = kept.fixed_columns_mut::<3>(0);
+        let mut joseph = Matrix6::identity();
+        let mut corrected = joseph.fixed_columns_mut::<3>(0);
         corrected -= gain;
         for part in &mut self.spread {
-            *part = kept * *part * kept.transpose();
+            *part = joseph * *part * joseph.transpose();
         }
-        for (part, of_look) in self.spread[1..].iter_mut().zip(noise_of_look) {
-            *part += gain * of_look * gain.transpose();
+        for (part, of_measurement) in self.spread[1..].iter_mut().zip(measurement_noise) {
+            *part += gain * of_measurement * gain.transpose();
         }
         self.factors += correction.fixed_rows::<3>(3);
         let pose = Pose::new(
@@ -202,21 +213,24 @@ impl<C: Count> AugmentedFilter<C> {
             predicted.y_m + correction[1],
             predicted.theta_rad + correction[2],
         );
-        self.leg = PropagationInterval::at(pose);
+        self.propagation = PropagationInterval::at(pose);
         self.noise.measurement(&residual, &expected);
         self.measurements += 1;
         if self.measurements >= 2 * self.next_half.measurements {
             self.half = self.next_half;
-            self.next_half =
-                Checkpoint { measurements: self.measurements, factors: self.factors, covariance: self.factor_covariance() };
+            self.next_half = Checkpoint {
+                measurements: self.measurements,
+                factors: self.factors,
+                covariance: self.factor_covariance(),
+            };
         }
-        Innovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
+        PoseInnovation { residual, covariance, nis: residual.dot(&(inverse * residual)) }
     }
 
-    /// Where the robot is believed to be.
+    /// The estimated pose.
     #[must_use]
     pub const fn world_from_body(&self) -> Pose {
-        self.leg.dead_reckoned.pose
+        self.propagation.dead_reckoned.pose
     }
 
     /// The three factors: left wheel, right wheel, separation.
@@ -253,7 +267,7 @@ impl<C: Count> AugmentedFilter<C> {
         self.whole(&self.spread_now()).fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// The noise as the second filter sees it.
+    /// The noise as the second filter estimates it.
     #[must_use]
     pub const fn noise(&self) -> &NoiseFilter {
         &self.noise
@@ -267,10 +281,12 @@ impl<C: Count> AugmentedFilter<C> {
         known && self.has_stopped_moving()
     }
 
-    /// Whether the later half of the measurements, or more, moved the factors by no more than it could tell.
+    /// Whether the later half of the measurements, or more, moved the factors by no more than it could
+    /// determine.
     ///
-    /// A constant that is estimated better and better moves by as much as its variance shrinks: Var(now − then) = P_then − P_now. One that moves by more is no
-    /// constant, or the noise is not what the filter takes it for.
+    /// A constant that is estimated better and better moves by as much as its variance shrinks: Var(now −
+    /// then) = P_then − P_now. One that moves by more is no constant, or the noise is not what the filter
+    /// takes it for.
     #[must_use]
     pub fn has_stopped_moving(&self) -> bool {
         let now = self.factor_covariance();
@@ -293,9 +309,9 @@ impl<C: Count> AugmentedFilter<C> {
 
     /// ∂(state now)/∂(state at the last measurement).
     fn transition(&self) -> Matrix6<f64> {
-        let PropagationInterval { start, dead_reckoned, .. } = &self.leg;
+        let PropagationInterval { start, dead_reckoned, .. } = &self.propagation;
         let mut transition = Matrix6::identity();
-        // Turned by its heading's error, the whole leg swings round its start.
+        // Turned by its heading's error, the whole interval swings round its start.
         transition[(0, 2)] = -(dead_reckoned.pose.y_m - start.y_m);
         transition[(1, 2)] = dead_reckoned.pose.x_m - start.x_m;
         let by_factors = dead_reckoned.by_geometry * Matrix3::from_diagonal(&self.nominal);
@@ -308,7 +324,7 @@ impl<C: Count> AugmentedFilter<C> {
         let transition = self.transition();
         let mut spread = self.spread.map(|part| transition * part * transition.transpose());
         let mut of_pose = spread[1].fixed_view_mut::<3, 3>(0, 0);
-        of_pose += self.leg.wheels.matrix();
+        of_pose += self.propagation.wheels.matrix();
         spread
     }
 }
@@ -374,7 +390,8 @@ mod tests {
             let (plus, minus) = (state(&end(h, column)), state(&end(-h, column)));
             for row in 0..6 {
                 let difference = (plus[row] - minus[row]) / (2.0 * h);
-                // 0.7 m and 0.9 rad: third derivatives by factors stay under 1 m; truncation 1e-12, rounding 1e-16/1e-6 times a few.
+                // 0.7 m and 0.9 rad: third derivatives by factors stay under 1 m; truncation 1e-12, rounding
+                // 1e-16/1e-6 times a few.
                 let tolerance = 1e-8;
                 assert!((transition[(row, column)] - difference).abs() < tolerance, "{row} {column}");
                 assert!((transition[(row, column)] + 1e-3 - difference).abs() > tolerance);
@@ -404,27 +421,28 @@ mod tests {
             whole = transition * whole * transition.transpose();
             let mut block = whole.fixed_view_mut::<3, 3>(0, 0);
             block += of_pose.matrix();
-            let seen = predicted * Pose::new(1e-3, -2e-3, 3e-3);
-            let innovation = parts.update(seen);
+            let measured = predicted * Pose::new(1e-3, -2e-3, 3e-3);
+            let innovation = parts.update(measured);
             let mean = whole.fixed_view::<3, 3>(0, 0) + measurement;
             assert!((innovation.covariance - mean).norm() < 1e-12 * mean.norm());
             let gain = whole.fixed_columns::<3>(0) * mean.try_inverse().expect("regular");
             let rows = whole.fixed_rows::<3>(0).into_owned();
             whole -= gain * rows;
-            // Joseph's form against the short one: roundings of 2.5e-3, the doubt before any data.
+            // Joseph's form against the short one: roundings of 2.5e-3, the prior variance.
             assert!((parts.whole(&parts.spread) - whole).norm() < 1e-15);
         }
         // And would not pass with the wheels' part left out.
         assert!((parts.whole(&parts.spread) - parts.spread[1] * variances[0] - whole).norm() > 1e-8);
     }
 
-    /// Legs of half a metre with half a radian of turn to either side, seen without error; the robot has these lengths.
-    fn wander(filter: &mut AugmentedFilter<f64>, geometry_parameters: GeometryParameters, legs: u32) {
+    /// Intervals of half a metre with half a radian of turn to either side, measured without error; the robot
+    /// has this geometry.
+    fn wander(filter: &mut AugmentedFilter<f64>, geometry_parameters: GeometryParameters, intervals: u32) {
         let mut truth = DeadReckoned::at(filter.world_from_body());
         let mut wheel_rad = filter.counts;
         filter.restart(truth.pose, wheel_rad);
-        for leg in 0..legs {
-            let turn = if leg % 4 < 2 { 1.0 } else { -1.0 };
+        for propagation in 0..intervals {
+            let turn = if propagation % 4 < 2 { 1.0 } else { -1.0 };
             let step = Wheels { left: 6.0 - turn, right: 6.0 + turn };
             truth.advance(&geometry_parameters, step);
             wheel_rad = wheel_rad.zip_with(step, |sum, step| sum + step);
@@ -434,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_are_found_settle_and_are_seen_to_change() {
+    fn factors_are_found_settle_and_their_change_is_detected() {
         let robot = |left: f64| GeometryParameters {
             m_per_rad: Wheels { left: 0.08 * left, right: 0.085 * 0.99 },
             separation_m: 0.363 * 1.03,
@@ -449,7 +467,7 @@ mod tests {
         assert!(error < 1e-4, "{error}");
         // The right wheel for the left one would not pass.
         assert!((filter.factors().y - 1.01).abs() > 1e-2);
-        // Another tyre: what 400 legs agree on does not explain the next ones.
+        // Another tyre: what 400 measurements agree on does not explain the next ones.
         wander(&mut filter, robot(1.02), 400);
         assert!(!filter.is_settled());
     }

@@ -1,4 +1,5 @@
-//! Self-calibration: the filter goes through logs as a robot would live them, once, row by row, and says when its parameters have settled.
+//! Self-calibration on line: the filter goes through logs once, row by row, and reports when its parameters
+//! have settled.
 
 use dataset::Session;
 use kinematics::{DriveGeometry, Pose, Wheels};
@@ -15,11 +16,11 @@ pub struct Followed {
     pub run: String,
     /// Measurements since the very first.
     pub measurements: usize,
-    /// Way driven since then by the nominal drive, metres.
+    /// Distance driven since then by the nominal drive, metres.
     pub distance_m: f64,
-    /// Turned since then by the nominal drive, either way, radians.
+    /// Turn since then by the nominal drive, in either direction, radians.
     pub turn_rad: f64,
-    /// The drive as it is believed to be.
+    /// The estimated drive.
     pub geometry: DriveGeometry,
     /// Standard deviations of left diameter, right diameter and separation, metres.
     pub sigma_m: Vector3<f64>,
@@ -28,13 +29,14 @@ pub struct Followed {
 }
 
 impl AugmentedKalman {
-    /// Follows the parameters through sessions in the order given, a measurement after the other; what is known is never gone back on.
+    /// Follows the parameters through sessions in the order given, a measurement after the other; what is
+    /// known is never gone back on.
     ///
     /// # Errors
     /// [`CalibError`] when the sessions hold no poses, or a factor leaves what is a drive.
     pub fn follow(&self, sessions: &[Session<'_>]) -> Result<Vec<Followed>, CalibError> {
         let (_, geometry) = nominal(Self::NAME, sessions)?;
-        let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
+        let spacing = Spacing { every_m: self.measurement_every_m, every_rad: self.measurement_every_rad };
         let (runs, _) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
         let mut turned = Wheels::both(0.0);
         let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);
@@ -71,7 +73,8 @@ impl AugmentedKalman {
     }
 }
 
-/// Where the parameters settled for good: the first measurement from which on they count as settled at every later one.
+/// Where the parameters settled for good: the first measurement from which on they count as settled at every
+/// later one.
 #[must_use]
 pub fn settled_at(followed: &[Followed]) -> Option<&Followed> {
     let unsettled = followed.iter().rposition(|step| !step.settled).map_or(0, |last| last + 1);

@@ -1,33 +1,40 @@
 //! `augmented_kalman`: pose and systematic factors in one extended Kalman filter, the noise in a second one.
 //!
-//! Model: the state is the pose with the factors δ_L, δ_R of the wheels and δ_B of the separation over their nominal values. Rows of the log predict, with wheel
-//! noise of variance k²|s|; poses of the instrument correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that is one
-//! pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until factors and noise stay: the linearisation is then at the answer.
-//! Assumptions: the instrument sees the drive's centre, its errors are normal and independent from measurement to measurement, factors are constant. Looks are therefore
-//! taken apart by [`AugmentedKalman::look_every_m`]: twenty a second of one clock that is off are not independent.
-//! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly better known afterwards is refused.
-//! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the augmented filter); Mehra 1970 for the innovations.
+//! Model: the state is the pose with the factors δ_L, δ_R of the wheels and δ_B of the separation over their
+//! nominal values. Rows of the log predict, with wheel noise of variance k²|s|; poses of the instrument
+//! correct. k², σ_xy² and σ_θ² come from the innovations by a filter of their own (`noise.rs`). On line that
+//! is one pass ([`AugmentedFilter`]). Sessions on disk are gone over again from the factors found, until
+//! factors and noise stay: the linearisation is then at the result.
+//! Assumptions: the instrument is at the drive's centre, its errors are normal and independent from
+//! measurement to measurement, factors are constant. Measurements are therefore spaced by
+//! [`AugmentedKalman::measurement_every_m`]: twenty a second share the error of their clock.
+//! Observability: all three, from measurements on paths with straights and turns; a factor that is hardly
+//! better known afterwards is refused.
+//! Reference: Martinelli 2002 (IEEE T-RA 18, 399–405), Martinelli, Tomatis, Tapus & Siegwart 2003 (IROS: the
+//! augmented filter); Mehra 1970 for the innovations.
 
 mod filter;
 mod follow;
 mod noise;
 
-use std::f64::consts::PI;
-
 use dataset::Session;
-use motion_programs::Schedule;
 use kinematics::{DriveGeometry, Pose, Wheels};
+use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
-pub use filter::{AugmentedFilter, Innovation, Settling};
+pub use filter::{AugmentedFilter, PoseInnovation, Settling};
 pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, Variances};
 
-use crate::estimate::{CalibError, Calibration, Covariance, Method, drive, nominal};
-use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::dead_reckoning_jacobian::unobservable;
+use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
+use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
+use crate::settings::{
+    FACTOR_PRIOR_SIGMA, HEADING_SIGMA_GUESS_RAD, MAX_PASSES, MAX_POSTERIOR_TO_PRIOR_SIGMA, MEASUREMENT_SPACING_M,
+    MEASUREMENT_SPACING_RAD, PASS_NOISE_TOLERANCE, PASS_TOLERANCE, POSITION_SIGMA_GUESS_M, WHEEL_SIGMA_GUESS,
+};
 
-/// The method with its beliefs before any data.
+/// The method with its priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AugmentedKalman {
     /// How far diameters and separation may be from nominal, relatively, one standard deviation.
@@ -39,19 +46,10 @@ pub struct AugmentedKalman {
     /// First guess of its error in heading where the dataset does not state it, radians.
     pub truth_sigma_rad: f64,
     /// Measurements are taken after so much travel by the nominal robot, metres, …
-    pub look_every_m: f64,
+    pub measurement_every_m: f64,
     /// … or so much turn, radians, and at a run's end.
-    pub look_every_rad: f64,
+    pub measurement_every_rad: f64,
 }
-
-/// A pass that changes no factor by more than this share of its sigma, and no variance by more than twice this, is the last.
-const STAYS: f64 = 0.01;
-
-/// Passes before it is given up.
-const MAX_PASSES: u32 = 60;
-
-/// A factor whose sigma is still this share of what it was before any data is not observable.
-const HARDLY_BETTER: f64 = 0.3;
 
 /// One pass over all runs.
 #[derive(Debug, Clone)]
@@ -65,17 +63,23 @@ struct Pass {
 impl AugmentedKalman {
     /// The method as the table of contents offers it.
     pub const DEFAULT: Self = Self {
-        factor_sigma: 0.05,
-        wheel_sigma_m_per_sqrt_m: 1e-3,
-        truth_sigma_m: 1e-3,
-        truth_sigma_rad: 2e-3,
-        look_every_m: 1.0,
-        look_every_rad: PI,
+        factor_sigma: FACTOR_PRIOR_SIGMA,
+        wheel_sigma_m_per_sqrt_m: WHEEL_SIGMA_GUESS,
+        truth_sigma_m: POSITION_SIGMA_GUESS_M,
+        truth_sigma_rad: HEADING_SIGMA_GUESS_RAD,
+        measurement_every_m: MEASUREMENT_SPACING_M,
+        measurement_every_rad: MEASUREMENT_SPACING_RAD,
     };
 
     const NAME: &'static str = "augmented_kalman";
 
-    fn pass(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, factors: Vector3<f64>, noise: NoiseFilter) -> Pass {
+    fn pass(
+        &self,
+        runs: &[PoseMeasurements<'_>],
+        nominal: &DriveGeometry,
+        factors: Vector3<f64>,
+        noise: NoiseFilter,
+    ) -> Pass {
         let m_per_rad = nominal.m_per_rad();
         let start = runs.first().map_or(Pose::IDENTITY, |measurements| measurements.start);
         let mut turned = Wheels::both(0.0);
@@ -121,16 +125,18 @@ impl AugmentedKalman {
         let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.held_at(*guess.variances()));
         let mut share = 1.0;
         for _ in 0..MAX_PASSES {
-            // The same variances from where the factors came to, before they are compared with others from there.
+            // The same variances from where the factors came to, before they are compared with others from
+            // there.
             let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
-            let moved =
-                (0..3).all(|i| (again.factors[i] - best.factors[i]).abs() <= STAYS * again.covariance[(i, i)].sqrt());
+            let settled = (0..3).all(|i| {
+                (again.factors[i] - best.factors[i]).abs() <= PASS_TOLERANCE * again.covariance[(i, i)].sqrt()
+            });
             best = again;
-            if !moved {
+            if !settled {
                 continue;
             }
             let step = best.noise.step() * share;
-            if step.amax() <= 2.0 * STAYS {
+            if step.amax() <= PASS_NOISE_TOLERANCE {
                 return (best, true);
             }
             let variances = best.noise.variances().zip_map(&step, |variance, step| variance * step.exp());
@@ -165,35 +171,33 @@ impl Method for AugmentedKalman {
 
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError> {
         let (robot, geometry) = nominal(Self::NAME, sessions)?;
-        let spacing = Spacing { every_m: self.look_every_m, every_rad: self.look_every_rad };
+        let spacing = Spacing { every_m: self.measurement_every_m, every_rad: self.measurement_every_rad };
         let (runs, runs_rejected) = PoseMeasurements::of_all(Self::NAME, sessions, spacing)?;
-        let (pass, stays) = self.iterate(&runs, &geometry, self.first_guess(sessions));
+        let (pass, settles) = self.iterate(&runs, &geometry, self.first_guess(sessions));
         self.observable(&pass.covariance)?;
         let [left, right, separation] = pass.factors.into();
         let diameter_m =
             geometry.wheel_diameter_m().zip_with(Wheels { left, right }, |nominal_m, factor| nominal_m * factor);
         let found = drive(Self::NAME, diameter_m, geometry.wheel_separation_m() * separation)?;
         let nominal_m = geometry.wheel_diameter_m();
-        let scale =
-            Matrix3::from_diagonal(&Vector3::new(nominal_m.left, nominal_m.right, geometry.wheel_separation_m()));
-        let covariance = scale * pass.covariance * scale;
+        let lengths_m = [nominal_m.left, nominal_m.right, geometry.wheel_separation_m()];
         Ok(Calibration {
-            covariance: Some(Covariance::from_column_slice(3, 3, covariance.as_slice())),
+            covariance: Some(covariance_of_lengths(|row, column| pass.covariance[(row, column)], lengths_m)),
             runs_used: runs.len(),
             runs_rejected,
-            converged: stays && pass.stopped,
+            converged: settles && pass.stopped,
             ..Calibration::new(Self::NAME, found, robot.ticks_per_rev)
         })
     }
 }
 
 impl AugmentedKalman {
-    /// Refuses factors that the measurements hardly told more of than was believed before.
+    /// Refuses factors that are hardly better known than by their prior.
     fn observable(&self, covariance: &Matrix3<f64>) -> Result<(), CalibError> {
         let eigen = covariance.symmetric_eigen();
         let vague = eigen.eigenvalues.imax();
         let left = eigen.eigenvalues[vague].max(0.0).sqrt() / self.factor_sigma;
-        if left <= HARDLY_BETTER {
+        if left <= MAX_POSTERIOR_TO_PRIOR_SIGMA {
             return Ok(());
         }
         let (parameter, missing) = unobservable(&eigen.eigenvectors.column(vague).into_owned());

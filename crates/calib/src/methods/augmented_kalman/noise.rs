@@ -1,13 +1,19 @@
 //! The second filter: the noise of the wheels and of the instrument, from the innovations of the first.
 //!
-//! Martinelli's second filter takes observables of the path whose means are linear in the noise parameters. Here they are the products of the first filter's
-//! innovations ν: at given gains their mean S = C + Σ q_i D_i is linear in the variances q, exactly, because the covariance in Joseph's form is; the first filter
-//! carries C and D along. q is a constant state seen through νν', whose scatter for normal errors gives the weights: information Λ_ij = ½ tr(S⁻¹D_i S⁻¹D_j) and
-//! its share of evidence ½ tr(S⁻¹D_i S⁻¹(νν' − C)) of each measurement. This is Fisher scoring on the likelihood of the innovations (Mehra 1970), a look at a time.
+//! Martinelli's second filter takes observables of the path whose means are linear in the noise parameters.
+//! Here they are the products of the first filter's innovations ν: at given gains their mean S = C + Σ q_i
+//! D_i is linear in the variances q, exactly, because the covariance in Joseph's form is; the first filter
+//! carries C and D along. q is a constant state measured through νν', whose scatter for normal errors gives
+//! the weights: information Λ_ij = ½ tr(S⁻¹D_i S⁻¹D_j) and its share of evidence ½ tr(S⁻¹D_i S⁻¹(νν' − C)) of
+//! each measurement. This is Fisher scoring on the likelihood of the innovations (Mehra 1970), one
+//! measurement at a time.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Noise variances, of which there are three: the wheels' (m, variance of travel a metre), the instrument's position (m²) and heading (rad²).
+use crate::settings::{MAX_NOISE_FACTOR, MAX_NOISE_STEP, NOISE_PRIOR_MEASUREMENTS};
+
+/// Noise variances, of which there are three: the wheels' (m, variance of travel a metre), the instrument's
+/// position (m²) and heading (rad²).
 pub type Variances = Vector3<f64>;
 
 /// The wheels' noise is the first of [`Variances`].
@@ -17,13 +23,7 @@ pub(super) const POSITION: usize = 1;
 /// The instrument's heading is the third.
 pub(super) const HEADING: usize = 2;
 
-/// How many looks the first guess is worth.
-const GUESS_WORTH: f64 = 1.0;
-
-/// Variances stay within this factor of the first guess, which keeps them positive.
-const WIDEST: f64 = 1e6;
-
-/// What is believed of the noise.
+/// Estimate of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFilter {
     variances: Variances,
@@ -51,7 +51,8 @@ impl Expected {
 }
 
 impl NoiseFilter {
-    /// Variances to begin with, and which of them are known and stay. The others are estimated look by look.
+    /// Variances to begin with, and which of them are known and fixed. The others are estimated measurement
+    /// by measurement.
     #[must_use]
     pub fn new(variances: Variances, known: [bool; 3]) -> Self {
         Self {
@@ -66,12 +67,13 @@ impl NoiseFilter {
         }
     }
 
-    /// The same guess with other variances that stay while evidence is collected: for going over the same measurements again.
+    /// The same guess with other variances, which are fixed while information is summed: for another pass
+    /// over the same measurements.
     pub(super) fn held_at(&self, variances: Variances) -> Self {
         Self { variances, adapting: false, ..Self::new(self.guess, self.known) }
     }
 
-    /// The variances as they are believed now.
+    /// The current estimate of the variances.
     #[must_use]
     pub const fn variances(&self) -> &Variances {
         &self.variances
@@ -99,13 +101,13 @@ impl NoiseFilter {
         }
     }
 
-    /// The variances that the evidence so far asks for, those at a border of their range held there.
+    /// Solves for the variances; those at a bound of their range are fixed there.
     fn solve(&mut self) {
         let mut held = self.known;
         loop {
             let (mut information, mut evidence) = (self.information, self.evidence);
             for i in 0..3 {
-                let prior = 0.5 * GUESS_WORTH / (self.guess[i] * self.guess[i]);
+                let prior = 0.5 * NOISE_PRIOR_MEASUREMENTS / (self.guess[i] * self.guess[i]);
                 information[(i, i)] += prior;
                 evidence[i] += prior * self.guess[i];
             }
@@ -122,7 +124,7 @@ impl NoiseFilter {
             }
             let Some(variances) = information.lu().solve(&evidence) else { return };
             let outside = |i: usize| {
-                let (least, most) = (self.guess[i] / WIDEST, self.guess[i] * WIDEST);
+                let (least, most) = (self.guess[i] / MAX_NOISE_FACTOR, self.guess[i] * MAX_NOISE_FACTOR);
                 (!held[i] && !(least..=most).contains(&variances[i])).then(|| variances[i].clamp(least, most))
             };
             let beyond: Vec<(usize, f64)> = (0..3).filter_map(|i| Some((i, outside(i)?))).collect();
@@ -141,7 +143,7 @@ impl NoiseFilter {
     pub(super) fn log_posterior(&self) -> f64 {
         let prior = (0..3).filter(|i| !self.known[*i]).map(|i| {
             let ratio = self.guess[i] / self.variances[i];
-            0.5 * GUESS_WORTH * (ratio.ln() - ratio)
+            0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio.ln() - ratio)
         });
         self.log_likelihood + prior.sum::<f64>()
     }
@@ -154,11 +156,11 @@ impl NoiseFilter {
                 information[(i, j)] = self.information[(i, j)] * self.variances[i] * self.variances[j];
             }
             let ratio = self.guess[i] / self.variances[i];
-            information[(i, i)] += 0.5 * GUESS_WORTH * ratio.max(1.0);
-            gradient[i] = self.gradient[i] * self.variances[i] + 0.5 * GUESS_WORTH * (ratio - 1.0);
+            information[(i, i)] += 0.5 * NOISE_PRIOR_MEASUREMENTS * ratio.max(1.0);
+            gradient[i] = self.gradient[i] * self.variances[i] + 0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio - 1.0);
         }
         let step = information.lu().solve(&gradient).unwrap_or_default();
-        step.map(|step| step.clamp(-2.0, 2.0))
+        step.map(|step| step.clamp(-MAX_NOISE_STEP, MAX_NOISE_STEP))
     }
 }
 
@@ -170,11 +172,12 @@ mod tests {
 
     const TRUTH: [f64; 3] = [3e-6, 5e-7, 2e-6];
 
-    /// Measurements after legs of different lengths, whose innovations have the covariance of [`TRUTH`] exactly: ±√3 times the columns of its root.
+    /// Measurements after intervals of different lengths, whose innovations have the covariance of [`TRUTH`]
+    /// exactly: ±√3 times the columns of its root.
     fn measurements() -> Vec<(Vector3<f64>, Expected)> {
         let mut measurements = Vec::new();
-        for leg in 1..=400_u32 {
-            let length_m = 0.01 * f64::from(leg);
+        for interval in 1..=400_u32 {
+            let length_m = 0.01 * f64::from(interval);
             let wheels = Matrix3::from_diagonal(&Vector3::new(0.5, length_m * length_m, 15.0)) * length_m;
             let expected = Expected {
                 fixed: Matrix3::from_diagonal_element(1e-7),
@@ -217,12 +220,16 @@ mod tests {
     #[test]
     fn variances_come_back_from_innovations_that_have_them() {
         let measurements = measurements();
-        // The guess, off by a factor of two, is worth a measurement among the hundred or so after short legs that show the heading's error: 0.01.
+        // The guess, off by a factor of two, is worth a measurement among the hundred or so after short
+        // intervals that determine the heading's error: 0.01.
         let found = scored(&measurements, [false; 3]);
         assert!(relative(found.variances()) < 0.01, "{}", found.variances());
-        // What must not pass: without the part that does not depend on the noise, and with two variances taken for each other.
-        let blind: Vec<_> =
-            measurements.iter().map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected })).collect();
+        // What must not pass: without the part that does not depend on the noise, and with two variances
+        // taken for each other.
+        let blind: Vec<_> = measurements
+            .iter()
+            .map(|(of, expected)| (*of, Expected { fixed: Matrix3::zeros(), ..*expected }))
+            .collect();
         assert!(relative(scored(&blind, [false; 3]).variances()) > 0.05);
         let swapped = |expected: &Expected| Expected {
             slopes: [expected.slopes[0], expected.slopes[2], expected.slopes[1]],
@@ -232,8 +239,8 @@ mod tests {
         assert!(relative(scored(&swapped, [false; 3]).variances()) > 0.5);
     }
 
-    /// 20 seeds of 2400 measurements. Each variance is estimated to the standard deviation that the information promises; 60 deviations of five of them are a false positive
-    /// of 3.4e-5.
+    /// 20 seeds of 2400 measurements. Each variance is estimated to the standard deviation that the
+    /// information promises; 60 deviations of five of them are a false positive of 3.4e-5.
     #[test]
     fn on_line_the_variances_come_as_near_as_the_information_allows() {
         let measurements = measurements();
@@ -244,7 +251,7 @@ mod tests {
             let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
             let mut filter = guess();
             for number in 0..measurements.len() {
-                // Short and long legs in turn.
+                // Short and long intervals in turn.
                 let (_, expected) = &measurements[(number * 991) % measurements.len()];
                 let root = expected.at(&TRUTH.into()).cholesky().expect("positive").l();
                 let draws = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
@@ -279,8 +286,9 @@ mod tests {
             };
             let difference = (moved(h) - moved(-h)) / (2.0 * h);
             let ratio = guess().guess[i] / point[i];
-            let gradient = filter.gradient[i] * point[i] + 0.5 * GUESS_WORTH * (ratio - 1.0);
-            // 2400 measurements: third derivatives in the logarithm stay under a few thousand, truncation 1e-8 of it; rounding 1e-16·4e4/1e-4.
+            let gradient = filter.gradient[i] * point[i] + 0.5 * NOISE_PRIOR_MEASUREMENTS * (ratio - 1.0);
+            // 2400 measurements: third derivatives in the logarithm stay under a few thousand, truncation
+            // 1e-8 of it; rounding 1e-16·4e4/1e-4.
             assert!((gradient - difference).abs() < 1e-3, "{i}: {gradient} {difference}");
             assert!((gradient * 1.001 + 2e-3 - difference).abs() > 1e-3);
         }

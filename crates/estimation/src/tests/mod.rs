@@ -1,0 +1,342 @@
+//! The pass against what it differentiates.
+
+use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+use kinematics::{Increment, Pose, Wheels};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
+
+use crate::filter::{OutlierGate, PassOptions};
+use crate::normal_equations::total;
+use crate::pass::pass;
+use crate::settings::MIN_PARALLEL_WORK;
+use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
+
+mod selection;
+
+const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
+const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];
+
+/// Two runs of a dozen rows, measured every two seconds with errors of a few millimetres, with headings or
+/// without.
+fn dataset(with_headings: bool) -> Dataset {
+    dataset_of(2, with_headings)
+}
+
+/// The same of another number of runs.
+fn dataset_of(runs: u32, with_headings: bool) -> Dataset {
+    let run = |number: u32| {
+        let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
+        let mut pose = Pose::new(0.2, -0.1, 0.5 + f64::from(number));
+        let mut truth = Vec::new();
+        for row in 0..=12_u32 {
+            if row % 2 == 0 {
+                let off = |k: f64| 3e-3 * (12.9898 * f64::from(7 * row + number) + 78.233 * k).sin();
+                let theta = with_headings.then_some(pose.theta_rad + BODY_FROM_SENSOR.theta_rad + off(3.0));
+                let measured = if with_headings { pose * BODY_FROM_SENSOR } else { pose };
+                truth.push(TruthSample::new(f64::from(row), measured.x_m + off(1.0), measured.y_m + off(2.0), theta));
+            }
+            if row < 12 {
+                let k = row as usize;
+                let (left, right) = (LEFT_RAD[k], RIGHT_RAD[k]);
+                angles.left.push(angles.left[k] + left);
+                angles.right.push(angles.right[k] + right);
+                pose =
+                    pose * Increment::from_travel(Wheels { left: 0.0811 * left, right: 0.0797 * right }, 0.366).arc();
+            }
+        }
+        let odometry = Odometry {
+            t_s: (0..=12).map(f64::from).collect(),
+            wheels: WheelLog::Angles(angles),
+            ..Odometry::default()
+        };
+        let info = RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() };
+        Run { info, odometry, truth, ..Run::default() }
+    };
+    Dataset {
+        provenance: Provenance::default(),
+        robot: NominalRobot {
+            left_wheel_diameter_m: 0.16,
+            right_wheel_diameter_m: 0.16,
+            wheel_separation_m: 0.363,
+            ticks_per_rev: None,
+            counter_bits: None,
+        },
+        truth_noise: TruthNoise::default(),
+        points: Vec::new(),
+        runs: (0..runs).map(run).collect(),
+    }
+}
+
+/// Adds distance in proportion to the square of the travel, and moves measurements ahead in proportion to the
+/// speed.
+#[derive(Clone)]
+struct TravelTerm;
+
+impl ModelTerm for TravelTerm {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const MOTION: TermParameter = TermParameter { name: "distance_per_m", unit: "1/m", prior_sigma: 1.0 };
+        const MEASUREMENT: TermParameter = TermParameter { name: "ahead_s", unit: "s", prior_sigma: 1.0 };
+        &[MOTION, MEASUREMENT]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let travel_m = interval.travel_m;
+        gradient[0] = interval.change(travel_m.map(|travel_m| travel_m * travel_m));
+        gradient[0].y_m = 0.1 * travel_m.left;
+    }
+
+    fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[1] = Pose::new(measurement.twist.v_m_s, 0.1, 0.3);
+    }
+}
+
+/// Has the distance driven in the run as its state.
+#[derive(Clone)]
+struct RunDistanceTerm {
+    distance_m: f64,
+}
+
+impl ModelTerm for RunDistanceTerm {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const MOTION: TermParameter = TermParameter { name: "distance_per_m2", unit: "1/m²", prior_sigma: 1.0 };
+        const MEASUREMENT: TermParameter = TermParameter { name: "ahead", unit: "1", prior_sigma: 1.0 };
+        &[MOTION, MEASUREMENT]
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        self.distance_m = 0.0;
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        self.distance_m += interval.increment().distance_m.abs();
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| self.distance_m * travel_m));
+    }
+
+    fn measurement(&mut self, _: &Measurement<'_>, gradient: &mut [Pose]) {
+        gradient[1] = Pose::new(self.distance_m, 0.0, 0.0);
+    }
+}
+
+#[test]
+fn runs_in_parallel_give_the_bits_of_runs_in_sequence() {
+    // Runs of at least four propagation intervals each: more than those from which on runs are filtered in
+    // parallel.
+    let dataset = dataset_of(MIN_PARALLEL_WORK.div_ceil(4) as u32, true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning { every_s: 1.0, phases: 2 }, &MODEL);
+    let headings = vec![0.0; records.segments.len()];
+    let pass_options = PassOptions { noise_score: true, innovations: true, ..PassOptions::default() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(RunDistanceTerm { distance_m: 7.0 })];
+        let found = pool.install(|| pass(&records, &selections, &model(), &NOISE, &headings, &mut terms, pass_options));
+        (found.runs, found.innovations, found.outliers, found.noise)
+    };
+    let one_by_one = on(1);
+    assert!(one_by_one.1.iter().all(|phase| phase.len() > MIN_PARALLEL_WORK), "measurements were left out");
+    assert_eq!(on(2), one_by_one);
+    assert_eq!(on(3), one_by_one);
+}
+
+#[test]
+fn parts_have_all_products_but_those_with_each_other() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    let model = Model { term_values: vec![0.004, -0.003, 0.0, 0.0, 0.0, 0.0], ..MODEL };
+    let headings = vec![0.0; records.segments.len()];
+    let of = |parts| {
+        let term = || Box::new(RunDistanceTerm { distance_m: 0.0 });
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(TravelTerm), term(), term()];
+        let pass_options = PassOptions { parts, ..PassOptions::default() };
+        total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, pass_options).runs).expect("runs")
+    };
+    let (all, grouping) = (of(&[]), of(&[2, 2]));
+    let common = Column::BASE.len() + 2;
+    for row in 0..common + 4 {
+        for column in 0..common + 4 {
+            let is_cross = row.min(column) >= common && (row - common) / 2 != (column - common) / 2;
+            let expected = if is_cross { 0.0 } else { all.information[(row, column)] };
+            assert_eq!(grouping.information[(row, column)], expected, "{row} {column}");
+            assert!(!is_cross || all.information[(row, column)] != 0.0, "{row} {column}: nothing to leave out");
+        }
+    }
+    assert_eq!(grouping.gradient, all.gradient);
+}
+
+const BODY_FROM_SENSOR: Pose = Pose::new(0.03, -0.02, 0.1);
+
+/// About a standard deviation from the true model.
+const MODEL: Model = Model {
+    m_per_rad: Wheels { left: 0.0812, right: 0.0796 },
+    separation_m: 0.3665,
+    body_from_sensor: Pose::new(0.032, -0.019, 0.103),
+    own: None,
+    latency_s: 0.003,
+    term_values: Vec::new(),
+};
+
+fn model() -> Model {
+    Model { term_values: vec![0.004, -0.003], ..MODEL }
+}
+
+const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5] };
+
+fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], pass_options: PassOptions) -> Pass {
+    let model = &Model {
+        term_values: if model.term_values.is_empty() { vec![0.0; 2] } else { model.term_values.clone() },
+        ..model.clone()
+    };
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    pass(&records, &selections, model, noise, headings, &mut [Box::new(TravelTerm)], pass_options)
+}
+
+fn cost(pass: &Pass) -> f64 {
+    pass.runs.iter().map(crate::NormalEquations::cost).sum()
+}
+
+fn columns() -> Vec<Column> {
+    Column::BASE.into_iter().chain([Column::Term(0), Column::Term(1)]).collect()
+}
+
+/// The gradient is the mean's alone: that the filter's own headings turn its covariances is left out.
+/// Innovations of one standard deviation over moves of a radian make that half a per cent of the root of a
+/// column's information.
+#[test]
+fn the_gradient_is_that_of_the_cost() {
+    let dataset = dataset(true);
+    let headings = [0.0, 0.0];
+    let found =
+        run(&dataset, &model(), &NOISE, &headings, PassOptions { gate: OutlierGate::Off, ..PassOptions::default() });
+    let gradient = found.runs.iter().fold(nalgebra::DVector::zeros(9), |sum, run| sum + &run.gradient);
+    let information = found.runs.iter().fold(nalgebra::DMatrix::zeros(9, 9), |sum, run| sum + &run.information);
+    for column in columns() {
+        let k = column.index();
+        let h = 1e-3 / f64::sqrt(information[(k, k)]);
+        let at = |by: f64| {
+            let mut model = model();
+            model.advance(column, by);
+            cost(&run(
+                &dataset,
+                &model,
+                &NOISE,
+                &headings,
+                PassOptions { gate: OutlierGate::Off, ..PassOptions::default() },
+            ))
+        };
+        let difference = (at(h) - at(-h)) / (2.0 * h);
+        let scale = f64::sqrt(information[(k, k)]);
+        let off = (gradient[k] - difference).abs() / scale;
+        assert!(off < 0.02, "{column:?}: {} {difference} in {scale}", gradient[k]);
+        // A column 5 % too long would not pass.
+        assert!((1.05 * gradient[k] - difference).abs() / scale > 0.02, "{column:?}");
+    }
+}
+
+/// In ln(variance). The recursions are those of the filter, differentiated; left out is, as above, that
+/// headings turn covariances: 3e-4 of a score here.
+#[test]
+fn the_noise_score_is_the_derivative_of_the_cost() {
+    let dataset = dataset(true);
+    let pass_options = PassOptions { gate: OutlierGate::Off, noise_score: true, ..PassOptions::default() };
+    let score = run(&dataset, &model(), &NOISE, &[0.0, 0.0], pass_options).noise.gradient;
+    for k in 0..4 {
+        let h = 1e-4_f64;
+        let at = |by: f64| {
+            let mut noise = NOISE;
+            noise.variance[k] *= by.exp();
+            cost(&run(&dataset, &model(), &noise, &[0.0, 0.0], pass_options))
+        };
+        let difference = (at(h) - at(-h)) / (2.0 * h);
+        let tolerance = 2e-3 * (1.0 + difference.abs());
+        assert!((score[k] - difference).abs() < tolerance, "{k}: {} {difference}", score[k]);
+        // Without what the gains' change does to the innovations to come, or 1 % too large, it would not
+        // pass.
+        assert!((1.01 * score[k].abs() + 5e-3 - difference.abs()).abs() > tolerance, "{k}");
+    }
+}
+
+/// A start heading that is not measured is eliminated: the sums are those at its optimum, and moving it away
+/// costs.
+#[test]
+fn a_free_heading_is_at_its_best() {
+    let dataset = dataset(false);
+    let pass_options = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };
+    let mut headings = [0.6, 1.6];
+    for _ in 0..8 {
+        let found = run(&dataset, &CENTRED_MODEL, &NOISE, &headings, pass_options);
+        for crate::pass::FreeHeading { segment, rest, .. } in &found.headings {
+            headings[*segment] += rest;
+        }
+    }
+    let at_best = run(&dataset, &CENTRED_MODEL, &NOISE, &headings, pass_options);
+    assert!(at_best.headings.iter().all(|heading| heading.rest.abs() < 1e-9), "{:?}", at_best.headings);
+    // Runs start at 0.5 and 1.5 rad; measurements of 3 mm over half a metre determine a heading to 0.01 rad.
+    assert!((headings[0] - 0.5).abs() < 0.03 && (headings[1] - 1.5).abs() < 0.03, "{headings:?}");
+    let off = run(&dataset, &CENTRED_MODEL, &NOISE, &[headings[0] + 0.01, headings[1]], pass_options);
+    // To second order the elimination undoes the move.
+    assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
+    assert!(off.headings[0].rest < -0.009);
+}
+
+const CENTRED_MODEL: Model = Model {
+    m_per_rad: Wheels { left: 0.0811, right: 0.0797 },
+    separation_m: 0.366,
+    body_from_sensor: Pose::IDENTITY,
+    own: None,
+    latency_s: 0.0,
+    term_values: Vec::new(),
+};
+
+#[test]
+fn cached_propagations_follow_the_model_to_first_order() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    let headings = vec![0.0; records.segments.len()];
+    let model = Model { term_values: vec![0.0; 4], ..MODEL };
+    let of = |model: &Model, pass_options: PassOptions<'_>| {
+        let mut terms: Vec<Box<dyn ModelTerm>> =
+            vec![Box::new(TravelTerm), Box::new(RunDistanceTerm { distance_m: 0.0 })];
+        let pass_options = PassOptions { noise_score: true, innovations: true, gate: OutlierGate::Off, ..pass_options };
+        pass(&records, &selections, model, &NOISE, &headings, &mut terms, pass_options)
+    };
+    let driven = of(&model, PassOptions { keep: true, ..PassOptions::default() });
+    let cached = driven.cached.as_ref().expect("propagations are cached");
+    let by = PassOptions { by: Some(cached), ..PassOptions::default() };
+    let reused = of(&model, by);
+    assert_eq!((&reused.runs, &reused.innovations, reused.noise), (&driven.runs, &driven.innovations, driven.noise));
+    // At twice the distance from the model of the cache the error is four times as large, to a tenth: the
+    // next order is a hundredth of that here.
+    let off = |size: f64| {
+        let mut near = model.clone();
+        let columns = Column::BASE.into_iter().chain((0..4).map(Column::Term));
+        columns.enumerate().for_each(|(k, column)| near.advance(column, size * (1.0 - 0.3 * k as f64)));
+        let (reused, driven) = (of(&near, by), of(&near, PassOptions::default()));
+        let pairs = reused.innovations[0].iter().zip(&driven.innovations[0]);
+        pairs.map(|(reused, driven)| (reused.sigma * (reused.z - driven.z)).abs()).fold(0.0, f64::max)
+    };
+    let ratio = off(2e-3) / off(1e-3);
+    assert!((ratio / 4.0 - 1.0).abs() < 0.1, "{ratio}");
+    assert!(off(1e-3) < 1e-4, "{}", off(1e-3));
+}
+
+#[test]
+fn dead_reckoning_to_every_measurement_ends_where_a_run_cut_there_ends() {
+    let dataset = dataset_of(1, true);
+    let fit = |dataset: &Dataset| -> Vec<(Pose, f64)> {
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(RunDistanceTerm { distance_m: 7.0 })];
+        let fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+        fit.dead_reckoned(&model(), &mut terms).iter().map(|end| (end.off, end.length_m)).collect()
+    };
+    let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(RunDistanceTerm { distance_m: 7.0 })];
+    let whole = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+    let measurements = whole.dead_reckoned_measurements(&model(), &mut terms);
+    assert_eq!(measurements.len(), dataset.runs[0].truth.len() - 1);
+    for (k, measurement) in measurements.iter().enumerate() {
+        let mut cut = dataset.clone();
+        cut.runs[0].truth.truncate(k + 2);
+        // The same steps in the same order: to the last bit.
+        assert_eq!(fit(&cut), [(measurement.off, measurement.length_m)], "measurement {k}");
+    }
+}

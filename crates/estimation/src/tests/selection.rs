@@ -1,0 +1,180 @@
+//! Which measurements and rows the likelihood takes: thinning, and decimation of fast logs.
+
+use dataset::{Displacement, Odometry};
+
+use super::*;
+use crate::FitSettings;
+use crate::decimation::Decimated;
+
+#[test]
+fn thinned_measurements_are_far_enough_apart_and_end_with_the_last() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning { every_s: 4.0, phases: 2 }, &MODEL);
+    let measurements = |phase: usize| -> Vec<usize> {
+        selections[phase].propagations[0].iter().map(|propagation| propagation.measurement).collect()
+    };
+    // Measurements every 2 s up to 12 s: at 4, 8, 12 s, and from 6 s on.
+    assert_eq!(measurements(0), [2, 4, 6]);
+    assert_eq!(measurements(1), [3, 6]);
+    let first = &selections[1].propagations[0][0];
+    assert_eq!((first.intervals.clone(), first.from), (0..6, 0));
+}
+
+/// Normal variables by the sum of twelve uniform ones of `SplitMix64` (Steele, Lea & Flood 2014).
+struct Normals(u64);
+
+impl Normals {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        f64::from(u32::try_from((z ^ (z >> 31)) >> 32).expect("half of the bits")) / f64::from(u32::MAX)
+    }
+
+    fn next(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// Displacements of each run; each takes a second.
+const DISPLACEMENTS: [u32; 8] = [40; 8];
+
+/// Runs measured by displacements of a second, with errors of which a share `autocorrelation` lasts from one
+/// to the next (a first-order autoregression of variance one, in millimetres and milliradians).
+fn displacement_dataset(runs: &[u32], autocorrelation: f64, seed: u64) -> Dataset {
+    let mut normals = Normals(seed);
+    let mut dataset = dataset(true);
+    let base = dataset.runs[0].clone();
+    let run = |(number, displacements): (usize, &u32)| {
+        let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
+        let (mut measured, mut errors) = (Vec::new(), [0.0; 3].map(|_: f64| normals.next()));
+        for second in 0..*displacements {
+            let k = (second as usize + number) % LEFT_RAD.len();
+            let turned = Wheels { left: LEFT_RAD[k], right: RIGHT_RAD[k] };
+            for (side, rad) in [(&mut angles.left, turned.left), (&mut angles.right, turned.right)] {
+                let before = *side.last().expect("a start");
+                side.push(before + rad);
+            }
+            let travel_m = Wheels { left: 0.0811 * turned.left, right: 0.0797 * turned.right };
+            let slid_m = travel_m.map(|travel_m: f64| travel_m + 3e-4 * travel_m.abs().sqrt() * normals.next());
+            let moved = Increment::from_travel(slid_m, 0.366).arc();
+            errors = errors.map(|error| {
+                autocorrelation * error + (1.0 - autocorrelation * autocorrelation).sqrt() * normals.next()
+            });
+            measured.push(Displacement {
+                t0_s: f64::from(second),
+                t1_s: f64::from(second + 1),
+                dx_m: moved.x_m + 1e-3 * errors[0],
+                dy_m: moved.y_m + 1e-3 * errors[1],
+                dtheta_rad: moved.theta_rad + 1e-3 * errors[2],
+            });
+        }
+        let t_s = (0..=*displacements).map(f64::from).collect();
+        let odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
+        let info = RunInfo { id: format!("run-{number}"), ..base.info.clone() };
+        Run { info, odometry, displacements: measured, ..Run::default() }
+    };
+    dataset.runs = runs.iter().enumerate().map(run).collect();
+    dataset
+}
+
+#[test]
+fn thinned_displacements_are_far_enough_apart_and_every_run_has_one() {
+    let dataset = displacement_dataset(&[6, 1], 0.0, 0);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning { every_s: 2.5, phases: 2 }, &MODEL);
+    let taken = |phase: usize| -> Vec<usize> {
+        let propagations = selections[phase].propagations.iter().enumerate();
+        propagations.filter(|(_, propagations)| !propagations.is_empty()).map(|(segment, _)| segment).collect()
+    };
+    // They end at 1 … 6 s: the first phase takes those at 1 and 4 s, the second, due from 1 + 1.25 s on,
+    // those at 3 and 6 s. The run of one gives it to both.
+    assert_eq!(taken(0), [0, 3, 6]);
+    assert_eq!(taken(1), [2, 5, 6]);
+    assert!(records.times_between().all(|between_s| (between_s - 1.0).abs() < 1e-12));
+    // Of the runs, not of the displacements, each of which is a segment of its own.
+    assert!((selections[0].mean_measurements(&records) - 1.5).abs() < 1e-12);
+    let all = Selection::of(&records, Thinning::NONE, &MODEL);
+    assert!((all[0].mean_measurements(&records) - 3.5).abs() < 1e-12);
+}
+
+/// Of 20 datasets with white errors, four or more would be thinned by chance once in 20 000 times (1 % each).
+/// Were displacements not neighbours, none of those whose errors last would.
+#[test]
+fn displacements_are_thinned_where_their_errors_last_and_only_there() {
+    let thinned = |autocorrelation: f64| {
+        let of = |seed: &u64| {
+            let dataset = displacement_dataset(&DISPLACEMENTS, autocorrelation, *seed);
+            let joint = FitSettings { nuisances: false, thin: true, thin_displacements: true };
+            joint.fit(&[dataset.session()]).expect("a fit").thinning != Thinning::NONE
+        };
+        (1..=20_u64).filter(of).count()
+    };
+    assert!(thinned(0.0) < 4);
+    assert_eq!(thinned(0.7), 20);
+}
+
+/// The same drive, logged several times as often.
+fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
+    let mut finer = dataset.clone();
+    for run in &mut finer.runs {
+        let WheelLog::Angles(angles) = &run.odometry.wheels else { unreachable!("the helper logs angles") };
+        let between = |of: &[f64]| -> Vec<f64> {
+            let steps = of.windows(2).flat_map(|pair| {
+                (0..times).map(|part| pair[0] + (pair[1] - pair[0]) * part as f64 / times as f64).collect::<Vec<_>>()
+            });
+            steps.chain(of.last().copied()).collect()
+        };
+        let (t_s, angles) = (between(&run.odometry.t_s), angles.as_ref().map(|of| between(of)));
+        (run.odometry.t_s, run.odometry.wheels) = (t_s, WheelLog::Angles(angles));
+    }
+    finer
+}
+
+/// Adds distance in proportion to the square of an interval's length.
+#[derive(Clone)]
+struct RowTerm;
+
+impl ModelTerm for RowTerm {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const MOTION: TermParameter = TermParameter { name: "distance_per_s2", unit: "m/s²", prior_sigma: 1.0 };
+        &[MOTION]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new(interval.dt_s * interval.dt_s, 0.0, 0.0);
+    }
+}
+
+#[test]
+fn decimated_rows_of_one_speed_give_what_single_rows_give() {
+    // Ten rows a second, measurements every two: five intervals make half a second.
+    let finer = logged_finer(&dataset(true), 10);
+    let session = [finer.session()];
+    let mut fit = ModelFit::from_parameters(MODEL, NOISE, &session);
+    fit.solution.pass = fit.scan(&mut []);
+    let coarse = fit.decimated(&mut [], 0.5).expect("a fifth of the pieces");
+    let intervals =
+        |fit: &ModelFit<'_>| fit.records.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>();
+    assert_eq!((intervals(&fit), intervals(&coarse)), (vec![120; 2], vec![24; 2]));
+    let close = |a: &Pass, b: &Pass| {
+        let both = a.runs.iter().zip(&b.runs);
+        // Arcs put together from five of a tenth, to rounding.
+        both.map(|(a, b)| (&a.gradient - &b.gradient).norm() / a.gradient.norm()).fold(0.0, f64::max) < 1e-9
+    };
+    assert!(close(&coarse.scan(&mut []), &fit.scan(&mut [])));
+    // Rows of several speeds lead elsewhere.
+    assert!(fit.decimated(&mut [], 3.0).is_none());
+    // Wheels that turn back, stand or begin are no part of what went before, nor is what comes after a
+    // measurement: of twelve rows three go with the one before.
+    let longest = Decimated::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
+    assert_eq!(longest.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>(), [9; 2]);
+    assert!(fit.decimated(&mut [], 0.15).is_none(), "nothing to put together");
+    // A fit with what goes by single rows is another one by longer ones.
+    let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(RowTerm)];
+    fit.solution.model.term_values = vec![0.01];
+    fit.solution.pass = fit.scan(&mut by_rows);
+    assert!(fit.decimated(&mut by_rows, 0.5).is_none());
+}
