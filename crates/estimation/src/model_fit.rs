@@ -267,12 +267,22 @@ impl ModelFit<'_> {
     /// first.
     #[must_use]
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        self.scan_with(terms, PassOptions { innovations: true, ..PassOptions::default() })
+    }
+
+    /// The same with samples of how the robot moved before each measurement.
+    #[must_use]
+    pub fn scan_with_samples(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        self.scan_with(terms, PassOptions { innovations: true, samples: true, ..PassOptions::default() })
+    }
+
+    fn scan_with(&self, terms: &mut [Box<dyn ModelTerm>], options: PassOptions<'_>) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         // Terms that are in the fit come first and keep their sizes.
         let mut model = self.fit.model.clone();
         model.term_values.resize(parameters, 0.0);
         let Fit { noise, free_headings, .. } = &self.fit;
-        let pass_options = PassOptions { innovations: true, gate: self.gate(), ..PassOptions::default() };
+        let pass_options = PassOptions { gate: self.gate(), ..options };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
     }
 
@@ -311,12 +321,7 @@ impl ModelFit<'_> {
     /// The normal equation of the same pass where the last parameters come in parts of so many, each tested for itself: there is none of two parts together.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
-        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        let mut model = self.fit.model.clone();
-        model.term_values.resize(parameters, 0.0);
-        let Fit { noise, free_headings, .. } = &self.fit;
-        let pass_options = PassOptions { parts, gate: self.gate(), ..PassOptions::default() };
-        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
+        self.scan_with(terms, PassOptions { parts, ..PassOptions::default() }).runs
     }
 
     /// The fit with further terms, their sizes free beside what is free already, on the same measurements.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::filter::{Filter, Innovation, NoiseScore, PassOptions};
 use crate::group_extrinsics::GroupResponse;
+use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::normal_equations::NormalEquations;
@@ -25,6 +26,8 @@ pub struct Pass {
     pub runs: Vec<NormalEquations>,
     /// The whitened innovations, phase by phase, in the order of segments and measurements.
     pub innovations: Vec<Vec<Innovation>>,
+    /// How the robot moved before each measurement, phase by phase, in the order of the innovations; empty where it is not asked for.
+    pub samples: Vec<Vec<KinematicSample>>,
     /// Measurements left out as outliers in the first phase: segment and look.
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
@@ -54,6 +57,7 @@ impl Pass {
         Self {
             runs: Vec::new(),
             innovations: Vec::new(),
+            samples: Vec::new(),
             outliers: Vec::new(),
             noise: NoiseScore::zero(),
             headings: Vec::new(),
@@ -80,6 +84,8 @@ pub(crate) fn pass(
     let runs = runs(&records.segments);
     result.runs =
         runs.iter().map(|segments| NormalEquations::new(records.segments[segments.start].run, columns)).collect();
+    // Terms and samples remember what was driven before.
+    let has_memory = !terms.is_empty() || pass_options.samples;
     let reused = pass_options.by.map(|cached| (cached, cached.change_to(model)));
     let of_segment = |(phase, number): (usize, usize),
                       propagations: &[PropagationInterval],
@@ -97,9 +103,10 @@ pub(crate) fn pass(
         }
         filter.run(propagations, free_headings[number]);
         *carried = Some(filter.carried());
+        let samples = std::mem::take(&mut filter.samples);
         let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
         let (equations, heading) = sums.eliminated(segment.run, columns);
-        (equations, OfSegment { number, heading, innovations, outliers, noise_score, cached })
+        (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, cached })
     };
     let mut phases = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {
@@ -109,8 +116,8 @@ pub(crate) fn pass(
             let mut found = Vec::with_capacity(segments.len());
             for number in segments.clone() {
                 let unobservable = propagations[number].is_empty();
-                // Terms remember what was driven on the way to the next displacement, seen or not.
-                let remember = !terms.is_empty() && pass_options.by.is_none();
+                // What was driven on the way to the next displacement is remembered, measured or not.
+                let remember = has_memory && pass_options.by.is_none();
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
                 }
@@ -127,7 +134,7 @@ pub(crate) fn pass(
             if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
         };
         let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= PROPAGATIONS_AT_ONCE;
-        let found: Vec<Vec<OfSegment>> = if at_once && terms.is_empty() {
+        let found: Vec<Vec<OfSegment>> = if at_once && !has_memory {
             let of = |number: usize| {
                 (!propagations[number].is_empty())
                     .then(|| of_segment((phase, number), &propagations[number], &mut [], &mut None))
@@ -139,7 +146,7 @@ pub(crate) fn pass(
             };
             runs.iter().zip(&mut result.runs).map(in_run).collect()
         } else if at_once {
-            // Chains of a run follow each other, and terms remember; each run starts anew.
+            // Segments of a run follow each other; each run starts anew.
             let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>,
                           (segments, equations): (&Range<usize>, &mut NormalEquations)| {
                 of_run(segments, equations, terms)
@@ -150,12 +157,14 @@ pub(crate) fn pass(
         };
         let reused = found.iter().flatten().map(|of| of.innovations.len()).sum();
         let mut innovations = Vec::with_capacity(reused);
+        let mut samples = Vec::new();
         let mut cached = vec![None; if pass_options.keep { propagations.len() } else { 0 }];
         for of in found.into_iter().flatten() {
             if pass_options.keep {
                 cached[of.number] = of.cached;
             }
             innovations.extend(of.innovations);
+            samples.extend(of.samples);
             if phase == 0 {
                 result.outliers.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
             }
@@ -168,6 +177,9 @@ pub(crate) fn pass(
         phases.push(cached);
         if pass_options.innovations {
             result.innovations.push(innovations);
+        }
+        if pass_options.samples {
+            result.samples.push(samples);
         }
     }
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
@@ -193,6 +205,7 @@ struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,
     innovations: Vec<Innovation>,
+    samples: Vec<KinematicSample>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
     cached: Option<SegmentCache>,
