@@ -14,7 +14,7 @@ use crate::candidate::{Candidate, mean_terms};
 use crate::check::TestResult;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
-use crate::findings::findings;
+use crate::findings::{Evidence, findings};
 use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
@@ -152,19 +152,26 @@ fn continued(
     limits: &Limits,
 ) -> Diagnosis {
     // Where the counts do not follow the robot at all, no small effect has a meaning.
-    let lost = !follows(&base);
-    let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
+    let uncorrelated = !follows(&base);
+    let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let asked = mean_structure(datasets, base, &catalogue, restored);
+    let structure = mean_structure(datasets, base, &catalogue, restored);
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
-    let findings = findings(&asked, (log.as_ref(), spans.as_ref()), faults, lost, &options.without);
-    let model = asked.model();
-    let (gain, gain_why_null) = gain_of(&asked.base, model);
-    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut asked.found.known.clone());
-    let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
+    let findings = findings(&Evidence {
+        structure: &structure,
+        log: log.as_ref(),
+        spans: spans.as_ref(),
+        faults,
+        uncorrelated,
+        without: &options.without,
+    });
+    let model = structure.model();
+    let (gain, gain_why_null) = gain_of(&structure.base, model);
+    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
+    let next = next_experiment(datasets, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits);
     let extended = crate::extended_scenario::scenario_of(datasets, model);
-    let residuals = residuals(&asked.base, model);
-    let alternatives = alternatives(&asked.found, &findings);
+    let residuals = residuals(&structure.base, model);
+    let alternatives = alternatives(&structure.found, &findings);
     let names: Vec<String> = datasets
         .iter()
         .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
@@ -173,7 +180,7 @@ fn continued(
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
         sentence: text::summary(&findings, gain.as_ref()),
-        checks: asked.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
+        checks: structure.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
         findings: findings.iter().map(text::finding).collect(),
         blind_to,
         sensitivity,

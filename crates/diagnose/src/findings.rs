@@ -1,4 +1,5 @@
-//! The findings of all stages in one list: record faults, effects of the mean, sparse terms, noise effects, faults of the log; each with the doubts that the others cast on it.
+//! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log; and the doubts that
+//! they cast on each other. [`findings`] lists the stages in their order.
 
 use crate::cause::Doubt;
 use crate::check::TestResult;
@@ -23,63 +24,135 @@ fn is_scatter(finding: &Finding) -> bool {
     }
 }
 
-/// The findings, record faults first and then those of the highest significance. `log`, `spans`: the tests of the log itself; `lost`: the odometry is uncorrelated with what the instrument measured.
-pub(crate) fn findings(
-    asked: &MeanStructure<'_>,
-    (log, spans): (Option<&TestResult>, Option<&TestResult>),
-    faults: &[&Fault],
-    lost: bool,
-    without: &[String],
-) -> Vec<Finding> {
-    // What lies far off by counts that are restored roughly has its name already.
-    let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let mut findings: Vec<Finding> = faults.iter().map(|fault| finding::of_fault(fault)).collect();
-    findings.extend(finding::of_search(&asked.found));
-    let model = asked.model();
-    if let Some(relative_odds) = asked.competing {
+/// What the stages of the diagnosis before found out.
+pub(crate) struct Evidence<'e, 'a> {
+    pub(crate) structure: &'e MeanStructure<'a>,
+    /// The tests of the log itself: its rows, and its time span.
+    pub(crate) log: Option<&'e TestResult>,
+    pub(crate) spans: Option<&'e TestResult>,
+    pub(crate) faults: &'e [&'e Fault],
+    /// The odometry is uncorrelated with what the instrument measured.
+    pub(crate) uncorrelated: bool,
+    /// Effects that are not to be named.
+    pub(crate) without: &'e [String],
+}
+
+impl Evidence<'_, '_> {
+    /// Lost counts were restored roughly: they explain outliers and autocorrelated errors that are left.
+    fn restored(&self) -> bool {
+        self.faults.iter().any(|fault| fault.is_restored_roughly())
+    }
+}
+
+/// A stage: the findings so far, record faults first, to those after it.
+type Stage = fn(&Evidence<'_, '_>, Vec<Finding>) -> Vec<Finding>;
+
+/// The findings, record faults first, then by significance.
+pub(crate) fn findings(evidence: &Evidence<'_, '_>) -> Vec<Finding> {
+    let stages: [Stage; 10] = [
+        record_faults,
+        mean_effects,
+        sparse_terms,
+        noise_effects,
+        faults_of_the_log,
+        failed_checks,
+        doubt_parts_of_stronger_findings,
+        doubt_incomplete_models,
+        doubt_low_significance,
+        by_significance,
+    ];
+    stages.iter().fold(Vec::new(), |findings, stage| stage(evidence, findings))
+}
+
+fn record_faults(evidence: &Evidence<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
+    evidence.faults.iter().map(|fault| finding::of_fault(fault)).collect()
+}
+
+/// Effects of the mean; where one uncatalogued term explains nearly as much, with that doubt.
+fn mean_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.extend(finding::of_search(&evidence.structure.found));
+    if let Some(relative_odds) = evidence.structure.competing {
         finding::beside_unlisted(&mut findings, relative_odds);
     }
-    for (index, p_value, trials) in asked.unlisted.iter().flat_map(UncataloguedTerms::terms) {
+    findings
+}
+
+fn sparse_terms(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let model = evidence.structure.model();
+    for (index, p_value, trials) in evidence.structure.unlisted.iter().flat_map(UncataloguedTerms::terms) {
         let test = wald_test(model, index).map(|(test, _)| test);
         findings.extend(test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials)));
     }
-    if lost {
-        findings.push(finding::of_lost(&asked.base));
-    } else if !restored {
-        // What has a size is not told again by its sign.
-        let told = |sign: &Finding| findings.iter().any(|finding| sign.names(finding.first()));
-        let signs: Vec<Finding> = scatter(asked, without).into_iter().filter(|sign| !told(sign)).collect();
+    findings
+}
+
+/// Noise effects, or that odometry is uncorrelated with the measurements. A mean effect of the same cause excludes a noise effect.
+fn noise_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if evidence.uncorrelated {
+        findings.push(finding::of_lost(&evidence.structure.base));
+    } else if !evidence.restored() {
+        let mut signs = scatter(evidence.structure, evidence.without);
+        signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
         findings.extend(signs);
     }
-    let wheels = if lost { None } else { wrong_wheels(&asked.base) };
+    findings
+}
+
+/// What the log or the wheels' sizes show. Faults without a name cast doubt on all findings before them.
+fn faults_of_the_log(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let Evidence { structure, log, spans, faults, without, .. } = *evidence;
+    let wheels = if evidence.uncorrelated { None } else { wrong_wheels(&structure.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);
     if !nameless.is_empty() {
-        // With times in other units even a gross fault may be an accident.
+        // Where times are in other units, a record fault may be an accident too.
         let sound = spans.is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
             finding.or_unlisted(1.0, Doubt::FaultyRecords);
         }
     }
     findings.extend(nameless);
-    // Something is left that no name explains; a failed check that a scatter explains has its name already.
+    findings
+}
+
+/// Failed checks that no finding explains. A noise effect explains failed checks, unless residuals depend on something too
+/// plainly.
+fn failed_checks(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let Evidence { structure, .. } = evidence;
     let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < BEYOND_SCATTER;
-    let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
-    let told = asked.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
-    if !(restored || scatters || told) {
-        findings.extend(finding::of_failed_checks(&asked.checked));
+    let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
+    let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
+    if !(evidence.restored() || scatters || is_reported) {
+        findings.extend(finding::of_failed_checks(&structure.checked));
     }
-    finding::doubt(&mut findings[faults.len()..], asked.found.model.candidates.len() >= MAX_EFFECTS);
-    // A term without a name that stands out beside all that was found, though not by enough to be a finding.
+    findings
+}
+
+fn doubt_parts_of_stronger_findings(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let full = evidence.structure.found.model.candidates.len() >= MAX_EFFECTS;
+    finding::doubt(&mut findings[evidence.faults.len()..], full);
+    findings
+}
+
+/// An uncatalogued term that is significant beside all that was found, though not by enough to be a finding.
+fn doubt_incomplete_models(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if findings.iter().any(Finding::is_sure)
-        && let Some(left) = lack_of_fit(&asked.base, model)
+        && let Some(left) = lack_of_fit(&evidence.structure.base, evidence.structure.model())
     {
         finding::or_incomplete(&mut findings, left);
     }
+    findings
+}
+
+fn doubt_low_significance(_: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     finding::or_of_low_significance(&mut findings);
-    // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
-    findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
+    findings
+}
+
+/// Record faults stay first: everything else is found in the records without them.
+fn by_significance(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings[evidence.faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     findings
 }

@@ -30,16 +30,16 @@ const CERTAINLY: f64 = 1e-6;
 const MAX_OUTLIERS: f64 = 0.2;
 
 /// Scatter that failed checks show.
-pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
+pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let outliers = asked.checked.outliers;
-    let tests = &asked.checked.checks;
+    let outliers = structure.checked.outliers;
+    let tests = &structure.checked.checks;
     let far = outliers.isolated + outliers.staying;
     if far as f64 > MAX_OUTLIERS * (outliers.measurements + far) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
-    let turns = of_turns(asked, without_ids);
+    let turns = of_turns(structure, without_ids);
     let with_something = tests.iter().filter(|test| test.shows_dependence());
     let with_something = with_something.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
@@ -47,7 +47,7 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
     let depends_on_something = with_something < tails.max(CERTAINLY);
     // After the end of a run nothing follows that could be back.
     let followed =
-        asked.base.selections.first().is_some_and(|taken| taken.mean_measurements(&asked.base.records) >= 2.0);
+        structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
     if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
         let share = outliers.isolated as f64 / (outliers.measurements + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
@@ -72,7 +72,7 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
         let jump = heaviest.and_then(|(component, number, sign)| {
             let fails = test(component).filter(|test| !test.passes);
             let p_value = fails.map(|test| test.p_value).or(far_off.then_some(outliers.p_value))?;
-            Some((p_value, what_follows(&asked.found.model.fit, number), sign))
+            Some((p_value, what_follows(&structure.found.model.fit, number), sign))
         });
         if let Some((p_value, follows, sign)) = jump {
             let named = |signs: &[Sign]| {
@@ -100,19 +100,19 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
             };
             // Tails have many causes.
             let or_unlisted = follows == ResidualPersistence::Undecided;
-            let likelihoods = log_likelihoods(asked.model(), &ids, any);
+            let likelihoods = log_likelihoods(structure.model(), &ids, any);
             let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
             let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
             let basis = Basis::LargeErrors(follows);
             findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
         }
     }
-    if let Some((coefficient, sigmas)) = asked.correlated
+    if let Some((coefficient, sigmas)) = structure.correlated
         && coefficient > 0.0
     {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        if !causes.is_empty() && (asked.spurious || !asked.found.model.candidates.is_empty()) {
+        if !causes.is_empty() && (structure.spurious || !structure.found.model.candidates.is_empty()) {
             causes.push(Cause::Unknown);
         }
         let basis = Basis::Autocorrelated(coefficient);
@@ -128,8 +128,8 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 }
 
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
-fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
-    let model = asked.model();
+fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
+    let model = structure.model();
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));

@@ -36,6 +36,13 @@ pub(crate) struct SearchResult<'a> {
     pub(crate) known: FitCache<'a>,
 }
 
+impl<'a> SearchResult<'a> {
+    /// The same search where another explanation replaces its effects; `base` is the model without any.
+    pub(crate) fn without_effects(self, base: AugmentedModel<'a>) -> Self {
+        Self { model: base, names: Vec::new(), tests: Vec::new(), ..self }
+    }
+}
+
 /// The best of a scan, refitted, if that confirms it; else its name.
 fn confirmed<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
