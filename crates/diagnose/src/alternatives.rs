@@ -6,7 +6,7 @@ use crate::cause::Cause;
 use crate::finding::Finding;
 use crate::ranking::tests_in;
 use crate::selection::SearchResult;
-use crate::settings::SCAN_LEVEL;
+use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
@@ -49,7 +49,11 @@ pub(crate) fn alternatives(found: &SearchResult<'_>, findings: &[Finding]) -> Ve
         .iter()
         .map(|entry| {
             let (id, log_odds) = (entry.scored.candidate.id(), entry.scored.log_odds);
-            let z = if entry.p_value > 1e-290 { z_of_p(entry.p_value) } else { entry.scored.statistic.sqrt() };
+            let z = if entry.p_value > MIN_QUANTILE_P_VALUE {
+                z_of_p(entry.p_value)
+            } else {
+                entry.scored.statistic.sqrt()
+            };
             let fate = if findings.iter().any(|finding| *finding.first() == Cause::Effect(id)) {
                 Status::Found
             } else if findings.iter().any(|finding| finding.names(&Cause::Effect(id))) {

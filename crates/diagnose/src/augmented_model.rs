@@ -6,6 +6,7 @@ use estimation::{Column, ModelFit, NormalEquations, total};
 use nalgebra::DVector;
 
 use crate::candidate::{Candidate, terms};
+use crate::settings::search::{MIN_TAKEN_FRACTION, OUTLIER_COST};
 
 /// A fit with effects.
 #[derive(Debug, Clone)]
@@ -44,17 +45,12 @@ pub(crate) fn cost(fit: &ModelFit<'_>, count: f64) -> f64 {
 
 /// What the innovations that are missing to a number of them cost: each lies as far off as an outlier does at least, and has a variance as the others have.
 pub(crate) fn left_out_cost(equations: &NormalEquations, count: f64) -> f64 {
-    // Half of the χ² with three degrees of freedom at which a measurement is an outlier, a component.
-    const OUTLIER: f64 = 0.5 * 25.9 / 3.0;
-    (count - equations.count).max(0.0) * (OUTLIER + 0.5 * equations.log_det / equations.count.max(1.0))
+    (count - equations.count).max(0.0) * (OUTLIER_COST + 0.5 * equations.log_det / equations.count.max(1.0))
 }
 
 pub(crate) fn count(fit: &ModelFit<'_>) -> f64 {
     fit.fit.pass.runs.iter().map(|run| run.count).sum()
 }
-
-/// A fit that takes a smaller share of the measurements that another one takes has lost the robot.
-const MIN_FOLLOWED: f64 = 0.5;
 
 /// The model with other candidates, fitted from where it stands, and where steps stray from the base too: the likelier of the two. `None` when both diverge.
 pub(crate) fn refit<'a>(
@@ -71,7 +67,8 @@ pub(crate) fn refit<'a>(
         estimates.extend(own.filter(|own| own.len() == none.len()).unwrap_or(none));
     }
     let follows = |fit: &ModelFit<'_>| {
-        fit.fit.model.term_values.iter().all(|size| size.is_finite()) && count(fit) > MIN_FOLLOWED * count(&from.fit)
+        fit.fit.model.term_values.iter().all(|size| size.is_finite())
+            && count(fit) > MIN_TAKEN_FRACTION * count(&from.fit)
     };
     let near = from.fit.extended_from(estimates, &mut terms(&candidates)).ok().filter(follows);
     let near = match near {

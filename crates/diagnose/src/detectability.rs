@@ -6,7 +6,8 @@ use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::document::{Blind, Smallest};
 use crate::fit_cache::FitCache;
-use crate::settings::DETECTION_SQRT_LAMBDA;
+use crate::settings::levels::DETECTION_SQRT_LAMBDA;
+use crate::settings::search::MAX_DETECTION_LIMIT_PRIOR_SIGMAS;
 
 /// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
 pub(crate) fn detectability(
@@ -27,7 +28,7 @@ pub(crate) fn detectability(
             .min_by(|a, b| (a.1 / a.0.prior_sigma).total_cmp(&(b.1 / b.0.prior_sigma)));
         let entry = match smallest {
             // A million times what would be large is rounding, not information.
-            Some((parameter, size)) if size < 1e6 * parameter.prior_sigma => {
+            Some((parameter, size)) if size < MAX_DETECTION_LIMIT_PRIOR_SIGMAS * parameter.prior_sigma => {
                 // A ratio has no unit in print.
                 let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
                 let why = if size > parameter.prior_sigma {

@@ -21,6 +21,7 @@ use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, fault, follows, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
+use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
 use crate::text;
 
 /// What to leave out.
@@ -88,11 +89,6 @@ impl FittedModel {
     }
 }
 
-/// A model that leaves out more of the measurements is none.
-const MAX_REJECTED: f64 = 0.2;
-/// With fewer measurements a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
-const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
-
 fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
     let runs = fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).count();
     fit.records.measurements() as f64 / runs.max(1) as f64
@@ -118,7 +114,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
     let measured = sessions(datasets);
     let first = EVERY_MEASUREMENT.fit(&measured);
     let outlying = first.as_ref().is_ok_and(|first| {
-        rejected_share(first) > MAX_REJECTED && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
+        rejected_share(first) > MAX_REJECTED_FRACTION && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
     });
     match fault(datasets, first.as_ref().ok(), &options.without, outlying) {
         Some(found) => {
@@ -136,7 +132,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
         None => {
             let first = first?;
             let share = rejected_share(&first);
-            if share > MAX_REJECTED {
+            if share > MAX_REJECTED_FRACTION {
                 return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
             }
             Ok(continued(datasets, first, &[], options, limits))

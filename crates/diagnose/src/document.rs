@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::settings::search::MATERIAL_DRIFT_INCREASE;
 use calib::{CalibrationReport, Names};
 use motion_programs::Schedule;
 use serde::Serialize;
@@ -147,9 +148,6 @@ pub struct Gain {
     pub drift_percent: Option<Compared>,
 }
 
-/// A drift that grows by less than this share is no reason to leave out what looks show.
-const MATERIAL: f64 = 0.05;
-
 impl Gain {
     /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single measurements.
     #[must_use]
@@ -161,7 +159,7 @@ impl Gain {
     pub(crate) fn drifts_more_by(&self, reaches: f64) -> bool {
         self.drift_percent.as_ref().is_some_and(|drift| {
             let (mean, reach) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));
-            mean + reaches * reach < 0.0 && drift.extended > (1.0 + MATERIAL) * drift.base
+            mean + reaches * reach < 0.0 && drift.extended > (1.0 + MATERIAL_DRIFT_INCREASE) * drift.base
         })
     }
 }

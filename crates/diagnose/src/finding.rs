@@ -14,7 +14,12 @@ use crate::record_faults::Fault;
 use crate::residual_tests::Checked;
 use crate::rivals::Name;
 use crate::selection::SearchResult;
-use crate::settings::{LOW_SIGNIFICANCE, MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
+use crate::settings::findings::{
+    LACK_OF_FIT_LEVEL, NONE_OF_CAUSES_ODDS, PART_OF_STRONGER_RATIO, PART_OF_STRONGER_RATIO_IF_FULL, UNCATALOGUED_PRIOR,
+};
+use crate::settings::levels::{
+    LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
+};
 use crate::statistics::{sidak, z_of_p};
 use crate::wald::Test;
 
@@ -105,15 +110,12 @@ fn trials(found: &SearchResult<'_>, candidate: &Candidate) -> usize {
 /// Whether an effect that a search found is of low significance.
 pub(crate) fn is_of_low_significance(found: &SearchResult<'_>, index: usize) -> bool {
     let (candidate, test) = (&found.model.candidates[index], &found.tests[index]);
-    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE
+    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE_SIGMAS
 }
-
-/// Probability that a finding has an uncatalogued cause that looks like one of the catalogue: one in twenty, as the blind benchmark finds.
-const UNCATALOGUED: f64 = 0.05;
 
 /// The log of that probability over that of a catalogued cause.
 pub(crate) fn uncatalogued_log_odds() -> f64 {
-    (UNCATALOGUED / (1.0 - UNCATALOGUED)).ln()
+    (UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).ln()
 }
 
 fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usize) -> Finding {
@@ -126,7 +128,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
     }
     Finding {
         causes,
-        probability: (1.0 - UNCATALOGUED) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
+        probability: (1.0 - UNCATALOGUED_PRIOR) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
         z: z(test, p_value),
         p_value,
         parameters: parameters(candidate, &test.estimates),
@@ -137,7 +139,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
 
 /// The standard normal quantile of a probability; where that is below what a double holds, from the statistic itself.
 fn z(test: &Test, p_value: f64) -> f64 {
-    if p_value > 1e-290 { z_of_p(p_value) } else { test.statistic.sqrt() }
+    if p_value > MIN_QUANTILE_P_VALUE { z_of_p(p_value) } else { test.statistic.sqrt() }
 }
 
 /// The finding of a sparse term at the end of a model's candidates.
@@ -168,12 +170,6 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     Some(of_causes(vec![Cause::Unknown], worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 
-/// A finding beside an uncatalogued one, or beside a noise effect, whose z is below this share of that one's may be a part of it.
-const DOUBTFUL: f64 = 3.0;
-
-/// By how much more where as many effects were found as are sought, and there is still something left.
-const DOUBTFUL_IF_FULL: f64 = 3.0;
-
 /// Says of mean effects that one uncatalogued term would do as well, with these odds over them.
 pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
     for finding in findings.iter_mut().filter(|finding| finding.is_mean()) {
@@ -181,17 +177,14 @@ pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
     }
 }
 
-/// p-value at which the effects found do not explain all that is there though they do.
-const LACK_OF_FIT: f64 = 0.05;
-
 /// Says of the effects found, where no other doubt is on them, that they may not be what is there where the score of an uncatalogued term is still significant beside them,
 /// by more than what their form may err by. A p-value speaks against what it was computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
 pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
-    if p_value >= LACK_OF_FIT {
+    if p_value >= LACK_OF_FIT_LEVEL {
         return;
     }
     let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    let odds = (against * UNCATALOGUED / (1.0 - UNCATALOGUED)).min(1.0);
+    let odds = (against * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0);
     let is_incomplete =
         |finding: &&mut Finding| finding.is_sure() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {
@@ -199,14 +192,10 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
     }
 }
 
-/// Odds that none of the candidates of a finding of low significance is right: of such findings of the blind benchmark seven of ten have the right one among theirs, of
-/// others forty-nine of fifty.
-const NONE_OF_THEM: f64 = 3.0 / 7.0;
-
 /// Says of the effects found, where no other doubt is on them, that they may be something else where they are of low significance.
 pub(crate) fn or_of_low_significance(findings: &mut [Finding]) {
-    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE) {
-        finding.or_unlisted(NONE_OF_THEM, Doubt::LowSignificance);
+    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE_SIGMAS) {
+        finding.or_unlisted(NONE_OF_CAUSES_ODDS, Doubt::LowSignificance);
     }
 }
 
@@ -220,12 +209,12 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let scatter = strongest(findings, |finding| has_sign(finding.first().id(), Sign::ScatterWithTurn));
     for finding in findings.iter_mut().filter(|finding| !finding.is_unlisted()) {
         let is_mean = finding.is_mean();
-        let stands_out = unlisted * if full && is_mean { DOUBTFUL_IF_FULL } else { 1.0 };
-        if is_mean && (finding.z < stands_out || DOUBTFUL * finding.z < scatter) {
+        let stands_out = unlisted * if full && is_mean { PART_OF_STRONGER_RATIO_IF_FULL } else { 1.0 };
+        if is_mean && (finding.z < stands_out || PART_OF_STRONGER_RATIO * finding.z < scatter) {
             finding.causes.retain(|cause| !cause.is_unlisted());
             finding.causes.insert(0, Cause::Unknown);
             finding.doubts.push(Doubt::ProbablyPartOfUnlisted);
-        } else if finding.z < DOUBTFUL * stands_out {
+        } else if finding.z < PART_OF_STRONGER_RATIO * stands_out {
             finding.or_unlisted(1.0, Doubt::PartOfUnlisted);
         }
     }
@@ -302,7 +291,7 @@ pub(crate) fn of_causes(
     if causes.is_empty() {
         causes.push(Cause::Unknown);
     }
-    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED) / causes.len() as f64 };
+    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) / causes.len() as f64 };
     Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new() }
 }
 
@@ -325,7 +314,7 @@ pub(crate) fn of_likely_scatter(
         causes.push(Cause::Unknown);
     }
     let finding = of_causes(causes, p_value, BTreeMap::new(), basis);
-    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED) * named / weights };
+    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) * named / weights };
     Finding { probability, ..finding }
 }
 

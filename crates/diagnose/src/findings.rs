@@ -8,12 +8,10 @@ use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
-use crate::settings::MAX_EFFECTS;
+use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
+use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
 use crate::wald::wald_test;
-
-/// What residuals go with by less chance than this, no scatter makes them go with.
-const BEYOND_SCATTER: f64 = 1e-8;
 
 fn is_scatter(finding: &Finding) -> bool {
     match effects::hypothesis(finding.first().id()) {
@@ -121,7 +119,7 @@ fn faults_of_the_log(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) ->
 /// plainly.
 fn failed_checks(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let Evidence { structure, .. } = evidence;
-    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < BEYOND_SCATTER;
+    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < DEPENDENCE_BEYOND_NOISE_LEVEL;
     let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
     let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
     if !(evidence.restored() || scatters || is_reported) {

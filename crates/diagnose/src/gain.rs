@@ -10,10 +10,9 @@ use nalgebra::DVector;
 use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
-use crate::settings::MIN_RUNS;
+use crate::settings::levels::MIN_RUNS;
+use crate::settings::search::{HOLD_OUT_FOLDS, MIN_HELD_OUT_UNITS};
 use crate::statistics::student_95;
-
-const FOLDS: usize = 6;
 
 /// What one held-out unit scores.
 struct Unit {
@@ -98,7 +97,7 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     } else {
         return Err("no run has measurements".to_owned());
     };
-    if units.len() < 3 {
+    if units.len() < MIN_HELD_OUT_UNITS {
         return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
     }
     let fold_of = folds(fit, &units, blocks);
@@ -106,7 +105,7 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     let prior = prior(fit, terms);
     let mut scored: Vec<Unit> = Vec::new();
     let mut models: Vec<Model> = Vec::new();
-    for fold in 0..FOLDS {
+    for fold in 0..HOLD_OUT_FOLDS {
         let mut others = units.iter().zip(&fold_of).filter(|(_, of)| **of != fold).map(|(unit, _)| unit);
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: NormalEquations = first.clone();
@@ -154,7 +153,7 @@ fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
 /// The fold of each unit: each protocol's units in turn.
 fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usize> {
     if blocks {
-        return (0..units.len()).map(|unit| unit % FOLDS).collect();
+        return (0..units.len()).map(|unit| unit % HOLD_OUT_FOLDS).collect();
     }
     let protocol = |run: (usize, usize)| {
         fit.records.segments.iter().find(|segment| segment.run == run).and_then(|segment| segment.info.protocol)
@@ -174,6 +173,6 @@ fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usi
         .collect();
     order.sort_unstable();
     let mut fold = vec![0; units.len()];
-    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % FOLDS);
+    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % HOLD_OUT_FOLDS);
     fold
 }

@@ -8,20 +8,10 @@ use dataset::{Dataset, Odometry, Run, WheelLog};
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::check::{Check, TestResult};
-
-/// An increment that is off by so many ranges of the four around it is astray.
-const OUTLYING: f64 = 20.0;
-/// Chance of an increment to be that by the scatter of steady wheels.
-const BY_CHANCE: f64 = 1.6e-5;
-/// Two increments of a steady wheel differ by as many counts, and their range is not less.
-const ROUNDING: f64 = 2.0;
-/// A wheel that does less than this share of what the rows around it do stands: a robot may stop for a row.
-const STANDS: f64 = 0.1;
-/// Chance at which a log shows that something is wrong with it.
-const LOG_LEVEL: f64 = 1e-6;
-
-/// A log that lasts so many times as long as what was seen of the robot, or so many times less, is of another clock.
-const OTHER_CLOCK: f64 = 30.0;
+use crate::settings::records::{
+    COUNT_ROUNDING, LOG_ROWS_LEVEL, MAX_CLOCK_RATIO, OUTLYING_ROW_PROBABILITY, OUTLYING_ROW_RANGES,
+    STANDSTILL_RATE_RATIO,
+};
 
 /// Whether the log lasts about as long as what was seen: the middle run's ratio. Looks need not begin and end with the log.
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
@@ -35,7 +25,7 @@ pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
     ratios.sort_by(f64::total_cmp);
     let statistic = *ratios.get(ratios.len() / 2)?;
-    let passes = (OTHER_CLOCK.recip()..OTHER_CLOCK).contains(&statistic);
+    let passes = (MAX_CLOCK_RATIO.recip()..MAX_CLOCK_RATIO).contains(&statistic);
     // No chance makes a clock thirty times as fast.
     Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
 }
@@ -53,10 +43,10 @@ pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
         let of = of_run(&run.odometry, run.info.continuous);
         Rows { all: sum.all + of.all, outlying: sum.outlying + of.outlying }
     });
-    let chance = Poisson::new(BY_CHANCE * rows.all as f64).ok()?;
+    let chance = Poisson::new(OUTLYING_ROW_PROBABILITY * rows.all as f64).ok()?;
     let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
     let statistic = rows.outlying as f64;
-    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_LEVEL })
+    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
 }
 
 fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
@@ -83,9 +73,9 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         let (least, most) =
             around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), rate| (a.min(*rate), b.max(*rate)));
         rows.all += 1;
-        let uncertain = ((most - least) * dt_s).max(ROUNDING);
-        let stands = rate.abs() < STANDS * mean.abs() || mean == 0.0;
-        if !stands && ((rate - mean) * dt_s).abs() > OUTLYING * uncertain {
+        let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING);
+        let stands = rate.abs() < STANDSTILL_RATE_RATIO * mean.abs() || mean == 0.0;
+        if !stands && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain {
             rows.outlying += 1;
         }
     }

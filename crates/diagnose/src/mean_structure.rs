@@ -16,19 +16,15 @@ use crate::model_comparison::{log_bayes_factor, log_odds_margin, relative_odds};
 use crate::record_faults::sessions;
 use crate::residual_tests::{Checked, check};
 use crate::selection::{SearchResult, search, search_ungated};
-use crate::settings::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, UNLISTED_LEVEL};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
 use crate::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
-
-/// Measurements whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
-const CORRELATED: f64 = 0.05;
-
-const CORRELATED_SIGMAS: f64 = 4.0;
 
 const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 fn is_white(checked: &Checked) -> bool {
     let (coefficient, sigmas) = checked.correlation;
-    coefficient.abs() < CORRELATED || (sigmas.abs() < CORRELATED_SIGMAS && !checked.autocorrelated)
+    coefficient.abs() < MIN_AUTOCORRELATION || (sigmas.abs() < AUTOCORRELATION_SIGMAS && !checked.autocorrelated)
 }
 
 /// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals that are left.
@@ -81,7 +77,7 @@ impl<'a> MeanModel<'a> {
 
     /// Uncatalogued terms beside the effects that were found.
     fn terms_beside(&self, base: &ModelFit<'a>) -> Option<UncataloguedTerms<'a>> {
-        sparse(base, &self.found.model, UNLISTED_LEVEL).map(|sparse| UncataloguedTerms::from(base, sparse))
+        sparse(base, &self.found.model, SPARSE_TERM_LEVEL).map(|sparse| UncataloguedTerms::from(base, sparse))
     }
 }
 
@@ -130,7 +126,7 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     let without = AugmentedModel::base(base);
     let Some(sparse_search) = SparseSearch::beside(base, &without) else { return model };
     let named = log_bayes_factor(&without.fit, &model.found.model);
-    let finding = sparse_search.finding(UNLISTED_LEVEL);
+    let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
     let unnamed = finding
         .as_ref()
         .map_or_else(|| sparse_search.log_bayes_factor(), |sparse| sparse_search.log_bayes_factor_of(&sparse.model));
@@ -171,7 +167,7 @@ fn thin_if_autocorrelated<'a>(
     if model.unlisted.is_some() || restored || is_white(&model.checked) {
         return Decorrelated { base, model, correlated: None, spurious: false };
     }
-    let tried = sparse(&base, &model.found.model, UNLISTED_LEVEL).map(|sparse| (check(&sparse.model), sparse));
+    let tried = sparse(&base, &model.found.model, SPARSE_TERM_LEVEL).map(|sparse| (check(&sparse.model), sparse));
     let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
     let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
     if let Some((_, sparse)) = explains {
@@ -192,7 +188,7 @@ fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue:
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    let found = search(base, catalogue, SURE_LEVEL, model.found.known.clone());
+    let found = search(base, catalogue, SCAN_LEVEL_IF_DEPENDENT, model.found.known.clone());
     if found.model.candidates.len() <= model.found.model.candidates.len() {
         return model;
     }
@@ -210,6 +206,3 @@ fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMode
         None => model,
     }
 }
-
-/// Family-wise rate of false positives of the scan where a check has already found that something is there.
-const SURE_LEVEL: f64 = 0.2;

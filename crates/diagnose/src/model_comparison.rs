@@ -5,7 +5,7 @@ use estimation::ModelFit;
 use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::candidate::terms;
 use crate::scan::log_occam_factor;
-use crate::settings::{MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
 use crate::wald::wald_test;
 
 /// How much less likely than the best a name may make the data and still be told.

@@ -19,15 +19,11 @@ use crate::mean_structure::MeanStructure;
 use crate::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::residual_tests::what_follows;
 use crate::run_to_run::differs_from_run_to_run;
-use crate::settings::TURNS_LEVEL;
+use crate::settings::levels::TURN_SCATTER_LEVEL;
+use crate::settings::residuals::{
+    DEPENDENCE_BEYOND_TAILS_LEVEL, ISOLATED_TO_PERSISTENT_RATIO, MAX_OUTLIER_FRACTION, NOISE_EFFECT_LEVEL,
+};
 use crate::statistics::{p_of_chi_square, p_of_z};
-
-/// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
-const SCATTER_LEVEL: f64 = 1e-3;
-/// Where tails are heavy, what residuals seem to go with must do so beyond doubt: few large errors make such a test fail.
-const CERTAINLY: f64 = 1e-6;
-/// With more, it is the model that is off, and not the measurements.
-const MAX_OUTLIERS: f64 = 0.2;
 
 /// Scatter that failed checks show.
 pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
@@ -35,7 +31,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
     let outliers = structure.checked.outliers;
     let tests = &structure.checked.checks;
     let far = outliers.isolated + outliers.staying;
-    if far as f64 > MAX_OUTLIERS * (outliers.measurements + far) as f64 {
+    if far as f64 > MAX_OUTLIER_FRACTION * (outliers.measurements + far) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
@@ -44,11 +40,14 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
     let with_something = with_something.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
     let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
-    let depends_on_something = with_something < tails.max(CERTAINLY);
+    let depends_on_something = with_something < tails.max(DEPENDENCE_BEYOND_TAILS_LEVEL);
     // After the end of a run nothing follows that could be back.
     let followed =
         structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
-    if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
+    if followed
+        && outliers.p_value < NOISE_EFFECT_LEVEL
+        && outliers.isolated >= ISOLATED_TO_PERSISTENT_RATIO * outliers.staying
+    {
         let share = outliers.isolated as f64 / (outliers.measurements + far) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.measurements + far;
@@ -67,7 +66,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
         let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::DistanceJumps)];
         let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
         let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
-        let far_off = outliers.p_value < SCATTER_LEVEL && (outliers.staying > 0 || !followed);
+        let far_off = outliers.p_value < NOISE_EFFECT_LEVEL && (outliers.staying > 0 || !followed);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(component, number, sign)| {
             let fails = test(component).filter(|test| !test.passes);
@@ -134,7 +133,7 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
     let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));
-    if p_value >= TURNS_LEVEL {
+    if p_value >= TURN_SCATTER_LEVEL {
         return None;
     }
     let sigma = model.fit.fit.noise.sigma(NoiseComponent::Turn);

@@ -19,24 +19,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
-
-/// An innovation this large, in standard deviations, is one that the tails are made of.
-const LARGE: f64 = 3.5;
-/// Large innovations with so few measurements between them are one error: a filter that followed it wrongly comes back.
-const APART: usize = 3;
-/// Most errors that are asked, the largest: each takes a term's share of a pass.
-const MOST: usize = 24;
-/// Errors that are asked in one pass.
-const AT_ONCE: usize = 4;
-/// Share of the large errors that may have another cause.
-const OTHERS: f64 = 0.05;
-/// Share of the errors of wheels that stick or slide that lie at starts and stops.
-const AT_RAMPS: f64 = 0.9;
-/// A measurement this near to an instant is at it, seconds.
-const AT_S: f64 = 1e-6;
-
-/// Errors of a measurement, metres and radians.
-const ERRORS: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
+use crate::settings::residuals::{
+    ERRORS_PER_PASS, INSTANT_TOLERANCE_S, JUMP_TIME_FRACTIONS, LARGE_INNOVATION_SIGMAS, MAX_ERROR_GAP,
+    MAX_LARGE_ERRORS, MEASUREMENT_ERROR_SCALES, OTHER_CAUSE_PROBABILITY, RAMP_ERROR_FRACTION,
+};
 
 /// A large error.
 #[derive(Debug, Clone)]
@@ -56,10 +42,8 @@ struct Large {
     z: f64,
 }
 
-/// Places of a jump between two measurements, as shares of the time.
-const PLACES: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
 /// Columns of a large error: each wheel's lost way at each place; way lost for a change of its speed; the error of the measurement, and of the one before; a jump before the measurement.
-const SLIDES: usize = 2 * PLACES.len();
+const SLIDES: usize = 2 * JUMP_TIME_FRACTIONS.len();
 const AT: usize = SLIDES + 2;
 const FROM: usize = AT + 3;
 const ANY: usize = FROM + 3;
@@ -96,7 +80,7 @@ impl ModelTerm for Jump {
             return;
         }
         let on = |side: Side, way: f64| interval.change(Wheels::from_sides(|of| if of == side { -way } else { 0.0 }));
-        for (index, share) in PLACES.iter().enumerate() {
+        for (index, share) in JUMP_TIME_FRACTIONS.iter().enumerate() {
             let instant_s = self.from_s + share * (self.at_s - self.from_s);
             if start_s <= instant_s && instant_s < end_s {
                 for (k, side) in Side::BOTH.into_iter().enumerate() {
@@ -108,7 +92,7 @@ impl ModelTerm for Jump {
         for (k, side) in Side::BOTH.into_iter().enumerate() {
             gradient[SLIDES + k] = on(side, speed_m_s[side] - before_m_s[side]);
         }
-        if end_s > self.at_s - AT_S {
+        if end_s > self.at_s - INSTANT_TOLERANCE_S {
             gradient[ANY..].copy_from_slice(&ANYWHERE);
         }
     }
@@ -118,7 +102,7 @@ impl ModelTerm for Jump {
             return;
         }
         for (at_s, column) in [(self.at_s, AT), (self.from_s, FROM)] {
-            if (measurement.t_s - at_s).abs() < AT_S {
+            if (measurement.t_s - at_s).abs() < INSTANT_TOLERANCE_S {
                 gradient[column..column + 3].copy_from_slice(&ANYWHERE);
             }
         }
@@ -149,8 +133,9 @@ pub(crate) fn log_likelihoods(
     let fit = model.fit.evaluated_ungated();
     let mut large = large(&fit, &fit.scan(&mut terms(&model.candidates)).innovations);
     large.sort_by(|a, b| b.z.total_cmp(&a.z));
-    large.truncate(MOST);
-    let of_passes: Vec<Vec<Measured>> = large.par_chunks(AT_ONCE).map(|large| seen(model, &fit, large)).collect();
+    large.truncate(MAX_LARGE_ERRORS);
+    let of_passes: Vec<Vec<Measured>> =
+        large.par_chunks(ERRORS_PER_PASS).map(|large| seen(model, &fit, large)).collect();
     let seen = of_passes.concat();
     if seen.is_empty() {
         return None;
@@ -171,7 +156,10 @@ fn of_causes(causes: &[Vec<Vec<f64>>]) -> Vec<f64> {
         .collect();
     let at_scale = |own: &Vec<f64>| -> f64 {
         // Over the best explanation of each: what is common to all causes.
-        own.iter().zip(&best).map(|(own, best)| ((1.0 - OTHERS) * (own - best).exp() + OTHERS).ln()).sum()
+        own.iter()
+            .zip(&best)
+            .map(|(own, best)| ((1.0 - OTHER_CAUSE_PROBABILITY) * (own - best).exp() + OTHER_CAUSE_PROBABILITY).ln())
+            .sum()
     };
     causes.iter().map(|scales| log_mean(&scales.iter().map(at_scale).collect::<Vec<_>>())).collect()
 }
@@ -232,15 +220,16 @@ fn large(fit: &ModelFit<'_>, innovations: &[Vec<Innovation>]) -> Vec<Large> {
     let mut found = Vec::new();
     let mut last: Option<(usize, usize)> = None;
     for (number, (measurement, (segment, ramp))) in measurements.into_iter().enumerate() {
-        if measurement.z <= LARGE {
+        if measurement.z <= LARGE_INNOVATION_SIGMAS {
             continue;
         }
-        let follows = last.is_some_and(|(at, of)| number - at <= APART && fit.records.are_in_series(of, segment));
+        let follows =
+            last.is_some_and(|(at, of)| number - at <= MAX_ERROR_GAP && fit.records.are_in_series(of, segment));
         last = Some((number, segment));
         if follows {
             continue;
         }
-        let mostly = AT_RAMPS.max(share);
+        let mostly = RAMP_ERROR_FRACTION.max(share);
         let ramp = if ramp { mostly / share } else { (1.0 - mostly) / (1.0 - share) };
         let way = if way > 0.0 { measurement.way / way } else { 0.0 };
         found.push(Large { way, ramp, ..measurement });
@@ -374,8 +363,11 @@ fn of_any(source: ErrorSource, seen: &[Measured]) -> Vec<Vec<f64>> {
         }
         ErrorSource::Instrument => &[Measured::of_look],
     };
-    let both =
-        kinds.iter().flat_map(|of| ERRORS.iter().flat_map(move |m| ERRORS.iter().map(move |rad| (of, *m, *rad))));
+    let both = kinds.iter().flat_map(|of| {
+        MEASUREMENT_ERROR_SCALES
+            .iter()
+            .flat_map(move |m| MEASUREMENT_ERROR_SCALES.iter().map(move |rad| (of, *m, *rad)))
+    });
     both.map(|(of, jump_m, jump_rad)| seen.iter().map(|seen| of(seen, jump_m, jump_rad)).collect()).collect()
 }
 

@@ -9,13 +9,8 @@
 use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
-
-/// Times that the parabola is drawn anew, each time closer.
-const ROUNDS: usize = 2;
-/// Standard deviations either way that hold 95 % of chance.
-const WITHIN_95: f64 = 1.96;
-/// How much closer, at the most.
-const CLOSER: f64 = 0.25;
+use crate::settings::levels::NORMAL_QUANTILE_95;
+use crate::settings::search::{MIN_PROFILE_STEP_RATIO, PROFILE_ITERATIONS, PROFILE_STEP_SIGMAS};
 
 /// One value of the parameter's logarithm, with the fit there.
 struct Point<'a> {
@@ -44,7 +39,7 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     };
     let mut best = Point { x: held.ln(), model: model.clone() };
     let mut sigma = 0.0;
-    for _ in 0..ROUNDS {
+    for _ in 0..PROFILE_ITERATIONS {
         let middle = best.x.clamp(low_end + 0.5 * reach, high_end - 0.5 * reach);
         if middle != best.x {
             let Some(point) = at(middle) else { return none };
@@ -64,13 +59,13 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
             let most = count(&best.model.fit).max(count(&point.model.fit));
             if cost(&point.model.fit, most) < cost(&best.model.fit, most) { point } else { best }
         });
-        reach = (1.5 * sigma).clamp(CLOSER * reach, reach);
+        reach = (PROFILE_STEP_SIGMAS * sigma).clamp(MIN_PROFILE_STEP_RATIO * reach, reach);
     }
-    let ends = [best.x - WITHIN_95 * sigma, best.x + WITHIN_95 * sigma].map(at);
+    let ends = [best.x - NORMAL_QUANTILE_95 * sigma, best.x + NORMAL_QUANTILE_95 * sigma].map(at);
     let size = |point: &Point<'_>, k: usize| point.model.fit.fit.model.term_values[first + k];
     let extra_sigma = |k: usize| {
         let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
-        moved.fold(0.0, f64::max) / WITHIN_95
+        moved.fold(0.0, f64::max) / NORMAL_QUANTILE_95
     };
     let extra_sigma = (0..parameters).map(extra_sigma).collect();
     *model = best.model;

@@ -13,22 +13,13 @@ use crate::candidate::Candidate;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariates::{of_cycles, of_runs};
 use crate::scan::{freedom, principal, scan_parts_of};
-use crate::settings::CHECKS_LEVEL;
+use crate::settings::levels::CHECKS_LEVEL;
+use crate::settings::residuals::{
+    AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS, MIN_WHITENESS_PAIRS,
+    OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
+};
+use crate::settings::search::MIN_DETECTABLE_SIGMAS;
 use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z, sidak};
-
-/// Correlations with so many measurements before are summed.
-const LAGS: usize = 5;
-/// A measurement off by this much is an outlier with a chance of 1e-5.
-const OUTLIER_CHANCE: f64 = 1e-5;
-/// The measurement after an outlier fits unless its chance is below this.
-const BACK_AGAIN: f64 = 0.01;
-/// An innovation this large, in standard deviations, comes from the tail.
-const LARGE: f64 = 3.0;
-/// What follows large errors is told from chance at this many standard errors.
-const FOLLOWS: f64 = 2.6;
-/// Two displacements undo each other when together they are off by less than this share of the one that is far off: that is by five standard deviations or more,
-/// and the sum of two right ones by √2 of them.
-const UNDONE: f64 = 0.5;
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
@@ -176,13 +167,13 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
-        if n < 20.0 {
+        if n < MIN_WHITENESS_INNOVATIONS {
             continue;
         }
         let variance = series.iter().map(|innovation| innovation.z.powi(2)).sum::<f64>() / n;
         let (mut statistic, mut lags, mut coefficient) = (0.0, 0.0, 0.0);
         let (mut resembles, mut weights) = (0.0, 0.0_f64);
-        for lag in 1..=LAGS {
+        for lag in 1..=WHITENESS_LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
             let follows = |pair: &&[&Innovation]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
             for pair in series.windows(lag + 1).filter(follows) {
@@ -192,7 +183,7 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
                 resembles += weight * pair[0].z * pair[lag].z;
                 weights += weight * weight;
             }
-            if pairs < 10.0 {
+            if pairs < MIN_WHITENESS_PAIRS {
                 break;
             }
             let z = products / variance / pairs.sqrt();
@@ -217,7 +208,7 @@ fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
-        if n < 50.0 {
+        if n < MIN_KURTOSIS_INNOVATIONS {
             continue;
         }
         let moment = |power: i32| series.iter().map(|innovation| innovation.z.powi(power)).sum::<f64>() / n;
@@ -271,13 +262,13 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
         let followed = far.get(position + 1).is_some_and(|&(c, l)| c == segment && l == measurement + 1);
         let follows =
             position.checked_sub(1).is_some_and(|before| far[before].0 == segment && far[before].1 + 1 == measurement);
-        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < BACK_AGAIN) {
+        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < AFTER_OUTLIER_LEVEL) {
             found.staying += 1;
         } else {
             found.isolated += 1;
         }
     }
-    let (count, expected) = (far.len() as f64, (found.measurements + far.len()) as f64 * OUTLIER_CHANCE);
+    let (count, expected) = (far.len() as f64, (found.measurements + far.len()) as f64 * OUTLIER_PROBABILITY);
     // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
     found
@@ -286,14 +277,14 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
 /// Do two displacements that follow each other undo what is wrong with one of them? Together they must be nearer to the wheels by half.
 fn undo(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
     let of = |segments| fit.mahalanobis_distance(segments).unwrap_or(f64::INFINITY);
-    fit.records.continues(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
+    fit.records.continues(second) && of(first..second + 1) < CANCELLATION_RATIO * of(wrong..wrong + 1)
 }
 
 /// What follows large innovations of a component: the mean of the next in the direction of the large one, in standard errors. After a displacement, which starts
 /// anew, there is nothing to stay: the same says that errors last, and not whose they are.
 pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
-    let large = |pair: &&[&Innovation]| pair[0].z.abs() > LARGE;
+    let large = |pair: &&[&Innovation]| pair[0].z.abs() > TAIL_INNOVATION_SIGMAS;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));
@@ -301,9 +292,9 @@ pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPers
     };
     let of_looks = follows(&|segment, next| next == segment);
     let of_displacements = follows(&|segment, next| next == segment + 1 && fit.records.continues(next));
-    if of_looks > FOLLOWS {
+    if of_looks > PERSISTENCE_SIGMAS {
         ResidualPersistence::Persistent
-    } else if of_looks.min(of_displacements) < -FOLLOWS {
+    } else if of_looks.min(of_displacements) < -PERSISTENCE_SIGMAS {
         ResidualPersistence::Reverting
     } else {
         ResidualPersistence::Undecided
@@ -321,7 +312,9 @@ fn covariates(model: &AugmentedModel<'_>, add: &mut impl FnMut(Check, f64, f64))
         &parts,
         |own, Projected { information, gradient, .. }, equations| {
             let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
-            let shown = principal(information, gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
+            let shown = principal(information, gradient, &parameters)
+                .into_iter()
+                .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
             let (statistic, dimensions) =
                 shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
             let freedom = freedom(&model.fit, equations);

@@ -15,12 +15,8 @@ use serde::Serialize;
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
+use crate::settings::residuals::{BINS, COVARIATE_TOLERANCE, MIN_BIN_WIDTH, MIN_RESIDUALS_PER_BIN};
 use crate::statistics::p_of_chi_square;
-
-/// Bins of a covariate that varies continuously.
-const BINS: usize = 12;
-/// A bin with fewer residuals has no scatter to speak of.
-const MIN_IN_BIN: usize = 8;
 
 /// Residuals against every covariate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -249,16 +245,13 @@ pub(crate) fn residuals(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Resi
     Residuals { measurements, against: against.collect() }
 }
 
-/// Bins no nearer to each other than this share of what a covariate spans: nearer, a picture shows a blot.
-const NEAREST: f64 = 0.025;
-
 /// Sorts values and cuts them: a turn into equal parts, few levels each for itself, others into parts of equal counts, or of equal widths where those were too
 /// narrow. `None` when they vary by less than `least`.
 fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<Vec<f64>> {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (first, last) = (values.first()?.0, values.last()?.0);
     let span = last - first;
-    if span <= least.max(1e-6 * first.abs().max(last.abs())) {
+    if span <= least.max(COVARIATE_TOLERANCE * first.abs().max(last.abs())) {
         return None;
     }
     let share = |k: usize| k as f64 / BINS as f64;
@@ -268,7 +261,7 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<V
     }
     let mut levels: Vec<f64> = Vec::new();
     for (value, ..) in values.iter() {
-        if levels.last().is_none_or(|level| value - level > 1e-6 * span) {
+        if levels.last().is_none_or(|level| value - level > COVARIATE_TOLERANCE * span) {
             levels.push(*value);
         }
         if levels.len() > BINS {
@@ -281,7 +274,7 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<V
     let mut edges: Vec<f64> = Vec::new();
     for k in 1..BINS {
         let edge = values[k * values.len() / BINS].0;
-        if edge - edges.last().copied().unwrap_or(first) > NEAREST * span && last - edge > NEAREST * span {
+        if edge - edges.last().copied().unwrap_or(first) > MIN_BIN_WIDTH * span && last - edge > MIN_BIN_WIDTH * span {
             edges.push(edge);
         }
     }
@@ -306,7 +299,7 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         let to = from + values[from..].partition_point(|(value, ..)| *value < edge);
         let own = &values[from..to];
         from = to;
-        if own.len() < MIN_IN_BIN {
+        if own.len() < MIN_RESIDUALS_PER_BIN {
             continue;
         }
         let n = own.len() as f64;

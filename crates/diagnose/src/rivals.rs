@@ -9,6 +9,10 @@ use crate::fit_cache::FitCache;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::physical::is_physical;
 use crate::ranking::Entry;
+use crate::settings::search::{
+    CLOSE_RIVAL_FRACTION, CLOSE_RIVAL_STATISTIC, MAX_CLOSE_RIVALS, MAX_FURTHER_VARIANTS, MAX_RIVALS,
+    MIN_RIVAL_STATISTIC_RATIO,
+};
 use crate::wald::wald_test;
 
 /// A name for a finding.
@@ -22,22 +26,6 @@ pub(crate) struct Name {
     pub(crate) outdone: bool,
 }
 
-/// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
-const RIVAL_SHARE: f64 = 0.5;
-
-/// One that explains less by no more than this, or by this share of the best, may come near it: the log of its odds is off by half of it, and the refit may find that much again.
-const NEAR: f64 = 12.0;
-
-const NEAR_SHARE: f64 = 0.1;
-
-/// Most rivals that are refitted, and most with those that may come near the best.
-const MAX_RIVALS: usize = 6;
-
-const MAX_NEAR: usize = 10;
-
-/// Most further variants of an effect that are tried where the best one's size is none that it can have.
-const MAX_VARIANTS: usize = 3;
-
 /// The rivals of one place in a model whose other candidates stay, each refitted: the best variant of each effect that explains enough, most probable first.
 pub(crate) fn rivals<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
@@ -46,8 +34,8 @@ pub(crate) fn rivals<'a>(
     entries: &[Entry],
     best: f64,
 ) -> Vec<(Name, AugmentedModel<'a>)> {
-    let near = best - NEAR.max(NEAR_SHARE * best);
-    let least = near.min(RIVAL_SHARE * best);
+    let near = best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best);
+    let least = near.min(MIN_RIVAL_STATISTIC_RATIO * best);
     let mut contenders: Vec<&Entry> =
         entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
     contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
@@ -55,7 +43,7 @@ pub(crate) fn rivals<'a>(
     let mut contenders: Vec<&Entry> = ranked
         .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= near)
         .map(|(_, entry)| entry)
-        .take(MAX_NEAR)
+        .take(MAX_CLOSE_RIVALS)
         .collect();
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
     let mut fits = known.with_each(base, without, index, &best_variants);
@@ -65,7 +53,7 @@ pub(crate) fn rivals<'a>(
         fits.iter().filter(is_its).any(|extended| is_physical(extended, index))
     };
     contenders.retain(|entry| entry.scored.statistic >= near && !can_be(&fits, entry));
-    for variant in 0..MAX_VARIANTS {
+    for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
             contenders.iter().filter_map(|entry| entry.others(near).nth(variant)).cloned().collect();
         fits.extend(known.with_each(base, without, index, &next));

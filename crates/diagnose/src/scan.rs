@@ -11,12 +11,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::candidate::{Candidate, terms, terms_together};
+use crate::settings::search::{
+    DECIMATION_STEP_S, MAX_COLUMNS_PER_PASS, MIN_COLUMN_SHARE, MIN_DETECTABLE_SIGMAS, PRIOR_SCALES,
+};
 use crate::statistics::p_of_score;
-
-/// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
-const MIN_DETECTABLE: f64 = 1.0;
-/// What is left of a column beside the others, as a share of its information, below which it is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A candidate's test.
 #[derive(Debug, Clone)]
@@ -50,9 +48,6 @@ pub(crate) fn principal(
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
 }
 
-/// Scales of the prior of sizes: what is plausible, halved again and again.
-const SCALES: i32 = 11;
-
 /// Log of the chance of the data with some sizes free over that with the best ones: what their freedom costs, and how well they agree with what is plausible.
 ///
 /// Sizes are normal about zero with a scale of their own, which is anything from what is plausible down to a thousandth of it with even chances in its logarithm (a
@@ -66,10 +61,10 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
         };
         directions.iter().map(of).sum()
     };
-    let all: Vec<f64> = (0..SCALES).map(at).collect();
+    let all: Vec<f64> = (0..PRIOR_SCALES).map(at).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = all.iter().map(|weight| (weight - most).exp()).sum();
-    most + (sum / f64::from(SCALES)).ln()
+    most + (sum / f64::from(PRIOR_SCALES)).ln()
 }
 
 /// How many values the noise was estimated from, after the free columns.
@@ -77,13 +72,6 @@ pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
     let columns = fit.columns.len() as f64;
     (equations.count - columns).max(1.0)
 }
-
-/// Most columns of a pass over a scan's candidates: a whole number of products on three channels. What every pass does for itself, the filter and the model's own terms, is done
-/// again for so many, and a state of so many stays near the processor.
-const MAX_COLUMNS: usize = 126;
-
-/// What candidates go with hardly changes within such a time, seconds: rows of a fast log are taken together.
-const STEP_S: f64 = 0.05;
 
 /// Asks something of parts of a scan, each of candidates that are tested as a whole beside the candidates that the fit already has: of its candidates, what the fit leaves of
 /// their columns, and the evidence. Nothing where the fit's own columns are not determined.
@@ -93,7 +81,7 @@ pub(crate) fn scan_parts_of<T: Send>(
     parts: &[&[Candidate]],
     answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
-    let Some(coarse) = fit.decimated(&mut terms(chosen), STEP_S) else {
+    let Some(coarse) = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S) else {
         return scan_parts_row_by_row(fit, chosen, parts, &answer);
     };
     let goes_by_rows = |part: &&[Candidate]| part.iter().any(Candidate::goes_by_rows);
@@ -116,7 +104,7 @@ fn scan_parts_row_by_row<T: Send>(
         let own = part.iter().map(|candidate| candidate.parameters().len()).sum::<usize>();
         columns += own;
         match passes.last_mut() {
-            Some(last) if columns <= MAX_COLUMNS => last.push((own, part)),
+            Some(last) if columns <= MAX_COLUMNS_PER_PASS => last.push((own, part)),
             _ => {
                 passes.push(vec![(own, part)]);
                 columns = own;
@@ -149,11 +137,11 @@ pub(crate) fn scan(fit: &ModelFit<'_>, chosen: &[Candidate], candidates: &[Candi
         let shrink = freedom / equations.count.max(1.0);
         let candidate = own[0].clone();
         let parameters = candidate.parameters();
-        let shown = share.iter().any(|share| *share > ROUNDING);
+        let shown = share.iter().any(|share| *share > MIN_COLUMN_SHARE);
         let mut directions = Vec::new();
         if shown {
             directions = principal(information, gradient, &parameters);
-            directions.retain(|(value, _)| *value >= MIN_DETECTABLE * MIN_DETECTABLE);
+            directions.retain(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
         }
         let dimensions = directions.len();
         let explained: Vec<(f64, f64)> =

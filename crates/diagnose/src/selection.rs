@@ -11,15 +11,11 @@ use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, over_names, rivals};
 use crate::run_to_run::differs_from_run_to_run;
-use crate::settings::{MAX_EFFECTS, RUNS_LEVEL, SCAN_LEVEL, TURNS_LEVEL};
+use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
+use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
 use crate::wald::{Test, cluster_robust_test, tests_of, wald_test};
 
-/// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
-const MAX_TRIED: usize = 3;
-/// Odometry must drift more with a name by so many times what the 95 % interval reaches before the name is none: within one of it an effect that is there, and does
-/// nothing to the drift, would be refused once in forty times.
-const NAMES_DRIFT: f64 = 2.0;
 /// What the search found.
 #[derive(Debug, Clone)]
 pub(crate) struct SearchResult<'a> {
@@ -61,8 +57,8 @@ fn confirmed<'a>(
     let is_an_accident = wald_test(&extended, index).is_none_or(|(test, _)| test.p_value * tests > level);
     // Nor is one of a few runs a size: what differs from run to run is none. Where turns scatter from run to run still, what goes with turns stands out by chance:
     // it must hold over the runs as if measurements said nothing.
-    let scattered = differs_from_run_to_run(&extended) < TURNS_LEVEL;
-    let over_runs = if scattered { level / tests } else { RUNS_LEVEL };
+    let scattered = differs_from_run_to_run(&extended) < TURN_SCATTER_LEVEL;
+    let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
     if is_an_accident || !cluster_robust_test(&extended, index, over_runs) {
         return Err(name.candidate.id());
     }
@@ -77,7 +73,7 @@ fn grown<'a>(
     level: f64,
 ) -> Option<AugmentedModel<'a>> {
     let tests = tests_in(&entries);
-    for _ in 0..MAX_TRIED {
+    for _ in 0..MAX_CANDIDATES_TRIED {
         let best = entries
             .iter()
             .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))?;
@@ -136,7 +132,7 @@ pub(crate) fn search<'a>(
         // what is there may predict worse.
         let predicts = gain(&without, &found[0].1).map_or(true, |gain| {
             let score = gain.log_score_per_observation;
-            score.low + score.high > 0.0 && !gain.drifts_more_by(NAMES_DRIFT)
+            score.low + score.high > 0.0 && !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS)
         });
         if !predicts || !found.iter().any(stands) {
             // Nor does a name that came in its place.
@@ -195,7 +191,8 @@ pub(crate) fn search_ungated<'a>(
     let tests = tests_of(&model, &bold.extra_sigma);
     let trials = tests_in(&bold.first_scan);
     let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
-    let predicts = gain(&AugmentedModel::base(base), &model).map_or(true, |gain| !gain.drifts_more_by(NAMES_DRIFT));
+    let predicts = gain(&AugmentedModel::base(base), &model)
+        .map_or(true, |gain| !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
     (stands && predicts).then(|| SearchResult {
         model,
         tests,

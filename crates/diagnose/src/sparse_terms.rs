@@ -11,11 +11,9 @@ use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
 use crate::model_comparison::{log_bayes_factor, regated};
 use crate::scan::{Scored, scan};
-use crate::settings::UNLISTED_LEVEL;
+use crate::settings::levels::SPARSE_TERM_LEVEL;
+use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
 use crate::statistics::sidak;
-
-/// Refits of the best by their scores.
-const TRIED: usize = 3;
 
 /// A sparse term with its model.
 pub(crate) struct FoundTerm<'a> {
@@ -34,9 +32,6 @@ fn log_trials(trials: usize) -> f64 {
     (trials as f64).ln()
 }
 
-/// Sparse terms of one thing at the most: a wheel's phase has a sine and a cosine, and there are two wheels.
-const MAX_TERMS: usize = 4;
-
 /// What is there without a name: a model, the last of whose candidates are sparse terms.
 pub(crate) struct UncataloguedTerms<'a> {
     pub(crate) model: AugmentedModel<'a>,
@@ -48,8 +43,8 @@ impl<'a> UncataloguedTerms<'a> {
     /// A term that was found, and what is left beside it.
     pub(crate) fn from(base: &ModelFit<'a>, first: FoundTerm<'a>) -> Self {
         let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
-        while all.tried.len() < MAX_TERMS
-            && let Some(next) = sparse(base, &all.model, UNLISTED_LEVEL).filter(|next| !next.drifts_more)
+        while all.tried.len() < MAX_SPARSE_TERMS
+            && let Some(next) = sparse(base, &all.model, SPARSE_TERM_LEVEL).filter(|next| !next.drifts_more)
         {
             all.model = next.model;
             all.tried.push((next.p_value, next.trials));
@@ -60,7 +55,8 @@ impl<'a> UncataloguedTerms<'a> {
     /// What is there among all measurements, those too that lie far off by a model without anything: what is large in few measurements hides them.
     pub(crate) fn ungated_terms(base: &ModelFit<'a>) -> Option<Self> {
         let open = base.refit_ungated().ok()?;
-        let first = sparse(&open, &AugmentedModel::base(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
+        let first =
+            sparse(&open, &AugmentedModel::base(&open), SPARSE_TERM_LEVEL).filter(|first| !first.drifts_more)?;
         let all = Self::from(&open, first);
         let log_trials = all.log_trials();
         Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
@@ -195,7 +191,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             model,
             p_value,
             trials,
-            refitted: scored[..TRIED.min(trials)].par_iter().filter_map(with).collect(),
+            refitted: scored[..MAX_SPARSE_REFITS.min(trials)].par_iter().filter_map(with).collect(),
         })
     }
 

@@ -4,7 +4,8 @@ use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
 
 use crate::augmented_model::AugmentedModel;
 use crate::scan::{freedom, principal};
-use crate::settings::MIN_RUNS;
+use crate::settings::levels::{MIN_RUNS, NORMAL_QUANTILE_95};
+use crate::settings::search::MIN_DETECTABLE_SIGMAS;
 use crate::statistics::{p_of_statistic, p_of_student, student_95};
 
 /// A test of one candidate of a fitted model.
@@ -26,7 +27,7 @@ pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Opti
     let gradient = &projected.information * &estimates;
     let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
         .into_iter()
-        .filter(|(value, _)| *value >= 1.0)
+        .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
         .map(|(value, gradient)| (value, gradient / value))
         .collect();
     let freedom = freedom(&extended.fit, &equations);
@@ -83,7 +84,7 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
     let ClusterRobust { covariance, left_out: 0 } = ClusterRobust::of(&inverse, clusters) else { return None };
     let n = runs.len() as f64;
     // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
-    let widening = student_95(n - 1.0) / 1.96;
+    let widening = student_95(n - 1.0) / NORMAL_QUANTILE_95;
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
@@ -91,7 +92,7 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
 pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> Vec<Test> {
     // As wide as Student's quantile is where measurements are few.
     let Some(equations) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
-    let few = student_95(freedom(&model.fit, &equations)) / 1.96;
+    let few = student_95(freedom(&model.fit, &equations)) / NORMAL_QUANTILE_95;
     let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
         let (mut test, _) = wald_test(model, candidate)?;
         test.estimates.iter_mut().for_each(|(_, sigma)| *sigma *= few);

@@ -18,20 +18,11 @@ use super::text::Predictions;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::settings::DETECTION_SQRT_LAMBDA;
-
-/// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
-const SHAPES: usize = 3;
-/// What a factor e in the precision of one length is worth, in effects brought into sight.
-const LENGTH_WORTH: f64 = 0.3;
-/// A new kind of run must bring this much more a minute than more of the same.
-const NEW_KIND: f64 = 1.3;
-/// Less than this, in effects brought into sight by a pair of runs, is not worth driving.
-const MIN_GAIN: f64 = 0.01;
-/// A length whose relative standard deviation is larger is little better known than before.
-const UNDETERMINED: f64 = 0.02;
-/// Kinds of run that a person keeps apart.
-const MAX_KINDS: usize = 6;
+use crate::settings::levels::DETECTION_SQRT_LAMBDA;
+use crate::settings::plan::{
+    GEOMETRY_PRECISION_VALUE, MAX_MANOEUVRES, MAX_PLANNED_VARIANTS, MIN_COVERAGE_GAIN, MIN_NOISE_SIGMA,
+    MIN_PLANNED_SIGMAS, NEW_MANOEUVRE_RATIO, UNDETERMINED_GEOMETRY_SIGMA,
+};
 
 /// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
 /// it.
@@ -81,7 +72,8 @@ fn some_shapes(candidates: &[Candidate]) -> Vec<Candidate> {
         .chunk_by(|a, b| a.id() == b.id())
         .flat_map(|variants| {
             let last = variants.len() - 1;
-            let mut indices: Vec<usize> = (0..SHAPES).map(|k| k * last / (SHAPES - 1)).collect();
+            let mut indices: Vec<usize> =
+                (0..MAX_PLANNED_VARIANTS).map(|k| k * last / (MAX_PLANNED_VARIANTS - 1)).collect();
             indices.dedup();
             indices.into_iter().map(|index| variants[index].clone())
         })
@@ -133,13 +125,19 @@ fn mix(
             .filter_map(|(manoeuvre, of)| {
                 let cost = manoeuvre.cost(setting).minutes;
                 let known = parts.iter().any(|part| part.manoeuvre == *manoeuvre);
-                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_KINDS) {
+                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_MANOEUVRES) {
                     return None;
                 }
                 let after = with_runs(&equations, &[(of, 1.0)]);
                 let there = worth(&after);
-                let preferred = if known { NEW_KIND } else { 1.0 };
-                (there - here > MIN_GAIN).then_some((preferred * (there - here) / cost, manoeuvre, after, there, cost))
+                let preferred = if known { NEW_MANOEUVRE_RATIO } else { 1.0 };
+                (there - here > MIN_COVERAGE_GAIN).then_some((
+                    preferred * (there - here) / cost,
+                    manoeuvre,
+                    after,
+                    there,
+                    cost,
+                ))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, manoeuvre, after, there, cost)) = best else { break };
@@ -304,8 +302,9 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let options = equations_of(&fit, &candidates, &setting, &library(&setting));
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
-    let worth =
-        |equations: &NormalEquations| in_sight(&frame, equations, &targets) - LENGTH_WORTH * spread(&frame, equations);
+    let worth = |equations: &NormalEquations| {
+        in_sight(&frame, equations, &targets) - GEOMETRY_PRECISION_VALUE * spread(&frame, equations)
+    };
     let (parts, after, minutes) = mix(&options, &before, &setting, worth);
     if parts.is_empty() {
         return Err(nothing_fits());
@@ -321,15 +320,15 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let sigmas: BTreeMap<String, f64> = lengths
         .iter()
         .zip(&relative)
-        .filter(|(_, relative)| **relative < UNDETERMINED)
+        .filter(|(_, relative)| **relative < UNDETERMINED_GEOMETRY_SIGMA)
         .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
     let all = all_shown(&frame, &after, &targets);
     let (shows, detectability): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA);
     let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
-        let why = if sigmas > 1e-3 { from_size(&smallest) } else { "no run excites it".to_owned() };
-        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > 1e-3).then_some(smallest) }
+        let why = if sigmas > MIN_PLANNED_SIGMAS { from_size(&smallest) } else { "no run excites it".to_owned() };
+        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > MIN_PLANNED_SIGMAS).then_some(smallest) }
     };
     let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
     let mut blind_to: Vec<Blind> = detectability.into_iter().map(entry).collect();
@@ -369,7 +368,6 @@ fn spread(frame: &Frame, equations: &NormalEquations) -> f64 {
 
 /// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the least that anything errs.
 fn noise(scenario: &Scenario) -> Option<Noise> {
-    const LEAST: f64 = 1e-6;
     let (xy_m, theta_rad) = scenario.instruments.iter().find_map(|instrument| match *instrument {
         Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => Some((sigma_xy_m, sigma_theta_rad)),
         Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
@@ -383,6 +381,6 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         }
         Instrument::Tachometer { .. } => None,
     })?;
-    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, LEAST, xy_m, theta_rad];
-    Some(Noise { variance: sigmas.map(|sigma| sigma.max(LEAST).powi(2)) })
+    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
+    Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)) })
 }

@@ -15,12 +15,8 @@ use crate::candidate::{Candidate, terms};
 use crate::document::NextExperiment;
 use crate::finding::is_of_low_significance;
 use crate::selection::SearchResult;
-use crate::settings::LOW_SIGNIFICANCE;
-
-/// Two kinds of run must save this share of the time against one to be worth the trouble.
-const WORTH_TWO_KINDS: f64 = 0.8;
-/// More pairs of runs of one kind nobody drives.
-const MAX_PAIRS: u32 = 50;
+use crate::settings::levels::LOW_SIGNIFICANCE_SIGMAS;
+use crate::settings::plan::{MAX_RUN_PAIRS, TWO_MANOEUVRES_TIME_RATIO};
 
 /// What to drive to tell apart the names of one finding; the error says why nothing does.
 pub(super) fn discriminate(
@@ -45,7 +41,7 @@ pub(super) fn discriminate(
     let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
     let options = equations_of(&without.fit, &all, setting, manoeuvres);
     // What hardly stands out is to stand out as well, where that can be.
-    let both = is_of_low_significance(found, index).then(|| rivals.clone().standing_out(LOW_SIGNIFICANCE));
+    let both = is_of_low_significance(found, index).then(|| rivals.clone().standing_out(LOW_SIGNIFICANCE_SIGMAS));
     let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
     let asked = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
@@ -194,7 +190,7 @@ impl DiscriminationSearch<'_> {
     /// How many pairs of runs of each of some kinds the time allows.
     fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
         let pairs = (within_min / self.minutes(kinds)).floor() as u32;
-        pairs.min(MAX_PAIRS)
+        pairs.min(MAX_RUN_PAIRS)
     }
 
     /// What a pair of runs of each kind takes.
@@ -230,7 +226,7 @@ impl DiscriminationSearch<'_> {
             pairs.map(|pairs| self.parts(kinds, pairs)).filter(|(_, minutes)| *minutes < least).or(best)
         };
         let one = self.options.iter().fold(None, |best, option| quicker(best, &[option], self.setting.minutes));
-        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| WORTH_TWO_KINDS * minutes);
+        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| TWO_MANOEUVRES_TIME_RATIO * minutes);
         self.twos().fold(one, |best, two| quicker(best, &two, within_min))
     }
 
@@ -276,7 +272,7 @@ mod tests {
         let options = [(library(&setting)[0], new)];
         let asked = DiscriminationSearch { rivals: &rivals, before: &before, options: &options, setting: &setting };
         let margin = |pairs| asked.margin(&[(0, 1)], &[&options[0]], pairs, Confidence::P50);
-        assert!(margin(1) > 0.0 && margin(MAX_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_PAIRS));
+        assert!(margin(1) > 0.0 && margin(MAX_RUN_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_RUN_PAIRS));
         assert_eq!(asked.most_discriminated(&[(0, 1)], Confidence::P50), [(0, 1)]);
         assert_eq!(asked.plan(Confidence::P50).map(|plan| plan.discriminated), Some(vec![(0, 1)]));
     }

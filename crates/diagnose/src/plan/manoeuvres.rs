@@ -9,13 +9,7 @@ use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 
 use super::constraints::{Reading, Setting};
 use crate::candidate::{Candidate, terms};
-
-/// Shares of the largest size and of the top speed that are tried.
-const SIZES: [f64; 2] = [1.0, 0.5];
-const SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
-const TURNS: [f64; 2] = [1.0, 3.0];
-/// Shorter ways show nothing that a measurement does not blur, metres.
-const SHORTEST_M: f64 = 0.2;
+use crate::settings::plan::{MIN_MANOEUVRE_LENGTH_M, SIZE_FRACTIONS, SPEED_FRACTIONS, SPIN_REVOLUTIONS, STANDSTILL_S};
 
 /// A pair of runs, one in each direction, at one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,13 +30,13 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
     let (shorter_m, longer_m) = setting.sides_m();
     let separation_m = setting.robot.wheel_separation_m;
     let mut schedules: Vec<Schedule> = Vec::new();
-    for size in SIZES {
+    for size in SIZE_FRACTIONS {
         let length_m = rounded(size * longer_m);
-        if length_m >= SHORTEST_M {
+        if length_m >= MIN_MANOEUVRE_LENGTH_M {
             schedules.push(Schedule::Straights { length_m, runs: 2 });
         }
         let side_m = rounded(size * shorter_m);
-        if side_m >= SHORTEST_M {
+        if side_m >= MIN_MANOEUVRE_LENGTH_M {
             schedules.push(Schedule::Squares { side_m, runs_each_way: 1 });
         }
         let radius_m = rounded(0.5 * size * shorter_m);
@@ -51,8 +45,8 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
             schedules.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
         }
     }
-    schedules.extend(TURNS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
-    let speeds = SPEEDS.map(|share| significant(share * setting.top_speed_m_s));
+    schedules.extend(SPIN_REVOLUTIONS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
+    let speeds = SPEED_FRACTIONS.map(|share| significant(share * setting.top_speed_m_s));
     let all = speeds
         .into_iter()
         .flat_map(|speed_m_s| schedules.iter().map(move |schedule| Manoeuvre { schedule: *schedule, speed_m_s }));
@@ -77,10 +71,6 @@ struct Log {
     read_s: Vec<f64>,
 }
 
-/// How long a robot stands before and after a run that is logged at even intervals, seconds. A log that began with its motion would tell effects of starting apart
-/// that no real log does.
-const STANDS_S: f64 = 0.5;
-
 /// One motion of a program: when it begins, how it goes, and from where each wheel turns by how much.
 struct Stretch {
     from_s: f64,
@@ -95,7 +85,7 @@ fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wh
     let geometry = setting.robot.geometry().ok()?;
     let m_per_rad = geometry.m_per_rad();
     let even = matches!(setting.reading, Reading::Even(_));
-    let stands_s = if even { STANDS_S } else { 0.0 };
+    let stands_s = if even { STANDSTILL_S } else { 0.0 };
     let (mut t_s, mut angle_rad) = (stands_s, phase_rad);
     let (mut stretches, mut read_s): (Vec<Stretch>, Vec<f64>) = (Vec::new(), vec![0.0]);
     for motion in &program.motions {
@@ -420,7 +410,7 @@ pub(super) mod tests {
                 // Sums of some hundred arcs: roundings of 1e-16 each.
                 assert!((end.theta_rad().expect("a heading") - turned).abs() < 1e-9, "{program:?}: {end:?}");
                 let driving_s = 60.0 * setting.pace(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
-                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDS_S;
+                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDSTILL_S;
                 assert!((-1e-9..=setting.between_rows_s + 1e-9).contains(&over_s), "{program:?}: {over_s} s more");
                 let WheelLog::Angles(angles) = &run.odometry.wheels else { panic!("angles are logged") };
                 for side in [&angles.left, &angles.right] {

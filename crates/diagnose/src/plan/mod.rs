@@ -19,8 +19,9 @@ use crate::candidate::Candidate;
 use crate::document::{Blind, NextExperiment};
 use crate::selection::SearchResult;
 
+pub use crate::settings::plan::{HANDLING_S, MINUTES};
 use constraints::Setting;
-pub use constraints::{HANDLING_S, Limits, MINUTES, moved_over_m};
+pub use constraints::{Limits, moved_over_m};
 pub use coverage::{PlanError, ScenarioPlan, plan_scenario};
 use manoeuvres::library;
 

@@ -14,13 +14,7 @@ use super::text;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
-
-/// Instants of a run at which a prediction is made: shares of its duration.
-const INSTANTS: usize = 12;
-/// How the wheels stand at the start is not known: so many ways are averaged.
-const PHASES: usize = 4;
-/// A difference of so many standard deviations shows in a single kind of measurement; with less, only all measurements together tell.
-const SINGLE_MEASUREMENT_SIGMAS: f64 = 2.0;
+use crate::settings::plan::{DERIVATIVE_STEP_SIGMAS, PREDICTION_INSTANTS, SINGLE_MEASUREMENT_SIGMAS, WHEEL_PHASES};
 
 /// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the name, and variance by the noise.
 #[derive(Debug, Clone)]
@@ -68,7 +62,11 @@ pub(super) fn predictions(
                 };
                 let sigmas = discriminated.iter().map(apart).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
-                    let at = Where { direction: index / INSTANTS, share: shares()[index % INSTANTS], component };
+                    let at = Where {
+                        direction: index / PREDICTION_INSTANTS,
+                        share: shares()[index % PREDICTION_INSTANTS],
+                        component,
+                    };
                     best = Some((sigmas, *part, at, seen));
                 }
             }
@@ -94,14 +92,14 @@ pub(super) fn predictions(
 }
 
 /// The instants, as shares of a run's duration.
-fn shares() -> [f64; INSTANTS] {
-    std::array::from_fn(|instant| (instant + 1) as f64 / INSTANTS as f64)
+fn shares() -> [f64; PREDICTION_INSTANTS] {
+    std::array::from_fn(|instant| (instant + 1) as f64 / PREDICTION_INSTANTS as f64)
 }
 
 /// Where the measurements of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
 fn looks_at(index: usize) -> impl Iterator<Item = usize> {
-    let (direction, instant) = (index / INSTANTS, index % INSTANTS);
-    (0..PHASES).map(move |phase| (direction * PHASES + phase) * INSTANTS + instant)
+    let (direction, instant) = (index / PREDICTION_INSTANTS, index % PREDICTION_INSTANTS);
+    (0..WHEEL_PHASES).map(move |phase| (direction * WHEEL_PHASES + phase) * PREDICTION_INSTANTS + instant)
 }
 
 /// Runs of a part, each seen at its start and at every instant, by direction and phase.
@@ -120,7 +118,7 @@ impl PlannedRun {
         let driven = |measurements: &[f64]| -> Option<dataset::Dataset> {
             let mut runs = Vec::new();
             for program in &programs {
-                for phase in (0..).take(PHASES).map(phase_rad) {
+                for phase in (0..).take(WHEEL_PHASES).map(phase_rad) {
                     let speed_m_s = part.manoeuvre.speed_m_s;
                     let mut run =
                         planned_run(program, setting, speed_m_s, model, phase, Measurements::At(measurements))?;
@@ -167,15 +165,16 @@ impl PlannedRun {
         };
         let here = measurements(&named)?;
         let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
-            let by = 0.1 * covariance[(k, k)].sqrt();
+            let by = DERIVATIVE_STEP_SIGMAS * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
             Some(measurements(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
-        let mean =
-            |index, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(index).map(of).sum::<Vector3<f64>>() / PHASES as f64;
-        let seen = (0..here.len() / PHASES).map(|index| {
+        let mean = |index, of: &dyn Fn(usize) -> Vector3<f64>| {
+            looks_at(index).map(of).sum::<Vector3<f64>>() / WHEEL_PHASES as f64
+        };
+        let seen = (0..here.len() / WHEEL_PHASES).map(|index| {
             let own = mean(index, &|measurement| here[measurement]);
             let noise = mean(index, &|measurement| self.noise[measurement]);
             let spread =

@@ -9,13 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use super::manoeuvres::{Manoeuvre, Part};
 use crate::candidate::Candidate;
 use crate::model_comparison::log_odds_margin;
-
-/// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
-/// mounting, seconds.
-const LENGTH_SD: f64 = 0.05;
-const MOUNT_SD_M: f64 = 0.2;
-const MOUNT_SD_RAD: f64 = 0.3;
-const LATENCY_SD_S: f64 = 0.2;
+use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
+use crate::settings::plan::{DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M};
 
 /// How sure it must be that names are told apart. The log of the odds is normal with mean λ/2 and variance λ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,19 +21,16 @@ pub(crate) enum Confidence {
     P50,
 }
 
-/// With 19 chances in 20 a normal variable is not lower than so many standard deviations below its mean.
-const CERTAIN_SIGMAS: f64 = 1.645;
-
 /// The log of the odds that holds with 19 chances in 20: λ/2 − e√λ at the likeliest of those errors e of the new measurements and of √λ, a size not being known
 /// better than by the old data, that are as unlikely as that (the design point of first-order reliability, Hasofer & Lind 1974).
 fn certain_log_odds(root: f64, root_sigma: f64) -> f64 {
-    const STEPS: u32 = 32;
     let at = |step: u32| {
-        let (measurements, size) = (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(STEPS)).sin_cos();
-        let root = (root - CERTAIN_SIGMAS * size * root_sigma).max(0.0);
-        0.5 * root * root - CERTAIN_SIGMAS * measurements * root
+        let (measurements, size) =
+            (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(DESIGN_POINT_STEPS)).sin_cos();
+        let root = (root - NORMAL_QUANTILE_ONE_SIDED_95 * size * root_sigma).max(0.0);
+        0.5 * root * root - NORMAL_QUANTILE_ONE_SIDED_95 * measurements * root
     };
-    (0..=STEPS).map(at).fold(f64::INFINITY, f64::min)
+    (0..=DESIGN_POINT_STEPS).map(at).fold(f64::INFINITY, f64::min)
 }
 
 /// One of several names, with its columns of the normal equation.
@@ -59,10 +51,10 @@ impl Frame {
     /// Of a fit with further terms: first those of the fit, then those of the candidates.
     pub(crate) fn of(fit: &ModelFit<'_>, terms: &[Candidate]) -> Self {
         let base = Column::BASE.map(|column| match column {
-            Column::LeftWheel | Column::RightWheel | Column::Separation => LENGTH_SD,
-            Column::SensorX | Column::SensorY => MOUNT_SD_M,
-            Column::SensorTheta => MOUNT_SD_RAD,
-            Column::Latency | Column::Term(_) => LATENCY_SD_S,
+            Column::LeftWheel | Column::RightWheel | Column::Separation => GEOMETRY_PRIOR_SIGMA,
+            Column::SensorX | Column::SensorY => LEVER_PRIOR_SIGMA_M,
+            Column::SensorTheta => SENSOR_HEADING_PRIOR_SIGMA_RAD,
+            Column::Latency | Column::Term(_) => LATENCY_PRIOR_SIGMA_S,
         });
         let of_terms = terms.iter().flat_map(Candidate::parameters).map(|parameter| parameter.prior_sigma);
         let weights: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();
