@@ -3,9 +3,9 @@
 //! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
 //! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
 
-use estimation::{Column, EndError, Model, ModelFit, NormalEquations, RIDGE, inverse};
+use estimation::{Column, EndError, Information, Model, ModelFit, NormalEquations, RIDGE, inverse};
 use model_term::ModelTerm;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
@@ -110,15 +110,8 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: NormalEquations = first.clone();
         others.for_each(|unit| sum.add(unit, 1.0));
-        let mut own = sum.of(&fit.columns);
-        // What the other runs do not show of an effect is none of it, not any: a payload that only the held-out run carried.
-        for (k, &(size, precision)) in prior.iter().enumerate() {
-            own.matrix[(k, k)] += precision;
-            own.gradient[k] += precision * size;
-        }
-        let covariance = inverse(&own.along(&free).matrix, RIDGE)
+        let step = refit_step(sum.of(&fit.columns), &prior, &free)
             .ok_or("the other runs do not determine the model once some are held out")?;
-        let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
         let mut model = fit.fit.model.clone();
         fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
@@ -137,6 +130,17 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     ends.sort_by_key(|end| end.run);
     scored.sort_by_key(|unit| unit.run);
     Ok((scored, ends))
+}
+
+/// One step of the fit to other runs, with the prior of each column: its size, and how precisely it is known before. What the
+/// other runs do not show of an effect, such as a payload that only the held-out run carried, is then none of it.
+fn refit_step(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -> Option<DVector<f64>> {
+    for (k, &(size, precision)) in prior.iter().enumerate() {
+        own.matrix[(k, k)] += precision;
+        own.gradient[k] += precision * size;
+    }
+    let covariance = inverse(&own.along(free).matrix, RIDGE)?;
+    Some(free * (-(covariance * (free.transpose() * own.gradient))))
 }
 
 /// For each column its size and how precisely it is known before: a term's is normal about nothing, as large as is plausible.
@@ -175,4 +179,46 @@ fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usi
     let mut fold = vec![0; units.len()];
     order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % HOLD_OUT_FOLDS);
     fold
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn information() -> Information {
+        Information {
+            matrix: DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]),
+            gradient: DVector::from_column_slice(&[-2.0, -4.0]),
+        }
+    }
+
+    fn is_near(found: &DVector<f64>, expected: [f64; 2]) -> bool {
+        // The ridge changes a step of order 1 by 1e-11 at most.
+        (found - DVector::from_column_slice(&expected)).amax() < 1e-11
+    }
+
+    #[test]
+    fn the_step_to_other_runs_is_that_on_paper() {
+        let free = DMatrix::identity(2, 2);
+        // −I⁻¹g = −[[3, −2], [−2, 4]]/8 · (−2, −4) = (−1/4, 3/2). Rejects a step along the gradient, of the other sign.
+        let step = refit_step(information(), &[(0.0, 0.0); 2], &free).expect("determined");
+        assert!(is_near(&step, [-0.25, 1.5]), "{step}");
+        // A prior of precision 1 about nothing, the second size being 2: I = [[4, 2], [2, 4]], g = (−2, −2), step (1/3, 1/3).
+        // Rejects a prior about the estimate, which leaves g as it was.
+        let step = refit_step(information(), &[(0.0, 0.0), (2.0, 1.0)], &free).expect("determined");
+        assert!(is_near(&step, [1.0 / 3.0, 1.0 / 3.0]), "{step}");
+        // Only the first column free: 2/4. Rejects a step of all columns cut to the free ones, −1/4.
+        let first = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+        let step = refit_step(information(), &[(0.0, 0.0); 2], &first).expect("determined");
+        assert!(is_near(&step, [0.5, 0.0]), "{step}");
+    }
+
+    #[test]
+    fn a_gain_per_observation_has_the_error_of_a_ratio() {
+        // Two units of equal count: mean (1 + 3)/2 = 2, residuals ∓1, √(2 · 2/1)/2 = 1. Rejects n/(n − 1) forgotten: 1/√2.
+        let (mean, error) = ratio(&[(1.0, 1.0), (3.0, 1.0)]);
+        assert_eq!((mean, error), (2.0, 1.0));
+        // Gains in proportion to the counts are no scatter. Rejects a mean of ratios with the scatter of the gains.
+        assert_eq!(ratio(&[(1.0, 1.0), (3.0, 3.0), (6.0, 6.0)]), (1.0, 0.0));
+    }
 }

@@ -34,17 +34,8 @@ pub(crate) fn rivals<'a>(
     entries: &[Entry],
     best: f64,
 ) -> Vec<(Name, AugmentedModel<'a>)> {
-    let near = best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best);
-    let least = near.min(MIN_RIVAL_STATISTIC_RATIO * best);
-    let mut contenders: Vec<&Entry> =
-        entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
-    contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
-    let ranked = contenders.into_iter().enumerate();
-    let mut contenders: Vec<&Entry> = ranked
-        .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= near)
-        .map(|(_, entry)| entry)
-        .take(MAX_CLOSE_RIVALS)
-        .collect();
+    let close = close_statistic(best);
+    let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
     let mut fits = known.with_each(base, without, index, &best_variants);
     // With another variant, about as good, an effect may have a size that can be.
@@ -52,10 +43,10 @@ pub(crate) fn rivals<'a>(
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
         fits.iter().filter(is_its).any(|extended| is_physical(extended, index))
     };
-    contenders.retain(|entry| entry.scored.statistic >= near && !can_be(&fits, entry));
+    contenders.retain(|entry| entry.scored.statistic >= close && !can_be(&fits, entry));
     for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
-            contenders.iter().filter_map(|entry| entry.others(near).nth(variant)).cloned().collect();
+            contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
         fits.extend(known.with_each(base, without, index, &next));
         contenders.retain(|entry| !can_be(&fits, entry));
     }
@@ -66,14 +57,10 @@ pub(crate) fn rivals<'a>(
         .map(|extended| {
             let candidate = extended.candidates[index].clone();
             let variants = entries.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
-            let trials = (variants.map_or(1, |entry| entry.variants.max(1)) as f64).ln();
+            let trials = variants.map_or(1, |entry| entry.variants.max(1));
             let likelier = base_cost - cost(&extended.fit, most);
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
-            // Its likelihood times how well its sizes agree with what is plausible, the others staying.
-            let log_odds =
-                directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions))
-                    - trials;
-            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
+            let (log_odds, explains) = evidence(likelier, directions.as_deref(), trials);
             (Name { candidate, log_odds, explains, outdone: false }, extended)
         })
         .collect();
@@ -87,19 +74,97 @@ pub(crate) fn rivals<'a>(
     named
 }
 
+/// The score statistic from which on a candidate is a close rival of the best.
+fn close_statistic(best: f64) -> f64 {
+    best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best)
+}
+
+/// The candidates that are refitted, by their scores: those that explain enough, most probable first, and no more of them than
+/// are worth it; close rivals beyond that.
+fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
+    let close = close_statistic(best);
+    let least = close.min(MIN_RIVAL_STATISTIC_RATIO * best);
+    let mut ranked: Vec<&Entry> =
+        entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
+    ranked.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
+    let refitted = ranked.into_iter().enumerate();
+    refitted
+        .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= close)
+        .map(|(_, entry)| entry)
+        .take(MAX_CLOSE_RIVALS)
+        .collect()
+}
+
+/// Log odds of a candidate over none, and its log likelihood less what its freedom gains by accident: from how much likelier it
+/// makes the data, its sizes along principal directions, and how many variants were tried.
+fn evidence(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
+    let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
+    let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
+    (log_odds - (trials as f64).ln(), explains)
+}
+
 /// Variances of sizes by what the candidate beside them is not known to be: how far they go where it has another of its names, by the names' chances. For each other candidate
 /// of the likeliest model, its sizes in turn.
 pub(crate) fn over_names(index: usize, names: &[(Name, AugmentedModel<'_>)]) -> Vec<(Candidate, Vec<f64>)> {
     let Some((top, likeliest)) = names.first() else { return Vec::new() };
-    let weights: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
-    let all: f64 = weights.iter().sum();
+    let odds: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
     let variances = |other: usize| {
-        let own = likeliest.estimates(other);
-        let moved = |model: &AugmentedModel<'_>| (model.estimates(other) - &own).map(|by| by * by);
-        let sum = names.iter().zip(&weights).fold(DVector::zeros(own.len()), |sum, ((_, model), occam_factor)| {
-            sum + moved(model) * (occam_factor / all)
-        });
-        (likeliest.candidates[other].clone(), sum.as_slice().to_vec())
+        let sizes: Vec<DVector<f64>> = names.iter().map(|(_, model)| model.estimates(other)).collect();
+        (likeliest.candidates[other].clone(), variances_between(&sizes, &odds).as_slice().to_vec())
     };
     (0..likeliest.candidates.len()).filter(|other| *other != index).map(variances).collect()
+}
+
+/// Mean squares of sizes about the first ones, weighed by the odds of the models that have them.
+fn variances_between(sizes: &[DVector<f64>], odds: &[f64]) -> DVector<f64> {
+    let all: f64 = odds.iter().sum();
+    let moved = |own: &DVector<f64>| (own - &sizes[0]).map(|by| by * by);
+    sizes.iter().zip(odds).fold(DVector::zeros(sizes[0].len()), |sum, (own, odds)| sum + moved(own) * (odds / all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranking::best_variants;
+    use crate::ranking::tests::scored;
+
+    fn ids(entries: &[&Entry]) -> Vec<&'static str> {
+        entries.iter().map(|entry| entry.scored.candidate.id()).collect()
+    }
+
+    #[test]
+    fn contenders_explain_half_of_the_best_or_are_close_to_it() {
+        // The best explains 100: half of it is 50; a close rival lacks 12 at the most. One without a direction is none.
+        let all = [
+            scored("slip_speed", 100.0, 40.0, 1),
+            scored("lateral_skid", 51.0, 20.0, 1),
+            scored("carpet_nap", 49.0, 30.0, 1),
+            scored("backlash", 90.0, 41.0, 1),
+            scored("slope", 100.0, 50.0, 0),
+        ];
+        // Rejects an order by the statistic, which puts slip_speed first, and a limit at 12 below the best for all.
+        assert_eq!(ids(&contenders(&best_variants(&all), 100.0)), ["backlash", "slip_speed", "lateral_skid"]);
+        // A weak best: 15 less 12 is 3, below half of it. Rejects half of the best as the only limit.
+        let weak =
+            [scored("slip_speed", 15.0, 4.0, 1), scored("backlash", 3.5, 1.0, 1), scored("carpet_nap", 2.5, 2.0, 1)];
+        assert_eq!(ids(&contenders(&best_variants(&weak), 15.0)), ["slip_speed", "backlash"]);
+    }
+
+    #[test]
+    fn odds_are_likelihood_less_freedom_and_trials() {
+        // Two directions of no information cost nothing but what they explain: none at size 0. Four variants cost ln 4.
+        let (log_odds, explains) = evidence(10.0, Some(&[(0.0, 0.0), (0.0, 0.0)]), 4);
+        assert!((log_odds - (10.0 - 4_f64.ln())).abs() < 1e-15);
+        // Half of χ² with two degrees of freedom, on average. Rejects a whole one a direction, 8.
+        assert_eq!(explains, 9.0);
+        // What cannot be tested has no odds, whatever it explains.
+        assert_eq!(evidence(10.0, None, 1), (f64::NEG_INFINITY, 10.0));
+    }
+
+    #[test]
+    fn sizes_that_differ_between_causes_are_known_less_well() {
+        // Odds 3 : 1, sizes (1, 0) and (3, 0): a quarter of (3 − 1)². Rejects a variance about the mean, 3/4.
+        let sizes = [[1.0, 0.0], [3.0, 0.0]].map(|size| DVector::from_column_slice(&size));
+        assert_eq!(variances_between(&sizes, &[3.0, 1.0]).as_slice(), [1.0, 0.0]);
+    }
 }

@@ -74,12 +74,7 @@ fn grown<'a>(
 ) -> Option<AugmentedModel<'a>> {
     let tests = tests_in(&entries);
     for _ in 0..MAX_CANDIDATES_TRIED {
-        let best = entries
-            .iter()
-            .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))?;
-        if best.p_value * tests > level {
-            return None;
-        }
+        let best = most_significant(&entries, tests, level)?;
         match confirmed((base, &mut *known), model, &entries, (best, tests), level) {
             Ok(grown) => return Some(grown),
             // What comes next may be what is there.
@@ -87,6 +82,27 @@ fn grown<'a>(
         }
     }
     None
+}
+
+/// The most significant effect of a scan, if it is significant at a family-wise level over so many tests (Bonferroni: the
+/// smallest p-value is the first step of Holm's order). Where p-values are equal, as where both are 0, the larger statistic.
+fn most_significant(entries: &[Entry], tests: f64, level: f64) -> Option<&Entry> {
+    let order = |a: &&Entry, b: &&Entry| {
+        a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic))
+    };
+    entries.iter().min_by(order).filter(|best| best.p_value * tests <= level)
+}
+
+/// Which causes are not discriminated from the first, the most probable one: those within the margin of its log odds, or, as
+/// neither the prior nor what is plausible may exclude a cause that explains as much, of the most that any explains. Log odds
+/// and explained log likelihood of each.
+fn is_not_discriminated(causes: &[(f64, f64)]) -> Vec<bool> {
+    let top = causes.first().map_or(0.0, |(log_odds, _)| *log_odds);
+    let most = causes.iter().map(|(_, explains)| *explains).fold(f64::MIN, f64::max);
+    let stays = |(log_odds, explains): &(f64, f64)| {
+        *log_odds > top - log_odds_margin(top) || *explains > most - log_odds_margin(most)
+    };
+    causes.iter().map(stays).collect()
 }
 
 /// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
@@ -139,11 +155,9 @@ pub(crate) fn search<'a>(
             model = without;
             continue;
         }
-        let (top, most) = (found[0].0.log_odds, found.iter().map(|(name, _)| name.explains).fold(f64::MIN, f64::max));
-        // Neither what is plausible nor the prior of sizes may silence a name that explains as much.
-        found.retain(|(name, _)| {
-            name.log_odds > top - log_odds_margin(top) || name.explains > most - log_odds_margin(most)
-        });
+        let evidence: Vec<(f64, f64)> = found.iter().map(|(name, _)| (name.log_odds, name.explains)).collect();
+        let mut kept = is_not_discriminated(&evidence).into_iter();
+        found.retain(|_| kept.next().unwrap_or(false));
         names.push(found.iter().map(|(name, _)| name.clone()).collect());
         beside.extend(over_names(index, &found));
         model = found.swap_remove(0).1;
@@ -200,4 +214,35 @@ pub(crate) fn search_ungated<'a>(
         known: found.known.clone(),
         ..bold
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranking::tests::scored;
+
+    #[test]
+    fn the_most_significant_effect_is_next_if_it_pays_for_all() {
+        // χ² with one degree of freedom: 6.63 has p = 0.01, 3.84 has p = 0.05.
+        let all = [scored("slip_speed", 3.84, 9.0, 1), scored("backlash", 6.635, 1.0, 1)];
+        let entries = best_variants(&all);
+        let next = |tests, level| most_significant(&entries, tests, level).map(|entry| entry.scored.candidate.id());
+        // Two tests at 3 %: 0.01 · 2 ≤ 0.03. Rejects the most probable, which is not the most significant.
+        assert_eq!(next(2.0, 0.03), Some("backlash"));
+        // Four: 0.04 > 0.03. Rejects an uncorrected p-value.
+        assert_eq!(next(4.0, 0.03), None);
+        // Both underflow: the larger statistic. Rejects the first in the catalogue's order.
+        let large = best_variants(&[scored("slip_speed", 5e3, 9.0, 1), scored("backlash", 6e3, 1.0, 1)]);
+        assert_eq!(most_significant(&large, 2.0, 0.03).map(|entry| entry.scored.candidate.id()), Some("backlash"));
+    }
+
+    #[test]
+    fn causes_within_the_margin_are_not_discriminated() {
+        // Margin 3 below log odds of 300 and less. Rejects a margin of the best's share alone, 0.2.
+        assert_eq!(is_not_discriminated(&[(20.0, 30.0), (17.1, 20.0), (16.9, 20.0)]), [true, true, false]);
+        // 1 % of 1000. Rejects the margin of 3.
+        assert_eq!(is_not_discriminated(&[(1000.0, 1010.0), (991.0, 0.0), (989.0, 0.0)]), [true, true, false]);
+        // Far less probable, but it explains as much: its prior alone excludes it. Rejects the odds as the only criterion.
+        assert_eq!(is_not_discriminated(&[(20.0, 30.0), (5.0, 29.0)]), [true, true]);
+    }
 }

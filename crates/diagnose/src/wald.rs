@@ -1,6 +1,8 @@
 //! How well sizes are known: by the likelihood, by how runs differ, by what is not known of variants, and by what is not known of the names beside them.
 
 use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
+use model_term::TermParameter;
+use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::AugmentedModel;
 use crate::scan::{freedom, principal};
@@ -17,30 +19,40 @@ pub(crate) struct Test {
     pub(crate) estimates: Vec<(f64, f64)>,
 }
 
-/// The test of a candidate in its fitted model, and along its principal directions in units of the plausible: information and size.
+/// The Wald test of a candidate in its fitted model, and along its principal directions in units of the plausible: information
+/// and size.
 pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Option<(Test, Vec<(f64, f64)>)> {
     let equations = total(&extended.fit.fit.pass.runs)?;
-    let parameters = extended.candidates[candidate].parameters();
     let own = extended.columns(candidate);
     let projected = extended.fit.eliminated(&equations, &own)?.of_columns(&equations, &own);
-    let estimates = extended.estimates(candidate);
-    let gradient = &projected.information * &estimates;
-    let directions: Vec<(f64, f64)> = principal(&projected.information, &gradient, &parameters)
+    let parameters = extended.candidates[candidate].parameters();
+    let of = (equations.count, freedom(&extended.fit, &equations));
+    Some(wald_test_of(&projected.information, &extended.estimates(candidate), &parameters, of))
+}
+
+/// The same of estimates with the information that the free columns leave; of `count` observations they leave `freedom`.
+fn wald_test_of(
+    information: &DMatrix<f64>,
+    estimates: &DVector<f64>,
+    parameters: &[TermParameter],
+    (count, freedom): (f64, f64),
+) -> (Test, Vec<(f64, f64)>) {
+    let gradient = information * estimates;
+    let directions: Vec<(f64, f64)> = principal(information, &gradient, parameters)
         .into_iter()
         .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
         .map(|(value, gradient)| (value, gradient / value))
         .collect();
-    let freedom = freedom(&extended.fit, &equations);
-    let shrink = freedom / equations.count.max(1.0);
+    let shrink = freedom / count.max(1.0);
     let statistic = directions.iter().map(|(value, size)| shrink * value * size * size).sum();
-    let covariance = inverse(&projected.information, RIDGE);
+    let covariance = inverse(information, RIDGE);
     let sigma = |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| (covariance[(k, k)] / shrink).sqrt());
     let test = Test {
         statistic,
         p_value: p_of_statistic(statistic, directions.len(), freedom),
         estimates: estimates.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
     };
-    Some((test, directions))
+    (test, directions)
 }
 
 /// Whether a candidate's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
@@ -59,11 +71,16 @@ pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usiz
     let Some(projection) = extended.fit.eliminated(&equations, &own) else { return false };
     let information = projection.of_columns(&equations, &own).information;
     let estimates = extended.estimates(candidate);
-    let stands = estimates.dot(&(&information * &estimates));
-    let n = runs.len() as f64;
-    let squares: f64 = runs.iter().map(|run| projection.score_of(run, &equations, &own).dot(&estimates).powi(2)).sum();
-    let t = stands / (squares * n / (n - 1.0)).sqrt();
-    t.is_nan() || p_of_student(t, n - 1.0) < level
+    let along: Vec<f64> = runs.iter().map(|run| projection.score_of(run, &equations, &own).dot(&estimates)).collect();
+    let t = cluster_robust_t(estimates.dot(&(&information * &estimates)), &along);
+    t.is_nan() || p_of_student(t, along.len() as f64 - 1.0) < level
+}
+
+/// Student's t of θᵀIθ over the scores of the runs along the estimate θ: with n runs, their sum of squares times n/(n − 1).
+fn cluster_robust_t(signal: f64, scores: &[f64]) -> f64 {
+    let n = scores.len() as f64;
+    let squares: f64 = scores.iter().map(|score| score.powi(2)).sum();
+    signal / (squares * n / (n - 1.0)).sqrt()
 }
 
 /// Standard deviations of a candidate's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
@@ -106,4 +123,52 @@ pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> 
         Some(test)
     };
     extra_sigma.iter().enumerate().filter_map(test).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: TermParameter = TermParameter { name: "a", unit: "1", prior_sigma: 1.0 };
+
+    /// I = [[4, 2], [2, 3]], θ = (−1/4, 3/2): Iθ = (2, 4), θᵀIθ = 11/2, I⁻¹ = [[3, −2], [−2, 4]]/8.
+    fn tested(prior_sigma: [f64; 2], of: (f64, f64)) -> (Test, Vec<(f64, f64)>) {
+        let information = DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]);
+        let parameters = prior_sigma.map(|prior_sigma| TermParameter { prior_sigma, ..UNIT });
+        wald_test_of(&information, &DVector::from_column_slice(&[-0.25, 1.5]), &parameters, of)
+    }
+
+    #[test]
+    fn the_wald_test_of_two_parameters_is_that_on_paper() {
+        let (test, directions) = tested([1.0, 1.0], (1e9, 1e9));
+        // Rejects a sum of θᵢ²Iᵢᵢ = 1/4 + 27/4. The ridge and rounding change each number by 1e-11 at most.
+        assert!((test.statistic - 5.5).abs() < 1e-11, "{test:?}");
+        assert!((test.estimates[0].1 - 0.375_f64.sqrt()).abs() < 1e-11, "{test:?}");
+        assert!((test.estimates[1].1 - 0.5_f64.sqrt()).abs() < 1e-11, "{test:?}");
+        // In principal directions, trace and determinant are those of I, and Σ value·size² is the statistic again.
+        let values: Vec<f64> = directions.iter().map(|(value, _)| *value).collect();
+        assert!((values[0] + values[1] - 7.0).abs() < 1e-12 && (values[0] * values[1] - 8.0).abs() < 1e-12);
+        let again: f64 = directions.iter().map(|(value, size)| value * size * size).sum();
+        assert!((again - 5.5).abs() < 1e-12, "{directions:?}");
+    }
+
+    #[test]
+    fn sizes_of_few_observations_are_known_less_well() {
+        // 8 observations, 6 free: the variance is 8/2 times as large. Rejects shrink in place of its reciprocal.
+        let (test, _) = tested([1.0, 1.0], (8.0, 2.0));
+        assert!((test.estimates[1].1 - (0.5_f64 * 4.0).sqrt()).abs() < 1e-11, "{test:?}");
+        assert!((test.statistic - 5.5 / 4.0).abs() < 1e-11, "{test:?}");
+        // Scaled by prior sigmas of 0.1, no direction has an eigenvalue of 1: nothing is tested.
+        let (test, directions) = tested([0.1, 0.1], (1e9, 1e9));
+        assert!(directions.is_empty() && test.statistic == 0.0 && test.p_value == 1.0, "{test:?}");
+    }
+
+    #[test]
+    fn runs_that_differ_weaken_a_test() {
+        // Four runs of score 1/2 along θ sum to the signal 2: squares 1, times 4/3, t = 2/√(4/3) = √3. Rejects n/(n − 1)
+        // forgotten, which gives 2.
+        assert!((cluster_robust_t(2.0, &[0.5; 4]) - 3_f64.sqrt()).abs() < 1e-15);
+        // One run that has it all: squares 4, t = √(3/4). Rejects squares of the sum, which are the same for both.
+        assert!((cluster_robust_t(2.0, &[2.0, 0.0, 0.0, 0.0]) - 0.75_f64.sqrt()).abs() < 1e-15);
+    }
 }
