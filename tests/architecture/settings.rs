@@ -1,9 +1,9 @@
-//! Numbers that decide something stand in a crate's settings, each with its unit, its meaning and its source, and
-//! docs/settings.md lists them. With YAIR_UPDATE_DOCS=1 the document is written anew.
+//! Numbers that decide something stand in a crate's settings, each with its unit, its meaning and its
+//! source, and docs/settings.md lists them. With YAIR_UPDATE_DOCS=1 the document is written anew.
 //!
-//! A number that decides something is a constant of a numeric type, or an array of them, whose value has a literal.
-//! Constants that name another constant are derived from it (a column's index, a sum), and constants under
-//! `#[cfg(test)]` decide nothing: both may stand anywhere.
+//! A number that decides something is a constant of a numeric type, or an array of them, whose value has a
+//! literal. Constants that name another constant are derived from it (a column's index, a sum), and
+//! constants under `#[cfg(test)]` decide nothing: both may stand anywhere.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,7 +13,8 @@ use syn::{Attribute, Expr, ExprLit, ExprPath, ImplItemConst, Item, ItemConst, It
 
 use crate::{files, root, text};
 
-/// The sources of the crates whose settings are listed. Each has a file `settings.rs` or a folder `settings/`.
+/// The sources of the crates whose settings are listed. Each has a file `settings.rs` or a folder
+/// `settings/`.
 const SOURCES: [&str; 1] = ["crates/diagnose/src"];
 
 const NUMERIC: [&str; 11] = ["f32", "f64", "u8", "u16", "u32", "u64", "usize", "i32", "i64", "isize", "Duration"];

@@ -1,6 +1,7 @@
-//! What this data could not have shown, and from which size on everything else would have.
+//! What is not detectable in these data, and the detection limits of everything else.
 //!
-//! A size shows with nine chances in ten at a false-alarm rate of 1e-3 when √λ = 4.57 (discovery by a score test; λ = size² of the projected information).
+//! A size is detected with probability 0.9 at a false-positive rate of 1e-3 when √λ = 4.57. The test is a
+//! score test; λ = size² of the projected information.
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
@@ -9,7 +10,8 @@ use crate::fit_cache::FitCache;
 use crate::settings::levels::DETECTION_SQRT_LAMBDA;
 use crate::settings::search::MAX_DETECTION_LIMIT_PRIOR_SIGMAS;
 
-/// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
+/// Detection limit of every candidate beside a model; second, the candidates whose limit is above a
+/// plausible size.
 pub(crate) fn detectability(
     model: &AugmentedModel<'_>,
     catalogue: &[Candidate],
@@ -18,7 +20,7 @@ pub(crate) fn detectability(
     let mut best: Vec<(Blind, f64)> = Vec::new();
     for scored in known.beside(model, catalogue) {
         let id = scored.candidate.id();
-        // The parameter that shows soonest, the others at rest, in units of what would be large.
+        // The parameter with the lowest detection limit in prior standard deviations, the others fixed.
         let smallest = scored
             .parameters
             .iter()

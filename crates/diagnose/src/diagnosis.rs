@@ -19,7 +19,7 @@ use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
-use crate::record_faults::{Fault, fault, follows, rejected_share, sessions};
+use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
 use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
 use crate::text;
@@ -63,7 +63,7 @@ pub struct Diagnosis {
     pub extended: Result<Scenario, String>,
     /// What the calibrated and the extended model leave, against everything recorded.
     pub residuals: Residuals,
-    /// Every effect that was asked for, and what became of it.
+    /// Every effect that was tested, and what became of it.
     pub alternatives: Vec<Alternative>,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
@@ -148,7 +148,7 @@ fn continued(
     limits: &Limits,
 ) -> Diagnosis {
     // Where the counts do not follow the robot at all, no small effect has a meaning.
-    let uncorrelated = !follows(&base);
+    let uncorrelated = !is_correlated(&base);
     let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
     let structure = mean_structure(datasets, base, &catalogue, restored);

@@ -1,4 +1,5 @@
-//! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry, estimated noise, found effects, and what was driven.
+//! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry,
+//! estimated noise, found effects, and what was driven.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +16,8 @@ use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
 
-/// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
+/// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
+/// diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
 /// The scenario, or why it cannot be written.
 pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Result<Scenario, String> {

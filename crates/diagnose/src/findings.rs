@@ -1,5 +1,5 @@
-//! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log; and the doubts that
-//! they cast on each other. [`findings`] lists the stages in their order.
+//! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log;
+//! and the doubts that they cast on each other. [`findings`] lists the stages in their order.
 
 use crate::cause::Doubt;
 use crate::check::TestResult;
@@ -84,10 +84,11 @@ fn sparse_terms(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<
     findings
 }
 
-/// Noise effects, or that odometry is uncorrelated with the measurements. A mean effect of the same cause excludes a noise effect.
+/// Noise effects, or that odometry is uncorrelated with the measurements. A mean effect of the same cause
+/// excludes a noise effect.
 fn noise_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if evidence.uncorrelated {
-        findings.push(finding::of_lost(&evidence.structure.base));
+        findings.push(finding::of_uncorrelated(&evidence.structure.base));
     } else if !evidence.restored() {
         let mut signs = scatter(evidence.structure, evidence.without);
         signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
@@ -115,8 +116,8 @@ fn faults_of_the_log(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) ->
     findings
 }
 
-/// Failed checks that no finding explains. A noise effect explains failed checks, unless residuals depend on something too
-/// plainly.
+/// Failed checks that no finding explains. A noise effect explains failed checks, unless residuals depend
+/// on something too plainly.
 fn failed_checks(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let Evidence { structure, .. } = evidence;
     let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < DEPENDENCE_BEYOND_NOISE_LEVEL;

@@ -1,8 +1,9 @@
 //! The mean model: which effects and sparse terms a base fit needs.
 //!
-//! Stages, each a function of the results before it: search, ungated search, ungated sparse terms, comparison with one sparse
-//! term, thinning of autocorrelated measurements, search at a higher level, sparse terms beside the effects. Once sparse terms
-//! are found, the stages after that leave the model as it is.
+//! Stages, each a function of the results before it: search, ungated search, ungated sparse terms,
+//! comparison with one sparse term, thinning of autocorrelated measurements, search at a higher level,
+//! sparse terms beside the effects. Once sparse terms are found, the stages after that leave the model as
+//! it is.
 
 use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
@@ -27,7 +28,8 @@ fn is_white(checked: &Checked) -> bool {
     coefficient.abs() < MIN_AUTOCORRELATION || (sigmas.abs() < AUTOCORRELATION_SIGMAS && !checked.autocorrelated)
 }
 
-/// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals that are left.
+/// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals
+/// that are left.
 pub(crate) struct MeanStructure<'a> {
     pub(crate) base: ModelFit<'a>,
     pub(crate) found: SearchResult<'a>,
@@ -35,9 +37,11 @@ pub(crate) struct MeanStructure<'a> {
     pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
     /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
     pub(crate) correlated: Option<(f64, f64)>,
-    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another cause is present.
+    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
+    /// cause is present.
     pub(crate) spurious: bool,
-    /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it replaced them.
+    /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it
+    /// replaced them.
     pub(crate) competing: Option<f64>,
 }
 
@@ -48,7 +52,8 @@ impl<'a> MeanStructure<'a> {
     }
 }
 
-/// What a stage hands to the next one: effects, sparse terms where any are needed, and the tests of the residuals left.
+/// What a stage hands to the next one: effects, sparse terms where any are needed, and the tests of the
+/// residuals left.
 struct MeanModel<'a> {
     found: SearchResult<'a>,
     unlisted: Option<UncataloguedTerms<'a>>,
@@ -106,7 +111,8 @@ fn search_ungated_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, cat
     ungated.map_or(model, MeanModel::of_effects)
 }
 
-/// Where outliers are in excess and residuals depend on something, but no effect is found: sparse terms among all measurements.
+/// Where outliers are in excess and residuals depend on something, but no effect is found: sparse terms
+/// among all measurements.
 fn ungated_terms_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
     if !(model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence()) {
         return model;
@@ -117,8 +123,8 @@ fn ungated_terms_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> M
     }
 }
 
-/// Compares the effects with one sparse term. Where that explains more than all effects together, sparse terms come beside the
-/// effects, or replace them if that explains more.
+/// Compares the effects with one sparse term. Where that explains more than all effects together, sparse
+/// terms come beside the effects, or replace them if that explains more.
 fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
     if model.unlisted.is_some() || model.found.model.candidates.is_empty() {
         return model;
@@ -154,8 +160,9 @@ struct Decorrelated<'a> {
     spurious: bool,
 }
 
-/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, a new search on them, and
-/// its comparison with one sparse term. Autocorrelated measurements taken as independent make any effect too significant.
+/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, a new
+/// search on them, and its comparison with one sparse term. Autocorrelated measurements taken as
+/// independent make any effect too significant.
 fn thin_if_autocorrelated<'a>(
     datasets: &'a [Dataset],
     base: ModelFit<'a>,
@@ -163,7 +170,8 @@ fn thin_if_autocorrelated<'a>(
     catalogue: &[Candidate],
     restored: bool,
 ) -> Decorrelated<'a> {
-    // Counts that were restored roughly make the errors of the measurements after them alike; the instrument has no part in it.
+    // Counts that were restored roughly make the errors of the measurements after them alike; the
+    // instrument has no part in it.
     if model.unlisted.is_some() || restored || is_white(&model.checked) {
         return Decorrelated { base, model, correlated: None, spurious: false };
     }
@@ -183,7 +191,8 @@ fn thin_if_autocorrelated<'a>(
     Decorrelated { base: thinned, model, correlated, spurious }
 }
 
-/// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds more effects.
+/// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds
+/// more effects.
 fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;

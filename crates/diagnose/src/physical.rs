@@ -17,7 +17,8 @@ pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
     effect_of(candidate, &test.estimates).is_some_and(scatters)
 }
 
-/// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one. What is within its error of nothing counts as nothing.
+/// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one.
+/// What is within its error of nothing counts as nothing.
 pub(crate) fn effect_of(candidate: &Candidate, estimates: &[(f64, f64)]) -> Option<Effect> {
     let parameters = candidate.parameters();
     let fitted = parameters.iter().zip(estimates);

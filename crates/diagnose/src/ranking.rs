@@ -5,13 +5,13 @@ use crate::physical::effect_of;
 use crate::scan::Scored;
 use crate::statistics::sidak;
 
-/// One candidate of an effect: its best variant, with its chance after paying for all variants.
+/// An effect of the scan: its best variant, with the p-value corrected for all variants.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
     pub(crate) scored: Scored,
     pub(crate) p_value: f64,
     pub(crate) variants: usize,
-    /// Shapes that can be seen and that the scan gives a size that can be, with their statistics, that which explains most first.
+    /// Detectable variants with physical estimates, with their statistics, the largest first.
     possible: Vec<(Candidate, f64)>,
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn best_variants(scored: &[Scored]) -> Vec<Entry> {
     entries
 }
 
-/// How many effects of a scan can be seen at all, each a test: at least one.
+/// Number of detectable effects of a scan, each a test: at least one.
 pub(crate) fn tests_in(entries: &[Entry]) -> f64 {
     entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64
 }

@@ -1,7 +1,8 @@
-//! Gross faults first: swapped or reversed wheels, factors, wraps, torn reads. Each is a rewriting of the records, judged by the likelihood of a base fit.
+//! Record faults: swapped or reversed wheels, factors, wraps, torn reads. Each is a correction of the
+//! records, compared by the likelihood of a base fit.
 //!
-//! A factor on both wheels is no matter of the likelihood, which fits any lengths: how plausible the fitted lengths are decides. A fault that a fit
-//! hides is worse than none.
+//! A factor on both wheels does not change the likelihood, which fits any geometry; the prior of the
+//! geometry decides. A fault that the fit absorbs is worse than none.
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
@@ -39,7 +40,8 @@ pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one; `outlying` leaves it at the former.
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one;
+/// `outlying` leaves it at the former.
 pub(crate) fn fault(
     datasets: &[Dataset],
     base: Option<&ModelFit<'_>>,
@@ -47,7 +49,7 @@ pub(crate) fn fault(
     outlying: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
-    let lost = base.is_some_and(|base| !follows(base));
+    let uncorrelated = base.is_some_and(|base| !is_correlated(base));
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
@@ -62,15 +64,16 @@ pub(crate) fn fault(
             }
             let own = sessions(&records);
             let Ok(fit) = PLAIN.fit(&own) else { continue };
-            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not
-            // restored to the last count: measurements may still lie off, but far fewer of them.
+            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless
+            // they show it by themselves. What was lost is not restored to the last count: measurements may
+            // still lie off, but far fewer of them.
             let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
                 MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
             });
-            let follows = is_drive(&fit)
+            let is_plausible = is_drive(&fit)
                 && rejected_share(&fit) < most_outliers
                 && fit.fit.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
-            if !follows && !visible_in_log {
+            if !is_plausible && !visible_in_log {
                 continue;
             }
             let gain = base.map_or(f64::MAX, |base| {
@@ -78,16 +81,17 @@ pub(crate) fn fault(
                 let measurements = count(base).max(count(&fit));
                 cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
             });
-            // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
-            let least = match visible_in_log {
-                true if lost => f64::NEG_INFINITY,
+            // What the log shows needs no instrument; one must not contradict it, where it has anything to
+            // say.
+            let min_gain = match visible_in_log {
+                true if uncorrelated => f64::NEG_INFINITY,
                 true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
                 false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
             };
-            let better = |(shown, known): &(bool, Fault)| {
-                (visible_in_log, gain) > (*shown, known.gain + f64::from(u8::from(*shown)))
+            let better = |(known_visible, known): &(bool, Fault)| {
+                (visible_in_log, gain) > (*known_visible, known.gain + f64::from(u8::from(*known_visible)))
             };
-            if gain > least && best.as_ref().is_none_or(better) {
+            if gain > min_gain && best.as_ref().is_none_or(better) {
                 best = Some((
                     visible_in_log,
                     Fault { id, sizes, sentence, records, gain: gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN) },
@@ -113,13 +117,13 @@ pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
     fit.fit.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64
 }
 
-/// Does a base fit look like a robot whose counts follow it?
+/// Whether a base fit is plausible and rejects few measurements.
 fn is_sound(fit: &ModelFit<'_>) -> bool {
     is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
 }
 
-/// Does the robot go where a drive of any lengths would, by the counts?
-pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
+/// Whether the odometry is correlated with the measurements, for some geometry.
+pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.fit.noise.sigma(of);
     sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
         && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
@@ -130,16 +134,17 @@ pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
 /// Are a fit's lengths and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.fit.model, &fit.nominal);
-    let near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
-    near(model.m_per_rad.left, nominal.m_per_rad.left, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
-        && near(model.m_per_rad.right, nominal.m_per_rad.right, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
-        && near(model.separation_m, nominal.separation_m, MAX_SEPARATION_DEVIATION_SIGMAS * SEPARATION_PRIOR_SIGMA)
+    let is_near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
+    is_near(model.m_per_rad.left, nominal.m_per_rad.left, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
+        && is_near(model.m_per_rad.right, nominal.m_per_rad.right, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
+        && is_near(model.separation_m, nominal.separation_m, MAX_SEPARATION_DEVIATION_SIGMAS * SEPARATION_PRIOR_SIGMA)
         && fit.fit.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
         && fit.fit.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
         && fit.fit.converged
 }
 
-/// By which factor the wheels of a fit are too large or too small for the robot that its description tells of, if they are.
+/// By which factor the wheels of a fit are too large or too small for the robot that its description tells
+/// of, if they are.
 pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
     let ratio = fit.fit.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
     let factor = (ratio.left * ratio.right).sqrt();

@@ -1,8 +1,9 @@
-//! What a model leaves, look by look, against everything that was recorded: binned means with their errors, before and after the extension.
+//! Residuals against everything that was recorded: binned means with their standard errors, before and
+//! after the extension.
 //!
-//! A residual is an innovation: what a measurement sees beyond what counts, model and the measurements before predict, along and across the robot (m) and of its heading (rad). Of a
-//! right model it has mean zero whatever it is drawn against. A bin's band is its mean ± 1.96 standard errors, from the scatter in the bin; residuals are uncorrelated
-//! where the checks of whiteness pass.
+//! A residual is an innovation, along and across the robot (m) and of its heading (rad). Under a right
+//! model its mean is zero whatever it is binned by. A bin's band is its mean ± 1.96 standard errors, from
+//! the scatter in the bin; residuals are uncorrelated where the whiteness tests pass.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -25,13 +26,14 @@ pub struct Residuals {
     #[serde(rename = "looks")]
     pub measurements: usize,
     /// One for each covariate that varies, in the order of the checks.
-    pub against: Vec<ResidualsByCovariate>,
+    #[serde(rename = "against")]
+    pub by_covariate: Vec<ResidualsByCovariate>,
 }
 
 /// Residuals against one covariate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualsByCovariate {
-    /// Its name, that of the check that asks for it.
+    /// Its name, that of the test of it.
     pub covariate: String,
     /// For people.
     pub label: String,
@@ -63,11 +65,11 @@ pub struct Profile {
     pub bins: Vec<Bin>,
     /// Σ (mean/standard error)².
     pub chi_square: f64,
-    /// Its chance when all means are zero.
+    /// Its p-value when all means are zero.
     pub p_value: f64,
-    /// The same about the mean of all bins: how much the residuals go with the covariate, whatever they are on the whole.
+    /// The same about the mean of all bins: how much the residuals depend on the covariate.
     pub varies_chi_square: f64,
-    /// Its chance when all means are the same.
+    /// Its p-value when all means are the same.
     pub varies_p_value: f64,
 }
 
@@ -102,7 +104,8 @@ impl Conditions<'_> {
         self.sample.motion.turn_rad / self.sample.duration_s
     }
 
-    /// The phase of a wheel, degrees. A wheel that turned on and on between two measurements has no one phase.
+    /// The phase of a wheel, degrees. A wheel that turned on and on between two measurements has no one
+    /// phase.
     fn phase_deg(&self, side: Side) -> Option<f64> {
         (self.sample.turned_rad[side].abs() < FRAC_PI_2).then(|| degrees(self.sample.phase_rad[side]))
     }
@@ -211,7 +214,7 @@ pub(crate) fn residuals(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Resi
     let before = residuals_of(&AugmentedModel::base(base), &covariates);
     let after = residuals_of(model, &covariates);
     let measurements = before.iter().filter(|residual| residual.component == 0).count();
-    let against = covariates.iter().enumerate().filter_map(|(number, covariate)| {
+    let by_covariate = covariates.iter().enumerate().filter_map(|(number, covariate)| {
         let components: Vec<Component> = ["along", "across", "heading"]
             .iter()
             .enumerate()
@@ -242,16 +245,16 @@ pub(crate) fn residuals(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Resi
             components,
         })
     });
-    Residuals { measurements, against: against.collect() }
+    Residuals { measurements, by_covariate: by_covariate.collect() }
 }
 
-/// Sorts values and cuts them: a turn into equal parts, few levels each for itself, others into parts of equal counts, or of equal widths where those were too
-/// narrow. `None` when they vary by less than `least`.
-fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<Vec<f64>> {
+/// Sorts values and cuts them into bins: a revolution into equal parts, few levels one each, others into
+/// equal counts, or equal widths where those are too narrow. `None` when they span less than `min_span`.
+fn edges(values: &mut [(f64, f64, f64)], periodic: bool, min_span: f64) -> Option<Vec<f64>> {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (first, last) = (values.first()?.0, values.last()?.0);
     let span = last - first;
-    if span <= least.max(COVARIATE_TOLERANCE * first.abs().max(last.abs())) {
+    if span <= min_span.max(COVARIATE_TOLERANCE * first.abs().max(last.abs())) {
         return None;
     }
     let share = |k: usize| k as f64 / BINS as f64;
@@ -279,7 +282,8 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, least: f64) -> Option<V
         }
     }
     if 2 * edges.len() < BINS {
-        // Most values lie in a few heaps, such as the speeds that were commanded: equal widths keep heaps whole and apart.
+        // Most values are at a few levels, such as commanded speeds: equal widths keep levels whole and
+        // separate.
         edges = (1..BINS).map(|k| first + span * share(k)).collect();
     }
     Some(edges)
@@ -308,10 +312,11 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         let variance = own.iter().map(|(_, size, _)| (size - mean).powi(2)).sum::<f64>() / (n - 1.0);
         bins.push(Bin { at, mean, sigma: (variance / n).sqrt(), mean_z, count: own.len() });
     }
-    let weight = |bin: &Bin| if bin.sigma > 0.0 { bin.sigma.powi(-2) } else { 0.0 };
-    let (sum, weights) = bins.iter().fold((0.0, 0.0), |sum, bin| (sum.0 + weight(bin) * bin.mean, sum.1 + weight(bin)));
-    let about = |centre: f64| bins.iter().map(|bin| weight(bin) * (bin.mean - centre).powi(2)).sum::<f64>();
-    let (chi_square, varies_chi_square) = (about(0.0), if weights > 0.0 { about(sum / weights) } else { 0.0 });
+    let precision = |bin: &Bin| if bin.sigma > 0.0 { bin.sigma.powi(-2) } else { 0.0 };
+    let (sum, precisions) =
+        bins.iter().fold((0.0, 0.0), |sum, bin| (sum.0 + precision(bin) * bin.mean, sum.1 + precision(bin)));
+    let about = |centre: f64| bins.iter().map(|bin| precision(bin) * (bin.mean - centre).powi(2)).sum::<f64>();
+    let (chi_square, varies_chi_square) = (about(0.0), if precisions > 0.0 { about(sum / precisions) } else { 0.0 });
     let freedom = bins.len() as f64;
     let varies_p_value = if freedom > 1.0 { p_of_chi_square(varies_chi_square, freedom - 1.0) } else { 1.0 };
     Profile { p_value: p_of_chi_square(chi_square, freedom), bins, chi_square, varies_chi_square, varies_p_value }
@@ -322,7 +327,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_stay_apart_and_a_continuum_is_cut_into_equal_counts() {
+    fn each_level_is_a_bin_and_a_continuum_is_cut_into_equal_counts() {
         let mut three: Vec<(f64, f64, f64)> = (0..90).map(|k| (f64::from(k % 3), f64::from(k % 3), 0.0)).collect();
         let cut = edges(&mut three, false, 0.0).expect("varies");
         assert_eq!(cut, [0.5, 1.5]);

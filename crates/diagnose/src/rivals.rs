@@ -1,4 +1,4 @@
-//! Rival models of one place: every effect that explains about as much, refitted, most probable first.
+//! Rival models of one candidate: every effect that explains about as much, refitted, most probable first.
 
 use estimation::ModelFit;
 use nalgebra::DVector;
@@ -15,18 +15,20 @@ use crate::settings::search::{
 };
 use crate::wald::wald_test;
 
-/// A name for a finding.
+/// A candidate cause of a finding.
 #[derive(Debug, Clone)]
 pub(crate) struct Name {
     pub(crate) candidate: Candidate,
     pub(crate) log_odds: f64,
-    /// Log likelihood at its best, less what its freedom gains by chance: half of a χ² for each direction.
+    /// Log likelihood less its expected gain without the effect: half of a χ² for each direction.
     pub(crate) explains: f64,
-    /// Sizes that no effect can have explain more: something is there that looks like this one, and is none of the names.
+    /// A model with unphysical sizes explains more: the cause resembles this one, and may be none of the
+    /// candidates.
     pub(crate) outdone: bool,
 }
 
-/// The rivals of one place in a model whose other candidates stay, each refitted: the best variant of each effect that explains enough, most probable first.
+/// The rivals of one candidate in a model whose others stay, each refitted: the best variant of each effect
+/// that explains enough, most probable first.
 pub(crate) fn rivals<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     without: &AugmentedModel<'a>,
@@ -38,7 +40,7 @@ pub(crate) fn rivals<'a>(
     let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
     let mut fits = known.with_each(base, without, index, &best_variants);
-    // With another variant, about as good, an effect may have a size that can be.
+    // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
         fits.iter().filter(is_its).any(|extended| is_physical(extended, index))
@@ -65,7 +67,8 @@ pub(crate) fn rivals<'a>(
         })
         .collect();
     named.sort_by(|a, b| b.0.log_odds.total_cmp(&a.0.log_odds));
-    // What no effect can be is no name; where it explains more than all that can, no name is right alone.
+    // Unphysical candidates are no causes. Where one explains more than all others, the first of those is
+    // doubted.
     let best = named.first().map_or(f64::NEG_INFINITY, |(name, _)| name.log_odds);
     named.retain(|(_, extended)| is_physical(extended, index));
     if let Some((name, _)) = named.first_mut() {
@@ -79,8 +82,8 @@ fn close_statistic(best: f64) -> f64 {
     best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best)
 }
 
-/// The candidates that are refitted, by their scores: those that explain enough, most probable first, and no more of them than
-/// are worth it; close rivals beyond that.
+/// The candidates that are refitted, by their scores: those that explain enough, most probable first, and
+/// no more of them than are worth it; close rivals beyond that.
 fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
     let close = close_statistic(best);
     let least = close.min(MIN_RIVAL_STATISTIC_RATIO * best);
@@ -95,16 +98,18 @@ fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
         .collect()
 }
 
-/// Log odds of a candidate over none, and its log likelihood less what its freedom gains by accident: from how much likelier it
-/// makes the data, its sizes along principal directions, and how many variants were tried.
+/// Log odds of a candidate over none, and its log likelihood less what its freedom gains by accident: from
+/// how much likelier it makes the data, its sizes along principal directions, and how many variants were
+/// tried.
 fn evidence(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
     let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
     let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
     (log_odds - (trials as f64).ln(), explains)
 }
 
-/// Variances of sizes by what the candidate beside them is not known to be: how far they go where it has another of its names, by the names' chances. For each other candidate
-/// of the likeliest model, its sizes in turn.
+/// Variances of the other candidates' sizes over the causes of one candidate: how far they move if it has
+/// another cause, weighed by the causes' odds. For each other candidate of the most probable model, its
+/// sizes in turn.
 pub(crate) fn over_names(index: usize, names: &[(Name, AugmentedModel<'_>)]) -> Vec<(Candidate, Vec<f64>)> {
     let Some((top, likeliest)) = names.first() else { return Vec::new() };
     let odds: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
@@ -134,7 +139,8 @@ mod tests {
 
     #[test]
     fn contenders_explain_half_of_the_best_or_are_close_to_it() {
-        // The best explains 100: half of it is 50; a close rival lacks 12 at the most. One without a direction is none.
+        // The best explains 100: half of it is 50; a close rival lacks 12 at the most. One without a
+        // direction is none.
         let all = [
             scored("slip_speed", 100.0, 40.0, 1),
             scored("lateral_skid", 51.0, 20.0, 1),
@@ -142,7 +148,8 @@ mod tests {
             scored("backlash", 90.0, 41.0, 1),
             scored("slope", 100.0, 50.0, 0),
         ];
-        // Rejects an order by the statistic, which puts slip_speed first, and a limit at 12 below the best for all.
+        // Rejects an order by the statistic, which puts slip_speed first, and a limit at 12 below the best
+        // for all.
         assert_eq!(ids(&contenders(&best_variants(&all), 100.0)), ["backlash", "slip_speed", "lateral_skid"]);
         // A weak best: 15 less 12 is 3, below half of it. Rejects half of the best as the only limit.
         let weak =
@@ -152,7 +159,8 @@ mod tests {
 
     #[test]
     fn odds_are_likelihood_less_freedom_and_trials() {
-        // Two directions of no information cost nothing but what they explain: none at size 0. Four variants cost ln 4.
+        // Two directions of no information cost nothing but what they explain: none at size 0. Four
+        // variants cost ln 4.
         let (log_odds, explains) = evidence(10.0, Some(&[(0.0, 0.0), (0.0, 0.0)]), 4);
         assert!((log_odds - (10.0 - 4_f64.ln())).abs() < 1e-15);
         // Half of χ² with two degrees of freedom, on average. Rejects a whole one a direction, 8.

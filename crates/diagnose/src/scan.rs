@@ -1,9 +1,10 @@
 //! Score tests: what a term would add to a fit, from one pass at the fit's values.
 //!
-//! With the normal equation (I, g) over all columns, n what the fit holds free and c a candidate's parameters: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc,
-//! g_c|n = g_c − I_cn I_nn⁻¹ g_n, and gᵀI⁻¹g is χ² without the effect and noncentral with λ = sizeᵀ I_c|n size. In units of what would be a large size,
-//! directions that even such a size would not show are left out: they cost power and show nothing.
-//! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
+//! With the normal equation (I, g) over all columns, n what the fit holds free and c a candidate's
+//! parameters: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc, g_c|n = g_c − I_cn I_nn⁻¹ g_n, and gᵀI⁻¹g is χ² without the
+//! effect and noncentral with λ = sizeᵀ I_c|n size. In units of what would be a large size, directions that
+//! even such a size would not show are left out: they cost power and show nothing.
+//! Reference: Rao 1948 (score test); Laplace's approximation of the evidence under a prior of the sizes.
 
 use estimation::{Column, ModelFit, NormalEquations, Projected, RIDGE, inverse, total};
 use model_term::TermParameter;
@@ -27,13 +28,14 @@ pub(crate) struct Scored {
     pub(crate) dimensions: usize,
     pub(crate) statistic: f64,
     pub(crate) p_value: f64,
-    /// Its sizes as one step of the fit finds them, and their standard deviations; none where they cannot be told from each other.
+    /// Its sizes by one step of the fit, and their standard deviations; none where they are not determined.
     pub(crate) estimates: Vec<(f64, f64)>,
-    /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
+    /// Log Bayes factor of the effect over none, with a normal prior of the sizes about zero.
     pub(crate) log_odds: f64,
 }
 
-/// A candidate's information and gradient in units of what is plausible, along its principal directions: eigenvalue and gradient of each.
+/// A candidate's information and gradient in units of what is plausible, along its principal directions:
+/// eigenvalue and gradient of each.
 pub(crate) fn principal(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -48,10 +50,12 @@ pub(crate) fn principal(
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
 }
 
-/// Log of the chance of the data with some sizes free over that with the best ones: what their freedom costs, and how well they agree with what is plausible.
+/// Log Occam factor: log evidence with some sizes free over that at the best sizes. It is what their
+/// freedom costs, and how well they agree with their prior.
 ///
-/// Sizes are normal about zero with a scale of their own, which is anything from what is plausible down to a thousandth of it with even chances in its logarithm (a
-/// mixture of g-priors; Liang et al. 2008): a small effect is not less likely because a large one would have been plausible. `directions` are principal ones: the
+/// Sizes are normal about zero. The scale is anything from what is plausible down to a thousandth of it,
+/// with equal probabilities in its logarithm (a mixture of g-priors; Liang et al. 2008): a small effect is
+/// not less likely because a large one would have been plausible. `directions` are principal ones: the
 /// information of a plausible size, and the χ² that the direction explains.
 pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     let at = |scale: i32| -> f64 {
@@ -63,7 +67,7 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     };
     let all: Vec<f64> = (0..PRIOR_SCALES).map(at).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let sum: f64 = all.iter().map(|weight| (weight - most).exp()).sum();
+    let sum: f64 = all.iter().map(|log_factor| (log_factor - most).exp()).sum();
     most + (sum / f64::from(PRIOR_SCALES)).ln()
 }
 
@@ -73,8 +77,9 @@ pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
     (equations.count - columns).max(1.0)
 }
 
-/// Asks something of parts of a scan, each of candidates that are tested as a whole beside the candidates that the fit already has: of its candidates, what the fit leaves of
-/// their columns, and the evidence. Nothing where the fit's own columns are not determined.
+/// Evaluates parts of a scan. The candidates of a part are tested as a whole beside those that the fit has.
+/// `answer` gets them, what the fit leaves of their columns, and the normal equations. Nothing where the
+/// fit's own columns are not determined.
 pub(crate) fn scan_parts_of<T: Send>(
     fit: &ModelFit<'_>,
     chosen: &[Candidate],
@@ -136,8 +141,8 @@ pub(crate) fn scan(fit: &ModelFit<'_>, chosen: &[Candidate], candidates: &[Candi
     })
 }
 
-/// The score test of a candidate by what the fit leaves of its columns; `count` observations, of which the free columns leave
-/// `freedom`.
+/// The score test of a candidate by what the fit leaves of its columns; `count` observations, of which the
+/// free columns leave `freedom`.
 fn score_test(
     candidate: &Candidate,
     parameters: Vec<TermParameter>,
@@ -179,8 +184,8 @@ mod tests {
 
     const UNIT: TermParameter = TermParameter { name: "a", unit: "1", prior_sigma: 1.0 };
 
-    /// I = [[4, 2], [2, 3]] and g = (−2, −4): I⁻¹ = [[3, −2], [−2, 4]]/8, −I⁻¹g = (−1/4, 3/2), gᵀI⁻¹g = 11/2. Eigenvalues
-    /// (7 ± √17)/2 = 5.56 and 1.44.
+    /// I = [[4, 2], [2, 3]] and g = (−2, −4): I⁻¹ = [[3, −2], [−2, 4]]/8, −I⁻¹g = (−1/4, 3/2), gᵀI⁻¹g =
+    /// 11/2. Eigenvalues (7 ± √17)/2 = 5.56 and 1.44.
     fn projected() -> Projected {
         Projected {
             information: DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]),
@@ -199,9 +204,11 @@ mod tests {
     fn the_score_test_of_two_parameters_is_that_on_paper() {
         let scored = tested([1.0, 1.0], (1e9, 1e9));
         assert_eq!(scored.dimensions, 2);
-        // Rejects (Σg)²/ΣI = 36/11, and a sum of gᵢ²/Iᵢᵢ = 1 + 16/3. Rounding and the ridge change it by 1e-11 at most.
+        // Rejects (Σg)²/ΣI = 36/11, and a sum of gᵢ²/Iᵢᵢ = 1 + 16/3. Rounding and the ridge change it by
+        // 1e-11 at most.
         assert!((scored.statistic - 5.5).abs() < 1e-11, "{}", scored.statistic);
-        // χ² with two degrees of freedom: e^(−11/4). The tail of F with 1e9 degrees of freedom rounds by some 1e-6 of it.
+        // χ² with two degrees of freedom: e^(−11/4). The tail of F with 1e9 degrees of freedom rounds by
+        // some 1e-6 of it.
         assert!((scored.p_value / f64::exp(-2.75) - 1.0).abs() < 1e-5, "{}", scored.p_value);
         let expected = [(-0.25, 0.375_f64.sqrt()), (1.5, 0.5_f64.sqrt())];
         for ((size, sigma), (of, sd)) in scored.estimates.iter().zip(expected) {
@@ -212,8 +219,8 @@ mod tests {
 
     #[test]
     fn directions_that_a_plausible_effect_does_not_show_are_not_tested() {
-        // A prior sigma of 0.1 on the second: [[4, 0.2], [0.2, 0.03]], eigenvalues 4.0100 and 0.0199. Rejects a threshold in
-        // the parameters' own units, which keeps both.
+        // A prior sigma of 0.1 on the second: [[4, 0.2], [0.2, 0.03]], eigenvalues 4.0100 and 0.0199.
+        // Rejects a threshold in the parameters' own units, which keeps both.
         let scored = tested([1.0, 0.1], (1e9, 1e9));
         assert_eq!(scored.dimensions, 1);
         // The estimates are those of both parameters still.
@@ -232,11 +239,13 @@ mod tests {
     fn the_occam_factor_is_a_mean_over_scales() {
         // Nothing known of the size: the data are as likely with the effect as without.
         assert!((0.5 * 9.0 + log_occam_factor(&[(0.0, 9.0)])).abs() < 1e-15);
-        // Information V = 1e12: each scale 2⁻ˢ costs ½ ln(4⁻ˢ V), and the mean over eleven is Σ2ˢ/11 = 2047/11 over √V. The
-        // smallest 4⁻ˢV is 1e6, hence 1e-5. Rejects a mean of the logs, which gives 5 ln 2 in place of ln 186.
+        // Information V = 1e12: each scale 2⁻ˢ costs ½ ln(4⁻ˢ V), and the mean over eleven is Σ2ˢ/11 =
+        // 2047/11 over √V. The smallest 4⁻ˢV is 1e6, hence 1e-5. Rejects a mean of the logs, which gives 5
+        // ln 2 in place of ln 186.
         let found = log_occam_factor(&[(1e12, 9.0)]);
         assert!((found - (f64::ln(2047.0 / 11.0) - 0.5 * f64::ln(1e12))).abs() < 1e-5, "{found}");
-        // Freedom costs: two such directions cost about twice the root of V, and share their scale: Σ4ˢ/11 over V.
+        // Freedom costs: two such directions cost about twice the root of V, and share their scale: Σ4ˢ/11
+        // over V.
         let found = log_occam_factor(&[(1e12, 0.0), (1e12, 0.0)]);
         let scales: f64 = (0..11).map(|scale| 4_f64.powi(scale)).sum();
         assert!((found - ((scales / 11.0).ln() - f64::ln(1e12))).abs() < 1e-5, "{found}");

@@ -1,4 +1,5 @@
-//! How well sizes are known: by the likelihood, by how runs differ, by what is not known of variants, and by what is not known of the names beside them.
+//! Tests and standard deviations of sizes: by the likelihood, by how runs differ, and by uncertain variants
+//! and causes.
 
 use estimation::{ClusterRobust, Information, RIDGE, inverse, total};
 use model_term::TermParameter;
@@ -19,8 +20,8 @@ pub(crate) struct Test {
     pub(crate) estimates: Vec<(f64, f64)>,
 }
 
-/// The Wald test of a candidate in its fitted model, and along its principal directions in units of the plausible: information
-/// and size.
+/// The Wald test of a candidate in its fitted model, and along its principal directions in units of the
+/// plausible: information and size.
 pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Option<(Test, Vec<(f64, f64)>)> {
     let equations = total(&extended.fit.fit.pass.runs)?;
     let own = extended.columns(candidate);
@@ -30,7 +31,8 @@ pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Opti
     Some(wald_test_of(&projected.information, &extended.estimates(candidate), &parameters, of))
 }
 
-/// The same of estimates with the information that the free columns leave; of `count` observations they leave `freedom`.
+/// The same of estimates with the information that the free columns leave; of `count` observations they
+/// leave `freedom`.
 fn wald_test_of(
     information: &DMatrix<f64>,
     estimates: &DVector<f64>,
@@ -55,11 +57,13 @@ fn wald_test_of(
     (test, directions)
 }
 
-/// Whether a candidate's size stands out against its own scatter from run to run, along itself: runs err alike within themselves (a wheelbase that differs from motion to
-/// motion, measurements that resemble each other), and a likelihood that takes looks for independent believes them too much.
+/// Cluster-robust test of a candidate along its own size. Errors are alike within runs (a wheelbase that
+/// differs from motion to motion, autocorrelated measurements), and a likelihood of independent
+/// measurements makes sizes too significant.
 ///
-/// With u_r the score of run r, the other free columns taken out, the size θ has the variance I⁻¹ (Σ u_r u_rᵀ) I⁻¹ whatever is alike within runs. References: White 1982;
-/// Liang & Zeger 1986.
+/// With u_r the score of run r, the other free columns projected out, the size θ has the variance I⁻¹ (Σ
+/// u_r u_rᵀ) I⁻¹ whatever is alike within runs.
+/// References: White 1982; Liang & Zeger 1986.
 pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usize, level: f64) -> bool {
     // Fewer runs do not say how a size differs between them.
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
@@ -76,15 +80,17 @@ pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usiz
     t.is_nan() || p_of_student(t, along.len() as f64 - 1.0) < level
 }
 
-/// Student's t of θᵀIθ over the scores of the runs along the estimate θ: with n runs, their sum of squares times n/(n − 1).
+/// Student's t of θᵀIθ over the scores of the runs along the estimate θ: with n runs, their sum of squares
+/// times n/(n − 1).
 fn cluster_robust_t(signal: f64, scores: &[f64]) -> f64 {
     let n = scores.len() as f64;
     let squares: f64 = scores.iter().map(|score| score.powi(2)).sum();
     signal / (squares * n / (n - 1.0)).sqrt()
 }
 
-/// Standard deviations of a candidate's sizes by how they differ from run to run, each run's score taken as it would be without the run in the fit; `None` where runs are
-/// too few to say. References: as above; Bell & McCaffrey 2002 (the leverage of a cluster).
+/// Cluster-robust standard deviations of a candidate's sizes, each run's score taken as it would be without
+/// the run in the fit; `None` where runs are too few. References: as above; Bell & McCaffrey 2002 (the
+/// leverage of a cluster).
 fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>> {
     let runs: Vec<_> = extended.fit.fit.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     if runs.len() < MIN_RUNS {
@@ -100,12 +106,14 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
     });
     let ClusterRobust { covariance, left_out: 0 } = ClusterRobust::of(&inverse, clusters) else { return None };
     let n = runs.len() as f64;
-    // As wide as Student's quantile is over so few runs: a size is told with a standard deviation, and read as within 1.96 of it.
+    // As much wider as Student's quantile is than the normal one: a standard deviation is read as 95 %
+    // within 1.96 of it.
     let widening = student_95(n - 1.0) / NORMAL_QUANTILE_95;
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
-/// Each candidate's test beside the others, and by how much what is not known of variants and names widens its sizes.
+/// Each candidate's test beside the others, with the standard deviations that uncertain variants and causes
+/// add.
 pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> Vec<Test> {
     // As wide as Student's quantile is where measurements are few.
     let Some(equations) = total(&model.fit.fit.pass.runs) else { return Vec::new() };
@@ -113,7 +121,8 @@ pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> 
     let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
         let (mut test, _) = wald_test(model, candidate)?;
         test.estimates.iter_mut().for_each(|(_, sigma)| *sigma *= few);
-        // Where runs differ more than measurements say, a size is known no better than by the runs.
+        // Where runs differ more than the measurements' noise explains, the scatter between runs limits
+        // what is known.
         if let Some(over_runs) = over_runs(model, candidate) {
             test.estimates.iter_mut().zip(over_runs).for_each(|((_, sigma), of)| *sigma = sigma.max(of));
         }
@@ -145,7 +154,8 @@ mod tests {
         assert!((test.statistic - 5.5).abs() < 1e-11, "{test:?}");
         assert!((test.estimates[0].1 - 0.375_f64.sqrt()).abs() < 1e-11, "{test:?}");
         assert!((test.estimates[1].1 - 0.5_f64.sqrt()).abs() < 1e-11, "{test:?}");
-        // In principal directions, trace and determinant are those of I, and Σ value·size² is the statistic again.
+        // In principal directions, trace and determinant are those of I, and Σ value·size² is the statistic
+        // again.
         let values: Vec<f64> = directions.iter().map(|(value, _)| *value).collect();
         assert!((values[0] + values[1] - 7.0).abs() < 1e-12 && (values[0] * values[1] - 8.0).abs() < 1e-12);
         let again: f64 = directions.iter().map(|(value, size)| value * size * size).sum();
@@ -154,7 +164,8 @@ mod tests {
 
     #[test]
     fn sizes_of_few_observations_are_known_less_well() {
-        // 8 observations, 6 free: the variance is 8/2 times as large. Rejects shrink in place of its reciprocal.
+        // 8 observations, 6 free: the variance is 8/2 times as large. Rejects shrink in place of its
+        // reciprocal.
         let (test, _) = tested([1.0, 1.0], (8.0, 2.0));
         assert!((test.estimates[1].1 - (0.5_f64 * 4.0).sqrt()).abs() < 1e-11, "{test:?}");
         assert!((test.statistic - 5.5 / 4.0).abs() < 1e-11, "{test:?}");
@@ -165,10 +176,11 @@ mod tests {
 
     #[test]
     fn runs_that_differ_weaken_a_test() {
-        // Four runs of score 1/2 along θ sum to the signal 2: squares 1, times 4/3, t = 2/√(4/3) = √3. Rejects n/(n − 1)
-        // forgotten, which gives 2.
+        // Four runs of score 1/2 along θ sum to the signal 2: squares 1, times 4/3, t = 2/√(4/3) = √3.
+        // Rejects n/(n − 1) forgotten, which gives 2.
         assert!((cluster_robust_t(2.0, &[0.5; 4]) - 3_f64.sqrt()).abs() < 1e-15);
-        // One run that has it all: squares 4, t = √(3/4). Rejects squares of the sum, which are the same for both.
+        // One run that has it all: squares 4, t = √(3/4). Rejects squares of the sum, which are the same
+        // for both.
         assert!((cluster_robust_t(2.0, &[2.0, 0.0, 0.0, 0.0]) - 0.75_f64.sqrt()).abs() < 1e-15);
     }
 }

@@ -1,14 +1,16 @@
-//! How the robot moved before each measurement, by the counts: speed, turn, phases of the wheels, distance since a reversal.
+//! How the robot moved before each measurement, by the counts: speed, turn, phases of the wheels, distance
+//! since a reversal.
 //!
-//! A pass takes these samples beside the innovations where it is asked to, for whoever tests residuals against what was
-//! recorded. They depend on counts, geometry and the filter's pose alone.
+//! A pass takes these samples beside the innovations where it is asked to, for whoever tests residuals
+//! against what was recorded. They depend on counts, geometry and the filter's pose alone.
 
 use kinematics::{Increment, Pose, Side, Wheels};
 
 use crate::model::Model;
 use crate::wheel_angles::WheelInterval;
 
-/// Motion against the direction of travel that counts as a reversal: 1 mm, more than the counts of a standstill.
+/// Motion against the direction of travel that counts as a reversal: 1 mm, more than the counts of a
+/// standstill.
 ///
 /// Tuned: by hand; no record of what on.
 const REVERSAL_M: f64 = 1e-3;
@@ -75,8 +77,8 @@ impl KinematicSampler {
         }
     }
 
-    /// Adds intervals of a run that began at `start_s` on the session's clock. They start at these angles of the wheels, and at
-    /// this distance driven in the session.
+    /// Adds intervals of a run that began at `start_s` on the session's clock. They start at these angles
+    /// of the wheels, and at this distance driven in the session.
     pub(crate) fn add(
         &mut self,
         start_s: f64,
@@ -123,7 +125,8 @@ impl KinematicSampler {
         self.since_reversal_m = self.since_reversal_m.map(|since_m| since_m + increment.distance_m.abs());
     }
 
-    /// The sample at a measurement, and sums that start anew; `None` where no time went by since the one before.
+    /// The sample at a measurement, and sums that start anew; `None` where no time went by since the one
+    /// before.
     pub(crate) fn sample(
         &mut self,
         (segment, measurement): (usize, usize),
@@ -179,7 +182,8 @@ mod tests {
         sampler.add(10.0, &intervals[..2], &model, (Wheels::both(2.0), 5.0));
         let first = sampler.sample((0, 1), Pose::IDENTITY).expect("two seconds went by");
         assert_eq!((first.motion.distance_m, first.duration_s, first.since_reversal_m), (0.1, 2.0, None));
-        // Session's clock and distance at the start of the last interval; 2 rad and the 0.1 rad of the first one.
+        // Session's clock and distance at the start of the last interval; 2 rad and the 0.1 rad of the
+        // first one.
         assert_eq!((first.session_s, first.session_m, first.phase_rad.left), (11.0, 5.1, 2.1));
         // Seen to fail where sums are not reset: a second sample without motion.
         assert_eq!(sampler.sample((0, 2), Pose::IDENTITY), None);

@@ -56,7 +56,7 @@ impl Setting {
     /// That of the data, as far as the user does not say otherwise.
     pub(crate) fn of_data(datasets: &[Dataset], model: &AugmentedModel<'_>, limits: &Limits) -> Option<Self> {
         let first = datasets.first()?;
-        let pace = SamplingStatistics::of(datasets, model);
+        let sampling = SamplingStatistics::of(datasets, model);
         let separation_m = first.robot.wheel_separation_m;
         let (free_m, floor) = match limits.room_m {
             Some(room_m) => (room_m.map(|side| side - CLEARANCE_SEPARATIONS * separation_m), of_room(room_m)),
@@ -68,8 +68,8 @@ impl Setting {
         let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
         let (minutes, time) = minutes(limits, MINUTES);
         let between = |run: &Run| run.truth.len() > 2 || run.displacements.len() > 1 || !run.point_readings.is_empty();
-        let reading = if pace.between_measurements_s <= STANDING_READING_INTERVAL_S {
-            Reading::Even(pace.between_measurements_s)
+        let reading = if sampling.between_measurements_s <= STANDING_READING_INTERVAL_S {
+            Reading::Even(sampling.between_measurements_s)
         } else if runs().any(between) {
             Reading::Standing
         } else {
@@ -77,9 +77,9 @@ impl Setting {
         };
         Some(Self {
             robot: first.robot,
-            top_speed_m_s: limits.top_speed_m_s.unwrap_or(pace.speed_m_s),
+            top_speed_m_s: limits.top_speed_m_s.unwrap_or(sampling.speed_m_s),
             acceleration_m_s2: DEFAULT_ACCELERATION_M_S2,
-            between_rows_s: pace.between_rows_s,
+            between_rows_s: sampling.between_rows_s,
             reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),
             relative: runs().all(|run| run.truth.is_empty() && run.point_readings.is_empty()),
@@ -122,7 +122,7 @@ impl Setting {
         })
     }
 
-    pub(crate) fn pace(&self, speed_m_s: f64) -> motion_programs::DriveLimits {
+    pub(crate) fn drive_limits(&self, speed_m_s: f64) -> motion_programs::DriveLimits {
         motion_programs::DriveLimits {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: speed_m_s,
@@ -147,7 +147,8 @@ fn minutes(limits: &Limits, otherwise: f64) -> (f64, String) {
     (minutes, format!("{minutes:.0} min"))
 }
 
-/// Over how much of the floor a robot moved, metres: of the runs that reached farthest, by what was seen, or by dead reckoning where only displacements were.
+/// Over how much of the floor a robot moved, metres: of the runs that reached farthest, by what was seen,
+/// or by dead reckoning where only displacements were.
 #[must_use]
 pub fn moved_over_m(datasets: &[Dataset]) -> [f64; 2] {
     let mut sides = [0.0_f64; 2];

@@ -1,7 +1,10 @@
-//! What to drive to see what would not have shown: manoeuvres are added as long as they bring something into sight, by what they bring a minute.
+//! The next experiment where there is nothing to discriminate: manoeuvres are added as long as they make
+//! effects detectable, by their value per minute.
 //!
-//! An effect is in sight when a size that would be large for a real robot shows with nine chances in ten (√λ = 4.57). Before there is any data the three geometry parameters of
-//! the drive count too, by the logarithm of their standard deviations (Wald 1943, D-optimum designs); adding the best run again and again is Wynn's rule (1970).
+//! An effect is detectable when a plausible size of it is detected with probability 0.9 (√λ = 4.57). Before
+//! there are any data the three geometry parameters of the drive count too, by the logarithm of their
+//! standard deviations (Wald 1943, D-optimum designs). Adding the best run again and again is Wynn's rule
+//! (1970).
 
 use std::collections::BTreeMap;
 
@@ -80,8 +83,9 @@ fn some_shapes(candidates: &[Candidate]) -> Vec<Candidate> {
         .collect()
 }
 
-/// How well a target's most telling parameter shows at a size that would be large, in standard deviations, and the smallest size that would show.
-fn shown(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<(f64, Smallest)> {
+/// How well a target's most telling parameter shows at a size that would be large, in standard deviations,
+/// and the smallest size that would show.
+fn detectability_of(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<(f64, Smallest)> {
     let information = frame.information(equations, &target.columns, &frame.free)?;
     let parameters = target.candidate.parameters().into_iter().enumerate();
     parameters
@@ -94,11 +98,15 @@ fn shown(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<
 }
 
 /// For each effect its best variant.
-fn all_shown(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> Vec<(&'static str, f64, Smallest)> {
+fn detectability_of_all(
+    frame: &Frame,
+    equations: &NormalEquations,
+    targets: &[Target],
+) -> Vec<(&'static str, f64, Smallest)> {
     targets
         .chunk_by(|a, b| a.id == b.id)
         .filter_map(|variants| {
-            let best = variants.iter().filter_map(|target| shown(frame, equations, target));
+            let best = variants.iter().filter_map(|target| detectability_of(frame, equations, target));
             let (sigmas, smallest) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
             Some((variants[0].id, sigmas, smallest))
         })
@@ -107,7 +115,10 @@ fn all_shown(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> 
 
 /// How many effects are in sight, those half in sight in part.
 fn in_sight(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
-    all_shown(frame, equations, targets).iter().map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0)).sum()
+    detectability_of_all(frame, equations, targets)
+        .iter()
+        .map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0))
+        .sum()
 }
 
 /// Runs added one pair after the other, by what they bring a minute, as long as there is time.
@@ -151,21 +162,21 @@ fn mix(
     (parts, equations, minutes)
 }
 
-/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into sight late makes earlier runs needless, and what never did
-/// made some in vain.
+/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into
+/// sight late makes earlier runs needless, and what never did made some in vain.
 fn pruned<'i>(
     parts: &mut Vec<Part>,
     options: &[(Manoeuvre, NormalEquations)],
     before: &NormalEquations,
     after: &NormalEquations,
-    shown: impl Fn(&NormalEquations) -> Vec<&'i str>,
+    detected: impl Fn(&NormalEquations) -> Vec<&'i str>,
 ) -> NormalEquations {
-    let all = shown(after);
+    let all = detected(after);
     let of = |parts: &[Part]| with_parts(before, parts, options);
     for index in (0..parts.len()).rev() {
         while parts[index].pairs > 0 {
             parts[index].pairs -= 1;
-            if shown(&of(parts)) != all {
+            if detected(&of(parts)) != all {
                 parts[index].pairs += 1;
                 break;
             }
@@ -198,11 +209,12 @@ pub(super) fn show(
     let frame = Frame::of(&model.fit, &all);
     let options = equations_of(&model.fit, &all, setting, manoeuvres);
     let (mut parts, after, _) = mix(&options, &before, setting, |equations| in_sight(&frame, equations, &targets));
-    let after =
-        pruned(&mut parts, &options, &before, &after, |equations| ids_shown(&all_shown(&frame, equations, &targets)));
+    let after = pruned(&mut parts, &options, &before, &after, |equations| {
+        detected_ids(&detectability_of_all(&frame, equations, &targets))
+    });
     let minutes: f64 = parts.iter().map(|part| f64::from(part.pairs) * part.manoeuvre.cost(setting).minutes).sum();
-    let was: Vec<&str> = ids_shown(&all_shown(&frame, &before, &targets));
-    let now: Vec<_> = all_shown(&frame, &after, &targets)
+    let was: Vec<&str> = detected_ids(&detectability_of_all(&frame, &before, &targets));
+    let now: Vec<_> = detectability_of_all(&frame, &after, &targets)
         .into_iter()
         .filter(|(id, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA && !was.contains(id))
         .collect();
@@ -236,8 +248,8 @@ fn from_size(smallest: &Smallest) -> String {
     format!("shows from {} = {:.2e}{unit} on", smallest.parameter, smallest.value)
 }
 
-fn ids_shown<'s>(shown: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
-    shown.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
+fn detected_ids<'s>(all: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
+    all.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
 }
 
 /// What to drive before there is any data.
@@ -247,7 +259,8 @@ pub struct ScenarioPlan {
     pub scenario: String,
     /// What to drive.
     pub next_experiment: NextExperiment,
-    /// Standard deviations that the runs will leave of the geometry parameters that they determine, metres, by the names of `calibrate`.
+    /// Standard deviations that the runs will leave of the geometry parameters that they determine, metres,
+    /// by the names of `calibrate`.
     pub sigmas: BTreeMap<String, f64>,
     /// What will show, from which size on.
     pub shows: Vec<Blind>,
@@ -282,7 +295,8 @@ pub enum PlanError {
     },
 }
 
-/// What to drive with a scenario's robot before there is any data, so that its three geometry parameters are determined well and few effects stay out of sight.
+/// What to drive with a scenario's robot before there is any data, so that its three geometry parameters
+/// are determined well and few effects stay out of sight.
 ///
 /// # Errors
 /// [`PlanError`] when floor, time or instruments allow nothing.
@@ -323,7 +337,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         .filter(|(_, relative)| **relative < UNDETERMINED_GEOMETRY_SIGMA)
         .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
-    let all = all_shown(&frame, &after, &targets);
+    let all = detectability_of_all(&frame, &after, &targets);
     let (shows, detectability): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA);
     let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
@@ -338,7 +352,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         why: format!("it does not go with what is driven: {how}"),
         smallest_detectable: None,
     }));
-    let predicts = shows.iter().map(|shown| (shown.id.clone(), shown.why.clone())).collect();
+    let predicts = shows.iter().map(|detected| (detected.id.clone(), detected.why.clone())).collect();
     let lengths = if sigmas.len() == relative.len() {
         format!(
             "determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %",
@@ -366,7 +380,8 @@ fn spread(frame: &Frame, equations: &NormalEquations) -> f64 {
         .map_or(0.0, |(_, covariance)| (0..Column::GEOMETRY.len()).map(|k| 0.5 * covariance[(k, k)].ln()).sum())
 }
 
-/// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the least that anything errs.
+/// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the
+/// least that anything errs.
 fn noise(scenario: &Scenario) -> Option<Noise> {
     let (xy_m, theta_rad) = scenario.instruments.iter().find_map(|instrument| match *instrument {
         Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => Some((sigma_xy_m, sigma_theta_rad)),

@@ -1,7 +1,9 @@
 //! What each name says that the planned runs will show, written down before they are driven.
 //!
-//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
-//! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
+//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the
+//! plan; what is told is where the instrument then sees the robot against dead reckoning with the
+//! calibrated lengths alone, at the instant and in the component at which the names differ most for what is
+//! known.
 
 use estimation::{Column, EndError, Model, ModelFit, NormalEquations};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -16,7 +18,8 @@ use crate::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
 use crate::settings::plan::{DERIVATIVE_STEP_SIGMAS, PREDICTION_INSTANTS, SINGLE_MEASUREMENT_SIGMAS, WHEEL_PHASES};
 
-/// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the name, and variance by the noise.
+/// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the
+/// name, and variance by the noise.
 #[derive(Debug, Clone)]
 struct Measured {
     mean: Vector3<f64>,
@@ -54,28 +57,28 @@ pub(super) fn predictions(
         let components = if setting.sees_heading { 3 } else { 2 };
         for index in 0..of_names[0].len() {
             for component in 0..components {
-                let seen: Vec<Measured> = of_names.iter().map(|name| name[index].clone()).collect();
-                let apart = |(a, b): &(usize, usize)| {
-                    let (a, b) = (&seen[*a], &seen[*b]);
+                let measured: Vec<Measured> = of_names.iter().map(|name| name[index].clone()).collect();
+                let difference = |(a, b): &(usize, usize)| {
+                    let (a, b) = (&measured[*a], &measured[*b]);
                     let var = a.known_var[component] + b.known_var[component] + a.noise_var[component];
                     (a.mean[component] - b.mean[component]).abs() / var.max(f64::MIN_POSITIVE).sqrt()
                 };
-                let sigmas = discriminated.iter().map(apart).fold(f64::INFINITY, f64::min);
+                let sigmas = discriminated.iter().map(difference).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
                     let at = Where {
                         direction: index / PREDICTION_INSTANTS,
                         share: shares()[index % PREDICTION_INSTANTS],
                         component,
                     };
-                    best = Some((sigmas, *part, at, seen));
+                    best = Some((sigmas, *part, at, measured));
                 }
             }
         }
     }
-    let (sigmas, part, at, seen) = best?;
+    let (sigmas, part, at, measured) = best?;
     let unit = if at.component == 2 { "rad" } else { "m" };
-    let values = rivals.rival_columns.iter().zip(&seen).map(|(rival_columns, seen)| {
-        let (value, var) = (seen.mean[at.component], (seen.known_var + seen.noise_var)[at.component]);
+    let values = rivals.rival_columns.iter().zip(&measured).map(|(rival_columns, measured)| {
+        let (value, var) = (measured.mean[at.component], (measured.known_var + measured.noise_var)[at.component]);
         (rival_columns.candidate.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
     });
     let predicted = Predicted {
@@ -84,7 +87,7 @@ pub(super) fn predictions(
         component: ["along", "across", "heading"][at.component].to_owned(),
         values: values.collect(),
     };
-    let mut sentence = text::where_to_look(&part, &at);
+    let mut sentence = text::where_to_measure(&part, &at);
     if sigmas < SINGLE_MEASUREMENT_SIGMAS {
         sentence.push_str(" No single measurement tells them apart: all measurements of the runs together do.");
     }
@@ -96,8 +99,9 @@ fn shares() -> [f64; PREDICTION_INSTANTS] {
     std::array::from_fn(|instant| (instant + 1) as f64 / PREDICTION_INSTANTS as f64)
 }
 
-/// Where the measurements of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
-fn looks_at(index: usize) -> impl Iterator<Item = usize> {
+/// Where the measurements of a direction and an instant stand among those of all runs, which are driven
+/// direction by direction and phase by phase.
+fn phases_at(index: usize) -> impl Iterator<Item = usize> {
     let (direction, instant) = (index / PREDICTION_INSTANTS, index % PREDICTION_INSTANTS);
     (0..WHEEL_PHASES).map(move |phase| (direction * WHEEL_PHASES + phase) * PREDICTION_INSTANTS + instant)
 }
@@ -172,9 +176,9 @@ impl PlannedRun {
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
         let mean = |index, of: &dyn Fn(usize) -> Vector3<f64>| {
-            looks_at(index).map(of).sum::<Vector3<f64>>() / WHEEL_PHASES as f64
+            phases_at(index).map(of).sum::<Vector3<f64>>() / WHEEL_PHASES as f64
         };
-        let seen = (0..here.len() / WHEEL_PHASES).map(|index| {
+        let measured = (0..here.len() / WHEEL_PHASES).map(|index| {
             let own = mean(index, &|measurement| here[measurement]);
             let noise = mean(index, &|measurement| self.noise[measurement]);
             let spread =
@@ -187,7 +191,7 @@ impl PlannedRun {
             });
             Measured { mean: own, known_var, noise_var: (noise + spread) / self.runs }
         });
-        Some(seen.collect())
+        Some(measured.collect())
     }
 }
 

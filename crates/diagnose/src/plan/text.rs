@@ -58,7 +58,7 @@ const fn noun(schedule: &Schedule) -> &'static str {
     }
 }
 
-pub(super) fn where_to_look(part: &Part, at: &Where) -> String {
+pub(super) fn where_to_measure(part: &Part, at: &Where) -> String {
     let schedule = &part.manoeuvre.schedule;
     let (direction, noun) = (direction(schedule, at.direction), noun(schedule));
     let when =
