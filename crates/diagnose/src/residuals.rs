@@ -115,6 +115,9 @@ fn degrees(angle_rad: f64) -> f64 {
     wrap_to_pi(angle_rad).to_degrees()
 }
 
+/// The value of a covariate at a measurement; `None` where it has none.
+type CovariateValue = dyn Fn(&Conditions<'_>) -> Option<f64>;
+
 /// A covariate of a measurement, and how it is cut into bins.
 struct Covariate {
     key: String,
@@ -124,7 +127,7 @@ struct Covariate {
     periodic: bool,
     /// A covariate that spans less than this is not drawn.
     min_span: f64,
-    value: Box<dyn Fn(&Conditions<'_>) -> Option<f64>>,
+    value: Box<CovariateValue>,
 }
 
 /// Key, label, unit, whether it is periodic, the least span that is drawn, and the value.
