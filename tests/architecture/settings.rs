@@ -209,7 +209,7 @@ fn every_setting_has_a_source_and_the_document_lists_it() {
     assert!(
         found == expected,
         "{DOCUMENT}, line {}: run YAIR_UPDATE_DOCS=1 cargo test --test architecture settings",
-        line.map_or_else(|| found.lines().count().min(expected.lines().count()), |line| line) + 1
+        line.unwrap_or_else(|| found.lines().count().min(expected.lines().count())) + 1
     );
 }
 
