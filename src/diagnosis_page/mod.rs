@@ -100,7 +100,7 @@ impl Page<'_> {
         for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "residuals") {
             writeln!(page, "![{alt}]({stem}.svg)\n")?;
         }
-        if !self.residuals.against.is_empty() {
+        if !self.residuals.by_covariate.is_empty() {
             writeln!(
                 page,
                 "Every covariate is drawn in [residuals-all.svg](residuals-all.svg); the numbers are in [residuals.json](residuals.json).\n"
@@ -134,9 +134,9 @@ impl Page<'_> {
     }
 
     fn alternatives(&self, page: &mut String) -> std::fmt::Result {
-        let asked = self.alternatives.iter().filter(|alternative| alternative.fate != Status::NotShown);
+        let asked = self.alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
         let (standing, others): (Vec<_>, Vec<_>) =
-            asked.partition(|alternative| alternative.fate != Status::DoesNotStandOut);
+            asked.partition(|alternative| alternative.status != Status::NotSignificant);
         if standing.is_empty() && others.is_empty() {
             return Ok(());
         }
@@ -155,7 +155,7 @@ impl Page<'_> {
                     alternative.id,
                     alternative.z,
                     alternative.to_the_best,
-                    words::fate(alternative)
+                    words::status(alternative)
                 )?;
             }
             writeln!(page)?;

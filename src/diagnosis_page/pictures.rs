@@ -30,8 +30,8 @@ fn chi_square(against: &ResidualsByCovariate) -> f64 {
 
 /// Covariates with which the calibrated model's residuals go, the strongest first.
 pub(super) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
-    let tests: usize = residuals.against.iter().map(|against| against.components.len()).sum();
-    let mut all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
+    let tests: usize = residuals.by_covariate.iter().map(|against| against.components.len()).sum();
+    let mut all: Vec<&ResidualsByCovariate> = residuals.by_covariate.iter().collect();
     // p-values of large statistics are all zero in a double: the statistic itself goes on.
     all.sort_by(|a, b| chi_square(b).total_cmp(&chi_square(a)));
     let level = STANDS_OUT / tests.max(1) as f64;
@@ -48,7 +48,7 @@ pub(super) fn pictures(residuals: &Residuals, next: Option<&NextExperiment>, ext
         let labels: Vec<&str> = matter.iter().map(|against| &against.label[..]).collect();
         let alt = format!("Mean residuals against {}", labels.join(", "));
         pictures.push(("residuals", alt, figure("Residuals against what matters most", &matter, residuals, extended)));
-        let all: Vec<&ResidualsByCovariate> = residuals.against.iter().collect();
+        let all: Vec<&ResidualsByCovariate> = residuals.by_covariate.iter().collect();
         let alt = "Mean residuals against every covariate".to_owned();
         pictures.push(("residuals-all", alt, figure("Residuals against every covariate", &all, residuals, extended)));
     }
@@ -60,7 +60,7 @@ pub(super) fn pictures(residuals: &Residuals, next: Option<&NextExperiment>, ext
 
 fn figure(title: &str, against: &[&ResidualsByCovariate], residuals: &Residuals, extended: bool) -> Figure {
     let scatter = |name: &str| {
-        let of = residuals.against.iter().flat_map(|against| &against.components);
+        let of = residuals.by_covariate.iter().flat_map(|against| &against.components);
         of.filter(|component| component.component == name).map(|component| 1e3 * component.scatter).fold(0.0, f64::max)
     };
     let caption = format!(

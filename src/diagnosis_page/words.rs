@@ -114,12 +114,12 @@ pub(super) fn question(check: &Check) -> String {
 }
 
 /// Why an alternative was not named.
-pub(super) fn fate(alternative: &Alternative) -> &'static str {
-    match alternative.fate {
+pub(super) fn status(alternative: &Alternative) -> &'static str {
+    match alternative.status {
         Status::Found => "found",
-        Status::NotToldApart => "cannot be told from what was found",
+        Status::NotDiscriminated => "cannot be told from what was found",
         Status::ExplainsLess => "explains less than what was found, or nothing beside it",
-        Status::DoesNotStandOut => "not significant",
-        Status::NotShown => "these data could not show it",
+        Status::NotSignificant => "not significant",
+        Status::NotDetectable => "these data could not show it",
     }
 }

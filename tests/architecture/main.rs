@@ -11,6 +11,7 @@ mod documents;
 mod effect_ids;
 mod file_graph;
 mod files;
+mod settings;
 #[path = "../support/mod.rs"]
 mod support;
 mod words;

@@ -1,4 +1,4 @@
-//! What else was asked of the data, and why it was not named: the first scan, effect by effect.
+//! The catalogued effects that are not in the model, and why: the first scan, effect by effect.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::cause::Cause;
 use crate::finding::Finding;
 use crate::ranking::tests_in;
 use crate::selection::SearchResult;
-use crate::settings::SCAN_LEVEL;
+use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
@@ -14,30 +14,34 @@ use crate::statistics::z_of_p;
 pub struct Alternative {
     /// The effect.
     pub id: String,
-    /// How far out a normal variable of its chance would be, trials of variants paid for.
+    /// Standard normal quantile of its p-value, corrected for the variants tried.
     pub z: f64,
-    /// Log of the chance of the data with the effect over that without; to second order, before any refit.
+    /// Log Bayes factor of the effect over none; to second order, before any refit.
     pub log_odds: f64,
     /// The same less that of the best.
     pub to_the_best: f64,
     /// What became of it.
-    pub fate: Status,
+    #[serde(rename = "fate")]
+    pub status: Status,
 }
 
 /// What became of an alternative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// The first name of a finding.
+    /// The most probable cause of a finding.
     Found,
-    /// Among the names of a finding.
-    NotToldApart,
-    /// It stands out alone, but explains less than what was found, beside which it is not needed.
+    /// Another cause of a finding.
+    #[serde(rename = "not_told_apart")]
+    NotDiscriminated,
+    /// It is significant alone, but explains less than what was found and is not needed beside that.
     ExplainsLess,
-    /// It does not stand out.
-    DoesNotStandOut,
-    /// These data could not show it.
-    NotShown,
+    /// It is not significant.
+    #[serde(rename = "does_not_stand_out")]
+    NotSignificant,
+    /// It is not detectable in these data.
+    #[serde(rename = "not_shown")]
+    NotDetectable,
 }
 
 /// The alternatives, most probable first.
@@ -49,19 +53,23 @@ pub(crate) fn alternatives(found: &SearchResult<'_>, findings: &[Finding]) -> Ve
         .iter()
         .map(|entry| {
             let (id, log_odds) = (entry.scored.candidate.id(), entry.scored.log_odds);
-            let z = if entry.p_value > 1e-290 { z_of_p(entry.p_value) } else { entry.scored.statistic.sqrt() };
-            let fate = if findings.iter().any(|finding| *finding.first() == Cause::Effect(id)) {
+            let z = if entry.p_value > MIN_QUANTILE_P_VALUE {
+                z_of_p(entry.p_value)
+            } else {
+                entry.scored.statistic.sqrt()
+            };
+            let status = if findings.iter().any(|finding| *finding.first() == Cause::Effect(id)) {
                 Status::Found
             } else if findings.iter().any(|finding| finding.names(&Cause::Effect(id))) {
-                Status::NotToldApart
+                Status::NotDiscriminated
             } else if entry.scored.dimensions == 0 {
-                Status::NotShown
+                Status::NotDetectable
             } else if entry.p_value * tests > SCAN_LEVEL {
-                Status::DoesNotStandOut
+                Status::NotSignificant
             } else {
                 Status::ExplainsLess
             };
-            Alternative { id: id.to_owned(), z, log_odds, to_the_best: log_odds - best, fate }
+            Alternative { id: id.to_owned(), z, log_odds, to_the_best: log_odds - best, status }
         })
         .collect();
     all.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.id.cmp(&b.id)));

@@ -1,4 +1,5 @@
-//! A fit with candidate terms: the augmented model, its cost against that of others, and refits with other terms.
+//! A fit with candidate terms: the augmented model, its cost against that of others, and refits with other
+//! terms.
 
 use std::ops::Range;
 
@@ -6,6 +7,7 @@ use estimation::{Column, ModelFit, NormalEquations, total};
 use nalgebra::DVector;
 
 use crate::candidate::{Candidate, terms};
+use crate::settings::search::{MIN_TAKEN_FRACTION, OUTLIER_COST};
 
 /// A fit with effects.
 #[derive(Debug, Clone)]
@@ -37,26 +39,24 @@ impl<'a> AugmentedModel<'a> {
     }
 }
 
-/// −log likelihood of a fit over as many innovations as the fullest of those compared: a measurement that one fit takes for an outlier is charged as one.
+/// Negative log likelihood of a fit over as many innovations as the fullest of those compared. A
+/// measurement that one fit rejects is charged as an outlier.
 pub(crate) fn cost(fit: &ModelFit<'_>, count: f64) -> f64 {
     total(&fit.solution.pass.runs).map_or(f64::INFINITY, |sum| sum.cost() + left_out_cost(&sum, count))
 }
 
-/// What the innovations that are missing to a number of them cost: each lies as far off as an outlier does at least, and has a variance as the others have.
+/// Cost of the innovations that are missing to a count: each costs as much as an outlier at the gate, and
+/// has the mean variance of the others.
 pub(crate) fn left_out_cost(equations: &NormalEquations, count: f64) -> f64 {
-    // Half of the χ² with three degrees of freedom at which a measurement is an outlier, a component.
-    const OUTLIER: f64 = 0.5 * 25.9 / 3.0;
-    (count - equations.count).max(0.0) * (OUTLIER + 0.5 * equations.log_det / equations.count.max(1.0))
+    (count - equations.count).max(0.0) * (OUTLIER_COST + 0.5 * equations.log_det / equations.count.max(1.0))
 }
 
 pub(crate) fn count(fit: &ModelFit<'_>) -> f64 {
     fit.solution.pass.runs.iter().map(|run| run.count).sum()
 }
 
-/// A fit that takes a smaller share of the measurements that another one takes has lost the robot.
-const MIN_FOLLOWED: f64 = 0.5;
-
-/// The model with other candidates, fitted from where it stands, and where steps stray from the base too: the likelier of the two. `None` when both diverge.
+/// The model with other candidates, fitted from where it stands, and where steps stray from the base too:
+/// the likelier of the two. `None` when both diverge.
 pub(crate) fn refit<'a>(
     base: &ModelFit<'a>,
     from: &AugmentedModel<'a>,
@@ -70,18 +70,18 @@ pub(crate) fn refit<'a>(
         let own = known.map(|index| from.estimates(index).as_slice().to_vec());
         estimates.extend(own.filter(|own| own.len() == none.len()).unwrap_or(none));
     }
-    let follows = |fit: &ModelFit<'_>| {
+    let takes_enough = |fit: &ModelFit<'_>| {
         fit.solution.model.term_values.iter().all(|size| size.is_finite())
-            && count(fit) > MIN_FOLLOWED * count(&from.fit)
+            && count(fit) > MIN_TAKEN_FRACTION * count(&from.fit)
     };
-    let near = from.fit.extended_from(estimates, &mut terms(&candidates)).ok().filter(follows);
-    let near = match near {
+    let from_here = from.fit.extended_from(estimates, &mut terms(&candidates)).ok().filter(takes_enough);
+    let from_here = match from_here {
         Some(fit) if !fit.solution.left_basin => return Some(AugmentedModel { fit, candidates }),
-        near => near,
+        from_here => from_here,
     };
-    let anew = base.extended(&mut terms(&candidates)).ok().filter(follows);
-    let most = [&near, &anew].into_iter().flatten().map(count).fold(0.0, f64::max);
-    let fit = near.into_iter().chain(anew).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
+    let from_base = base.extended(&mut terms(&candidates)).ok().filter(takes_enough);
+    let most = [&from_here, &from_base].into_iter().flatten().map(count).fold(0.0, f64::max);
+    let fit = from_here.into_iter().chain(from_base).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
     Some(AugmentedModel { fit, candidates })
 }
 

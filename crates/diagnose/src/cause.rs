@@ -38,7 +38,8 @@ pub(crate) enum Basis {
     Products(usize),
     /// Failed tests of the residuals that nothing explains.
     FailedTests(Vec<Check>),
-    /// Odometry is uncorrelated with what the instrument measured: noise of wheel, turn, position and heading to the best fit.
+    /// Odometry is uncorrelated with what the instrument measured: noise of wheel, turn, position and
+    /// heading to the best fit.
     Uncorrelated([f64; 4]),
     /// So many outlying rows of the log.
     OutlyingRows(f64),

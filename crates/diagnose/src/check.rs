@@ -26,7 +26,7 @@ impl Component {
     }
 }
 
-/// What a test asks.
+/// What is tested.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Check {
     /// Mean normalised innovation squared of a component.
@@ -93,6 +93,6 @@ pub(crate) enum ResidualPersistence {
     Persistent,
     /// The next are off the other way: one measurement erred.
     Reverting,
-    /// Neither beyond chance.
+    /// Neither is significant.
     Undecided,
 }

@@ -1,5 +1,6 @@
 //! Covariates that depend on the records: those of runs, and cycles of a wheel's turn.
 
+use crate::settings::search::WHEEL_CYCLES;
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
 use kinematics::Side;
@@ -19,12 +20,9 @@ pub(crate) fn values_of_runs(fit: &ModelFit<'_>, key: &str) -> Vec<f64> {
     runs.map(|segments| segments[0].info.covariates.get(key).copied().unwrap_or(0.0)).collect()
 }
 
-/// Cycles in one turn of a wheel: gear teeth, spokes, poles, the turns of a motor.
-const CYCLES: [u8; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24];
-
 /// What a wheel may do several times in each turn.
 pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
     let channel = if side == Side::Left { Channel::LeftWheel } else { Channel::RightWheel };
     let phases = |cycles| [Covariate::CosPhase(side, cycles), Covariate::SinPhase(side, cycles)];
-    CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
+    WHEEL_CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
 }

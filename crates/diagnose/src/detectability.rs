@@ -1,14 +1,17 @@
-//! What this data could not have shown, and from which size on everything else would have.
+//! What is not detectable in these data, and the detection limits of everything else.
 //!
-//! A size shows with nine chances in ten at a false-alarm rate of 1e-3 when √λ = 4.57 (discovery by a score test; λ = size² of the projected information).
+//! A size is detected with probability 0.9 at a false-positive rate of 1e-3 when √λ = 4.57. The test is a
+//! score test; λ = size² of the projected information.
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::document::{Blind, Smallest};
 use crate::fit_cache::FitCache;
-use crate::settings::DETECTION_SQRT_LAMBDA;
+use crate::settings::levels::DETECTION_SQRT_LAMBDA;
+use crate::settings::search::MAX_DETECTION_LIMIT_PRIOR_SIGMAS;
 
-/// The smallest size of every candidate that would have shown beside a model; second, those of which even a large size would not have.
+/// Detection limit of every candidate beside a model; second, the candidates whose limit is above a
+/// plausible size.
 pub(crate) fn detectability(
     model: &AugmentedModel<'_>,
     catalogue: &[Candidate],
@@ -17,7 +20,7 @@ pub(crate) fn detectability(
     let mut best: Vec<(Blind, f64)> = Vec::new();
     for scored in known.beside(model, catalogue) {
         let id = scored.candidate.id();
-        // The parameter that shows soonest, the others at rest, in units of what would be large.
+        // The parameter with the lowest detection limit in prior standard deviations, the others fixed.
         let smallest = scored
             .parameters
             .iter()
@@ -27,7 +30,7 @@ pub(crate) fn detectability(
             .min_by(|a, b| (a.1 / a.0.prior_sigma).total_cmp(&(b.1 / b.0.prior_sigma)));
         let entry = match smallest {
             // A million times what would be large is rounding, not information.
-            Some((parameter, size)) if size < 1e6 * parameter.prior_sigma => {
+            Some((parameter, size)) if size < MAX_DETECTION_LIMIT_PRIOR_SIGMAS * parameter.prior_sigma => {
                 // A ratio has no unit in print.
                 let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
                 let why = if size > parameter.prior_sigma {

@@ -13,13 +13,14 @@ use crate::candidate::{Candidate, mean_terms};
 use crate::check::TestResult;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
-use crate::findings::findings;
+use crate::findings::{StageResults, findings};
 use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
-use crate::record_faults::{Fault, fault, follows, rejected_share, sessions};
+use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
+use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
 use crate::text;
 
 /// What to leave out.
@@ -61,7 +62,7 @@ pub struct Diagnosis {
     pub extended: Result<Scenario, String>,
     /// What the calibrated and the extended model leave, against everything recorded.
     pub residuals: Residuals,
-    /// Every effect that was asked for, and what became of it.
+    /// Every effect that was tested, and what became of it.
     pub alternatives: Vec<Alternative>,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
@@ -86,11 +87,6 @@ impl FittedModel {
         crate::candidate::terms(&self.candidates)
     }
 }
-
-/// A model that leaves out more of the measurements is none.
-const MAX_REJECTED: f64 = 0.2;
-/// With fewer measurements a run, a fit that follows nothing may have gone astray by itself: no fault is named then that the log does not show.
-const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 
 fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
     let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
@@ -117,7 +113,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
     let measured = sessions(datasets);
     let first = EVERY_MEASUREMENT.fit(&measured);
     let outlying = first.as_ref().is_ok_and(|first| {
-        rejected_share(first) > MAX_REJECTED && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
+        rejected_share(first) > MAX_REJECTED_FRACTION && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
     });
     match fault(datasets, first.as_ref().ok(), &options.without, outlying) {
         Some(found) => {
@@ -135,7 +131,7 @@ pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits)
         None => {
             let first = first?;
             let share = rejected_share(&first);
-            if share > MAX_REJECTED {
+            if share > MAX_REJECTED_FRACTION {
                 return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
             }
             Ok(continued(datasets, first, &[], options, limits))
@@ -151,19 +147,26 @@ fn continued(
     limits: &Limits,
 ) -> Diagnosis {
     // Where the counts do not follow the robot at all, no small effect has a meaning.
-    let lost = !follows(&base);
-    let catalogue = if lost { Vec::new() } else { mean_terms(&options.without) };
+    let uncorrelated = !is_correlated(&base);
+    let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let asked = mean_structure(datasets, base, &catalogue, restored);
+    let structure = mean_structure(datasets, base, &catalogue, restored);
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
-    let findings = findings(&asked, (log.as_ref(), spans.as_ref()), faults, lost, &options.without);
-    let model = asked.model();
-    let (gain, gain_why_null) = gain_of(&asked.base, model);
-    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut asked.found.known.clone());
-    let next = next_experiment(datasets, (&asked.base, &asked.found), (model, &catalogue, &blind_to), limits);
+    let findings = findings(&StageResults {
+        structure: &structure,
+        log: log.as_ref(),
+        spans: spans.as_ref(),
+        faults,
+        uncorrelated,
+        without: &options.without,
+    });
+    let model = structure.model();
+    let (gain, gain_why_null) = gain_of(&structure.base, model);
+    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
+    let next = next_experiment(datasets, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits);
     let extended = crate::extended_scenario::scenario_of(datasets, model);
-    let residuals = residuals(&asked.base, model);
-    let alternatives = alternatives(&asked.found, &findings);
+    let residuals = residuals(&structure.base, model);
+    let alternatives = alternatives(&structure.found, &findings);
     let names: Vec<String> = datasets
         .iter()
         .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
@@ -172,7 +175,7 @@ fn continued(
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
         sentence: text::summary(&findings, gain.as_ref()),
-        checks: asked.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
+        checks: structure.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
         findings: findings.iter().map(text::finding).collect(),
         blind_to,
         sensitivity,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::settings::search::MATERIAL_DRIFT_INCREASE;
 use calib::{CalibrationReport, Names};
 use motion_programs::Schedule;
 use serde::Serialize;
@@ -14,7 +15,7 @@ pub enum Verdict {
     Consistent,
     /// Every finding has one name.
     Named,
-    /// Some finding has several names that this data cannot tell apart.
+    /// Some finding has several causes that these data do not discriminate.
     Ambiguous,
     /// Some finding is not in the catalogue.
     Unlisted,
@@ -29,7 +30,7 @@ pub struct Document {
     pub verdict: Verdict,
     /// In a sentence.
     pub sentence: String,
-    /// What was asked of the residuals that the final model leaves.
+    /// The tests of the residuals that the final model leaves.
     pub checks: Vec<Check>,
     /// What was found.
     pub findings: Vec<Finding>,
@@ -44,7 +45,7 @@ pub struct Document {
     /// Why there is no gain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_why_null: Option<String>,
-    /// What to drive to tell names apart.
+    /// What to drive to discriminate the causes.
     pub next_experiment: Option<NextExperiment>,
     /// Why there is nothing to drive.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -63,7 +64,7 @@ pub struct Check {
     pub name: String,
     /// What was computed.
     pub statistic: f64,
-    /// Its chance when nothing is wrong.
+    /// Its p-value: the probability of as large a statistic when nothing is wrong.
     pub p_value: f64,
     /// Whether it passes among all checks together (Holm).
     pub passes: bool,
@@ -76,17 +77,17 @@ pub struct Finding {
     pub id: String,
     /// Names that this data cannot tell apart, most probable first.
     pub names: Vec<String>,
-    /// Of the first name, among all names tried.
+    /// Probability of the first cause among all that were tried.
     pub probability: f64,
-    /// How far out a normal variable of this chance would be.
+    /// Standard normal quantile of the p-value.
     pub z: f64,
-    /// Chance of so large an effect when there is none; trials of variants paid for.
+    /// Probability of so large an effect when there is none, corrected for the variants tried.
     pub p_value: f64,
     /// Sizes of the first name.
     pub parameters: BTreeMap<String, Value>,
     /// For people.
     pub sentence: String,
-    /// The term, when no name of the catalogue fits.
+    /// The sparse term, when no catalogued effect fits.
     pub unlisted_term: Option<UnlistedTerm>,
 }
 
@@ -104,9 +105,11 @@ pub struct Value {
 /// A term outside of the catalogue.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnlistedTerm {
-    /// `along`, `across` or `yaw` of the motion, or `seen_along`, `seen_across`, `seen_heading` of what the instrument sees.
+    /// `along`, `across` or `yaw` of the motion, or `seen_along`, `seen_across`, `seen_heading` of what the
+    /// instrument sees.
     pub channel: String,
-    /// Its rate, or its size where it is seen, is the coefficient times the product of these; `1` for none. `kind = "term"` in a scenario takes them.
+    /// Its rate, or its size where it is seen, is the coefficient times the product of these; `1` for none.
+    /// `kind = "term"` in a scenario takes them.
     pub covariates: Vec<String>,
     /// In m/s or rad/s; in metres or radians where it is seen.
     pub coefficient: f64,
@@ -121,7 +124,7 @@ pub struct Blind {
     pub id: String,
     /// Why it does not show, or how sharply it would.
     pub why: String,
-    /// With nine chances in ten at a false-alarm rate of 1e-3; `None` when no size would show.
+    /// With probability 0.9 at a false-positive rate of 1e-3; `None` when no size is detectable.
     pub smallest_detectable: Option<Smallest>,
 }
 
@@ -143,25 +146,23 @@ pub struct Gain {
     pub held_out_runs: usize,
     /// Log likelihood of a scalar observation: extended − base.
     pub log_score_per_observation: Compared,
-    /// Final position error of dead reckoning over the way: base − extended.
+    /// Final position error of dead reckoning over the distance: base − extended.
     pub drift_percent: Option<Compared>,
 }
 
-/// A drift that grows by less than this share is no reason to leave out what looks show.
-const MATERIAL: f64 = 0.05;
-
 impl Gain {
-    /// Does odometry drift more with the extended model, for certain and by a twentieth or more? Then it is none, whatever it says of single measurements.
+    /// Whether odometry drifts more with the extended model, beyond the 95 % interval and by a material
+    /// share. Such a model is refused, whatever it gains on single measurements.
     #[must_use]
     pub fn drifts_more(&self) -> bool {
         self.drifts_more_by(1.0)
     }
 
-    /// The same so many times as far out as the 95 % interval reaches.
-    pub(crate) fn drifts_more_by(&self, reaches: f64) -> bool {
+    /// The same at so many half-widths of the 95 % interval.
+    pub(crate) fn drifts_more_by(&self, half_widths: f64) -> bool {
         self.drift_percent.as_ref().is_some_and(|drift| {
-            let (mean, reach) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));
-            mean + reaches * reach < 0.0 && drift.extended > (1.0 + MATERIAL) * drift.base
+            let (mean, half_width) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));
+            mean + half_widths * half_width < 0.0 && drift.extended > (1.0 + MATERIAL_DRIFT_INCREASE) * drift.base
         })
     }
 }
@@ -188,7 +189,7 @@ pub struct NextExperiment {
     pub why: String,
     /// What each name predicts, or from which size on an effect would show.
     pub predicts: BTreeMap<String, String>,
-    /// The predictions as numbers, where names are to be told apart.
+    /// The predictions as numbers, where causes are to be discriminated.
     pub predicted: Option<Predicted>,
     /// What to drive, in words.
     pub drive: String,
@@ -219,7 +220,8 @@ pub struct PlannedSession {
     pub schedules: Vec<Schedule>,
 }
 
-/// What each name says that one kind of run will show: where the instrument sees the robot against dead reckoning with the calibrated lengths alone.
+/// What each name says that one kind of run will show: where the instrument sees the robot against dead
+/// reckoning with the calibrated lengths alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Predicted {
     /// `forward`, `backward`, `clockwise` or `counter-clockwise`.

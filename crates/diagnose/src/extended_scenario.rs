@@ -1,4 +1,5 @@
-//! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry, estimated noise, found effects, and what was driven.
+//! The robot as found, as a scenario that the simulator drives: nominal values, calibrated geometry,
+//! estimated noise, found effects, and what was driven.
 
 use std::collections::BTreeMap;
 
@@ -13,21 +14,18 @@ use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario}
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
+use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
 
-/// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is diagnosed lies behind the encoders.
+/// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
+/// diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
-/// A controller regulates on counts much finer than most logs' ticks.
-const MIN_COUNTS: f64 = 40_000.0;
-/// Measurements farther apart than this, in a run of a few, are readings of a standing robot.
-pub(crate) const READ_STANDING_S: f64 = 2.0;
-
 /// The scenario, or why it cannot be written.
 pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let nominal = first.robot;
     let fit = &model.fit.solution;
-    let counts = nominal.ticks_per_rev.unwrap_or(MIN_COUNTS);
-    let per_tick = (MIN_COUNTS / counts).ceil().max(1.0);
+    let counts = nominal.ticks_per_rev.unwrap_or(MIN_CONTROLLER_COUNTS);
+    let per_tick = (MIN_CONTROLLER_COUNTS / counts).ceil().max(1.0);
     let mut robot: Robot = toml::from_str(STAND_IN).map_err(|error| error.message().to_owned())?;
     robot.left_wheel_diameter_m = nominal.left_wheel_diameter_m;
     robot.right_wheel_diameter_m = nominal.right_wheel_diameter_m;
@@ -40,7 +38,7 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
     robot.points = stated.collect();
     let sigma_xy_m = fit.noise.sigma(NoiseComponent::MeasurementPosition);
     let sigma_theta_rad = fit.noise.sigma(NoiseComponent::MeasurementHeading);
-    let instrument = if sampling.between_measurements_s > READ_STANDING_S {
+    let instrument = if sampling.between_measurements_s > STANDING_READING_INTERVAL_S {
         if robot.points.len() < 2 {
             let half_m = 0.5 * nominal.wheel_separation_m;
             let mark = |id: &str, y_m| Mark { id: id.to_owned(), x_m: 0.0, y_m };
@@ -92,7 +90,8 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
         noise: Noise { wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel), sensitivity_sigma: 0.0 },
         placement: Placement { half_width_m: 0.05, half_width_rad: 0.02 },
         budget: None,
-        log: (sampling.between_rows_s < READ_STANDING_S).then_some(Log { interval_s: sampling.between_rows_s }),
+        log: (sampling.between_rows_s < STANDING_READING_INTERVAL_S)
+            .then_some(Log { interval_s: sampling.between_rows_s }),
         instruments: vec![instrument],
         effects,
         protocols: protocols(datasets),

@@ -1,4 +1,5 @@
-//! Findings: candidate causes with their probabilities, significance and parameter values, and the doubts that are on them.
+//! Findings: candidate causes with their probabilities, significance and parameter values, and the doubts
+//! that are on them.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,12 @@ use crate::record_faults::Fault;
 use crate::residual_tests::Checked;
 use crate::rivals::Name;
 use crate::selection::SearchResult;
-use crate::settings::{LOW_SIGNIFICANCE, MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
+use crate::settings::findings::{
+    LACK_OF_FIT_LEVEL, NONE_OF_CAUSES_ODDS, PART_OF_STRONGER_RATIO, PART_OF_STRONGER_RATIO_IF_FULL, UNCATALOGUED_PRIOR,
+};
+use crate::settings::levels::{
+    LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
+};
 use crate::statistics::{sidak, z_of_p};
 use crate::wald::Test;
 
@@ -105,20 +111,17 @@ fn trials(found: &SearchResult<'_>, candidate: &Candidate) -> usize {
 /// Whether an effect that a search found is of low significance.
 pub(crate) fn is_of_low_significance(found: &SearchResult<'_>, index: usize) -> bool {
     let (candidate, test) = (&found.model.candidates[index], &found.tests[index]);
-    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE
+    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE_SIGMAS
 }
-
-/// Probability that a finding has an uncatalogued cause that looks like one of the catalogue: one in twenty, as the blind benchmark finds.
-const UNCATALOGUED: f64 = 0.05;
 
 /// The log of that probability over that of a catalogued cause.
 pub(crate) fn uncatalogued_log_odds() -> f64 {
-    (UNCATALOGUED / (1.0 - UNCATALOGUED)).ln()
+    (UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).ln()
 }
 
 fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
-    let weights: f64 = names.iter().map(|name| relative_odds(name.log_odds, top)).sum();
+    let total_odds: f64 = names.iter().map(|name| relative_odds(name.log_odds, top)).sum();
     let p_value = sidak(test.p_value, trials);
     let mut causes: Vec<Cause> = names.iter().map(|name| name.candidate.cause()).collect();
     if names.iter().any(|name| name.outdone) {
@@ -126,7 +129,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
     }
     Finding {
         causes,
-        probability: (1.0 - UNCATALOGUED) * if weights > 0.0 { 1.0 / weights } else { 1.0 },
+        probability: (1.0 - UNCATALOGUED_PRIOR) * if total_odds > 0.0 { 1.0 / total_odds } else { 1.0 },
         z: z(test, p_value),
         p_value,
         parameters: parameters(candidate, &test.estimates),
@@ -135,9 +138,10 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
     }
 }
 
-/// The standard normal quantile of a probability; where that is below what a double holds, from the statistic itself.
+/// The standard normal quantile of a probability; where that is below what a double holds, from the
+/// statistic itself.
 fn z(test: &Test, p_value: f64) -> f64 {
-    if p_value > 1e-290 { z_of_p(p_value) } else { test.statistic.sqrt() }
+    if p_value > MIN_QUANTILE_P_VALUE { z_of_p(p_value) } else { test.statistic.sqrt() }
 }
 
 /// The finding of a sparse term at the end of a model's candidates.
@@ -160,7 +164,7 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
 /// Something is left, and nothing that was tried explains it.
 pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     let failed: Vec<Check> = checked.checks.iter().filter(|test| !test.passes).map(|test| test.check.clone()).collect();
-    // Heavy tails have names of their own: what residuals depend on says how sure it is.
+    // Heavy tails have causes of their own: the p-value is that of the tests of dependence.
     let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
@@ -168,30 +172,22 @@ pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
     Some(of_causes(vec![Cause::Unknown], worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 
-/// A finding beside an uncatalogued one, or beside a noise effect, whose z is below this share of that one's may be a part of it.
-const DOUBTFUL: f64 = 3.0;
-
-/// By how much more where as many effects were found as are sought, and there is still something left.
-const DOUBTFUL_IF_FULL: f64 = 3.0;
-
-/// Says of mean effects that one uncatalogued term would do as well, with these odds over them.
+/// Doubts mean effects: one uncatalogued term explains as much, with these odds over them.
 pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
     for finding in findings.iter_mut().filter(|finding| finding.is_mean()) {
         finding.or_unlisted(odds, Doubt::TermDoesAsWell);
     }
 }
 
-/// p-value at which the effects found do not explain all that is there though they do.
-const LACK_OF_FIT: f64 = 0.05;
-
-/// Says of the effects found, where no other doubt is on them, that they may not be what is there where the score of an uncatalogued term is still significant beside them,
-/// by more than what their form may err by. A p-value speaks against what it was computed under by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+/// Doubts effects that no other doubt is on, where the score of an uncatalogued term is significant beside
+/// them by more than the error of their form. A p-value speaks against its hypothesis by no more than 1/(−e
+/// p ln p) (Sellke, Bayarri & Berger 2001).
 pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
-    if p_value >= LACK_OF_FIT {
+    if p_value >= LACK_OF_FIT_LEVEL {
         return;
     }
-    let against = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    let odds = (against * UNCATALOGUED / (1.0 - UNCATALOGUED)).min(1.0);
+    let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
+    let odds = (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0);
     let is_incomplete =
         |finding: &&mut Finding| finding.is_sure() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {
@@ -199,19 +195,15 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
     }
 }
 
-/// Odds that none of the candidates of a finding of low significance is right: of such findings of the blind benchmark seven of ten have the right one among theirs, of
-/// others forty-nine of fifty.
-const NONE_OF_THEM: f64 = 3.0 / 7.0;
-
-/// Says of the effects found, where no other doubt is on them, that they may be something else where they are of low significance.
+/// Doubts effects of low significance that no other doubt is on.
 pub(crate) fn or_of_low_significance(findings: &mut [Finding]) {
-    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE) {
-        finding.or_unlisted(NONE_OF_THEM, Doubt::LowSignificance);
+    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE_SIGMAS) {
+        finding.or_unlisted(NONE_OF_CAUSES_ODDS, Doubt::LowSignificance);
     }
 }
 
-/// Says of causes that they may be part of an uncatalogued one that is significant as well, the more so where as many effects were found as are sought. A noise effect
-/// keeps its name first.
+/// Doubts findings that may be part of a stronger uncatalogued or noise finding. The margin is wider where
+/// as many effects were found as are sought. A noise effect keeps its cause first.
 pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let strongest = |findings: &[Finding], is: fn(&Finding) -> bool| {
         findings.iter().filter(|finding| is(finding)).map(|finding| finding.z).fold(0.0, f64::max)
@@ -220,19 +212,19 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let scatter = strongest(findings, |finding| has_sign(finding.first().id(), Sign::ScatterWithTurn));
     for finding in findings.iter_mut().filter(|finding| !finding.is_unlisted()) {
         let is_mean = finding.is_mean();
-        let stands_out = unlisted * if full && is_mean { DOUBTFUL_IF_FULL } else { 1.0 };
-        if is_mean && (finding.z < stands_out || DOUBTFUL * finding.z < scatter) {
+        let limit = unlisted * if full && is_mean { PART_OF_STRONGER_RATIO_IF_FULL } else { 1.0 };
+        if is_mean && (finding.z < limit || PART_OF_STRONGER_RATIO * finding.z < scatter) {
             finding.causes.retain(|cause| !cause.is_unlisted());
             finding.causes.insert(0, Cause::Unknown);
             finding.doubts.push(Doubt::ProbablyPartOfUnlisted);
-        } else if finding.z < DOUBTFUL * stands_out {
+        } else if finding.z < PART_OF_STRONGER_RATIO * limit {
             finding.or_unlisted(1.0, Doubt::PartOfUnlisted);
         }
     }
 }
 
-/// The counts do not follow the robot, and no gross fault explains it.
-pub(crate) fn of_lost(base: &ModelFit<'_>) -> Finding {
+/// Odometry is uncorrelated with the measurements, and no record fault explains it.
+pub(crate) fn of_uncorrelated(base: &ModelFit<'_>) -> Finding {
     let sigmas = NoiseComponent::ALL.map(|component| base.solution.noise.sigma(component));
     of_causes(vec![Cause::Unknown], 0.0, BTreeMap::new(), Basis::Uncorrelated(sigmas))
 }
@@ -250,7 +242,8 @@ pub(crate) fn of_spans(spans: Option<&TestResult>) -> Option<Finding> {
     Some(of_causes(vec![Cause::Unknown], test.p_value, BTreeMap::new(), Basis::OtherClock(test.statistic)))
 }
 
-/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to be named.
+/// Wheels that are another robot's by a factor: a fault that multiplies the counts, unless that is not to
+/// be named.
 pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
     let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
     let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;
@@ -292,7 +285,7 @@ fn has_sign(id: &str, sign: Sign) -> bool {
     hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign))
 }
 
-/// A finding of what has no mean: causes that are as probable as each other, or an unknown one where there is none.
+/// A finding without a mean: causes of equal probability, or an unknown one where there is none.
 pub(crate) fn of_causes(
     mut causes: Vec<Cause>,
     p_value: f64,
@@ -302,12 +295,13 @@ pub(crate) fn of_causes(
     if causes.is_empty() {
         causes.push(Cause::Unknown);
     }
-    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED) / causes.len() as f64 };
+    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) / causes.len() as f64 };
     Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new() }
 }
 
-/// A noise effect by candidates each with the log of its likelihood: the likeliest first, without those that cannot be it, as another of them or `any`
-/// cause does better. An unknown cause, where it may be one, is as likely as they are on average.
+/// A noise effect by the log likelihood of each candidate cause. The likeliest comes first. Those that
+/// another cause, or `any`, exceeds by the margin are left out. An unknown cause, where there may be one,
+/// is as likely as the others on average.
 pub(crate) fn of_likely_scatter(
     mut likely: Vec<(&'static str, f64)>,
     any: f64,
@@ -317,7 +311,7 @@ pub(crate) fn of_likely_scatter(
 ) -> Finding {
     likely.sort_by(|a, b| b.1.total_cmp(&a.1));
     let best = likely.first().map_or(0.0, |(_, log)| *log);
-    let weights: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
+    let total_odds: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
     let named = if or_unlisted { likely.len() as f64 / (likely.len() + 1) as f64 } else { 1.0 };
     likely.retain(|(_, log)| *log > best.max(any) - MIN_LOG_ODDS_MARGIN);
     let mut causes: Vec<Cause> = likely.into_iter().map(|(id, _)| Cause::Effect(id)).collect();
@@ -325,7 +319,7 @@ pub(crate) fn of_likely_scatter(
         causes.push(Cause::Unknown);
     }
     let finding = of_causes(causes, p_value, BTreeMap::new(), basis);
-    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED) * named / weights };
+    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) * named / total_odds };
     Finding { probability, ..finding }
 }
 
@@ -385,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_term_stays_what_it_is_when_something_else_may_do_the_same() {
+    fn a_term_keeps_its_cause_beside_a_doubt() {
         let term = UnlistedTerm { channel: "yaw".to_owned(), covariates: vec![], coefficient: 1.0, sigma: 0.1 };
         let mut finding = of_causes(vec![Cause::Term(term)], 1e-9, BTreeMap::new(), Basis::Products(300));
         let before = finding.clone();

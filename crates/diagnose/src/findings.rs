@@ -1,4 +1,5 @@
-//! The findings of all stages in one list: record faults, effects of the mean, sparse terms, noise effects, faults of the log; each with the doubts that the others cast on it.
+//! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log;
+//! and the doubts that they cast on each other. [`findings`] lists the stages in their order.
 
 use crate::cause::Doubt;
 use crate::check::TestResult;
@@ -7,12 +8,10 @@ use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
-use crate::settings::MAX_EFFECTS;
+use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
+use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
 use crate::wald::wald_test;
-
-/// What residuals go with by less chance than this, no scatter makes them go with.
-const BEYOND_SCATTER: f64 = 1e-8;
 
 fn is_scatter(finding: &Finding) -> bool {
     match effects::hypothesis(finding.first().id()) {
@@ -23,63 +22,136 @@ fn is_scatter(finding: &Finding) -> bool {
     }
 }
 
-/// The findings, record faults first and then those of the highest significance. `log`, `spans`: the tests of the log itself; `lost`: the odometry is uncorrelated with what the instrument measured.
-pub(crate) fn findings(
-    asked: &MeanStructure<'_>,
-    (log, spans): (Option<&TestResult>, Option<&TestResult>),
-    faults: &[&Fault],
-    lost: bool,
-    without: &[String],
-) -> Vec<Finding> {
-    // What lies far off by counts that are restored roughly has its name already.
-    let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let mut findings: Vec<Finding> = faults.iter().map(|fault| finding::of_fault(fault)).collect();
-    findings.extend(finding::of_search(&asked.found));
-    let model = asked.model();
-    if let Some(relative_odds) = asked.competing {
+/// What the stages of the diagnosis before found out.
+pub(crate) struct StageResults<'e, 'a> {
+    pub(crate) structure: &'e MeanStructure<'a>,
+    /// The tests of the log itself: its rows, and its time span.
+    pub(crate) log: Option<&'e TestResult>,
+    pub(crate) spans: Option<&'e TestResult>,
+    pub(crate) faults: &'e [&'e Fault],
+    /// The odometry is uncorrelated with what the instrument measured.
+    pub(crate) uncorrelated: bool,
+    /// Effects that are not to be named.
+    pub(crate) without: &'e [String],
+}
+
+impl StageResults<'_, '_> {
+    /// Lost counts were restored roughly: they explain outliers and autocorrelated errors that are left.
+    fn restored(&self) -> bool {
+        self.faults.iter().any(|fault| fault.is_restored_roughly())
+    }
+}
+
+/// A stage: the findings so far, record faults first, to those after it.
+type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
+
+/// The findings, record faults first, then by significance.
+pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
+    let stages: [Stage; 10] = [
+        record_faults,
+        mean_effects,
+        sparse_terms,
+        noise_effects,
+        faults_of_the_log,
+        failed_checks,
+        doubt_parts_of_stronger_findings,
+        doubt_incomplete_models,
+        doubt_low_significance,
+        by_significance,
+    ];
+    stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
+}
+
+fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
+    results.faults.iter().map(|fault| finding::of_fault(fault)).collect()
+}
+
+/// Effects of the mean; where one uncatalogued term explains nearly as much, with that doubt.
+fn mean_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.extend(finding::of_search(&results.structure.found));
+    if let Some(relative_odds) = results.structure.competing {
         finding::beside_unlisted(&mut findings, relative_odds);
     }
-    for (index, p_value, trials) in asked.unlisted.iter().flat_map(UncataloguedTerms::terms) {
+    findings
+}
+
+fn sparse_terms(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let model = results.structure.model();
+    for (index, p_value, trials) in results.structure.unlisted.iter().flat_map(UncataloguedTerms::terms) {
         let test = wald_test(model, index).map(|(test, _)| test);
         findings.extend(test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials)));
     }
-    if lost {
-        findings.push(finding::of_lost(&asked.base));
-    } else if !restored {
-        // What has a size is not told again by its sign.
-        let told = |sign: &Finding| findings.iter().any(|finding| sign.names(finding.first()));
-        let signs: Vec<Finding> = scatter(asked, without).into_iter().filter(|sign| !told(sign)).collect();
+    findings
+}
+
+/// Noise effects, or that odometry is uncorrelated with the measurements. A mean effect of the same cause
+/// excludes a noise effect.
+fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if results.uncorrelated {
+        findings.push(finding::of_uncorrelated(&results.structure.base));
+    } else if !results.restored() {
+        let mut signs = scatter(results.structure, results.without);
+        signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
         findings.extend(signs);
     }
-    let wheels = if lost { None } else { wrong_wheels(&asked.base) };
+    findings
+}
+
+/// What the log or the wheels' sizes show. Faults without a name cast doubt on all findings before them.
+fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let StageResults { structure, log, spans, faults, without, .. } = *results;
+    let wheels = if results.uncorrelated { None } else { wrong_wheels(&structure.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);
     if !nameless.is_empty() {
-        // With times in other units even a gross fault may be an accident.
+        // Where times are in other units, a record fault may be an accident too.
         let sound = spans.is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
             finding.or_unlisted(1.0, Doubt::FaultyRecords);
         }
     }
     findings.extend(nameless);
-    // Something is left that no name explains; a failed check that a scatter explains has its name already.
-    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < BEYOND_SCATTER;
-    let scatters = findings.iter().any(is_scatter) && !asked.checked.checks.iter().any(plainly);
-    let told = asked.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
-    if !(restored || scatters || told) {
-        findings.extend(finding::of_failed_checks(&asked.checked));
+    findings
+}
+
+/// Failed checks that no finding explains. A noise effect explains failed checks, unless residuals depend
+/// on something too plainly.
+fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let StageResults { structure, .. } = results;
+    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < DEPENDENCE_BEYOND_NOISE_LEVEL;
+    let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
+    let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
+    if !(results.restored() || scatters || is_reported) {
+        findings.extend(finding::of_failed_checks(&structure.checked));
     }
-    finding::doubt(&mut findings[faults.len()..], asked.found.model.candidates.len() >= MAX_EFFECTS);
-    // A term without a name that stands out beside all that was found, though not by enough to be a finding.
+    findings
+}
+
+fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let full = results.structure.found.model.candidates.len() >= MAX_EFFECTS;
+    finding::doubt(&mut findings[results.faults.len()..], full);
+    findings
+}
+
+/// An uncatalogued term that is significant beside all that was found, though not by enough to be a finding.
+fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if findings.iter().any(Finding::is_sure)
-        && let Some(left) = lack_of_fit(&asked.base, model)
+        && let Some(left) = lack_of_fit(&results.structure.base, results.structure.model())
     {
         finding::or_incomplete(&mut findings, left);
     }
+    findings
+}
+
+fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     finding::or_of_low_significance(&mut findings);
-    // The plainest first; a gross fault before everything, as everything else was asked of the records without it.
-    findings[faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
+    findings
+}
+
+/// Record faults stay first: everything else is found in the records without them.
+fn by_significance(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings[results.faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     findings
 }

@@ -1,4 +1,4 @@
-//! Scans and fits that have been made of one base: many are asked for again.
+//! Cache of the scans and fits that were made on one base.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::augmented_model::{AugmentedModel, others, refit, without};
 use crate::candidate::Candidate;
 use crate::scan::{Scored, scan};
 
-/// What has been asked of one base: scans of the catalogue's other effects beside models, and fits of models. Many are asked for again.
+/// Scans of the catalogue's other effects beside models, and fits of models, on one base.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FitCache<'a> {
     scans: Vec<(Vec<Candidate>, Vec<Scored>)>,

@@ -1,19 +1,19 @@
-//! What an extension gains on runs that it has not seen: folds by run, each protocol in every fold.
+//! Cross-validated gain of an extended model on held-out runs: folds by run, each protocol in every fold.
 //!
-//! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the noise, four numbers, is that of all runs for both
-//! models. Intervals are over runs (a ratio's linearised standard error with Student's quantile).
+//! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the
+//! noise, four numbers, is that of all runs for both models. Intervals are over runs (a ratio's linearised
+//! standard error with Student's quantile).
 
-use estimation::{Column, EndError, Model, ModelFit, NormalEquations, RIDGE, inverse};
+use estimation::{Column, EndError, Information, Model, ModelFit, NormalEquations, RIDGE, inverse};
 use model_term::ModelTerm;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
 use crate::document::{Compared, Gain};
-use crate::settings::MIN_RUNS;
+use crate::settings::levels::MIN_RUNS;
+use crate::settings::search::{HOLD_OUT_FOLDS, MIN_HELD_OUT_UNITS};
 use crate::statistics::student_95;
-
-const FOLDS: usize = 6;
 
 /// What one held-out unit scores.
 struct Unit {
@@ -23,7 +23,7 @@ struct Unit {
     fold: usize,
 }
 
-/// The gain, or why there is none to tell.
+/// The gain, or why it cannot be computed.
 pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> Result<Gain, String> {
     let (before, reckoned_before) = held_out(&base.fit, &mut terms(&base.candidates))?;
     let (after, reckoned_after) = held_out(&extended.fit, &mut terms(&extended.candidates))?;
@@ -46,12 +46,12 @@ pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> 
         })
         .collect();
     let (mean, error) = ratio(&pairs);
-    let reach = student_95(freedom) * error;
+    let half_width = student_95(freedom) * error;
     let log_score = Compared {
         base: per_observation(&before),
         extended: per_observation(&after),
-        low: mean - reach,
-        high: mean + reach,
+        low: mean - half_width,
+        high: mean + half_width,
     };
     let drift = drift(&reckoned_before, &reckoned_after);
     Ok(Gain { held_out_runs: before.len(), log_score_per_observation: log_score, drift_percent: drift })
@@ -75,8 +75,13 @@ fn drift(before: &[EndError], after: &[EndError]) -> Option<Compared> {
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
     let (mean, error) = ratio(&pairs);
-    let reach = student_95(pairs.len() as f64 - 1.0) * error;
-    Some(Compared { base: percent(&before), extended: percent(&after), low: mean - reach, high: mean + reach })
+    let half_width = student_95(pairs.len() as f64 - 1.0) * error;
+    Some(Compared {
+        base: percent(&before),
+        extended: percent(&after),
+        low: mean - half_width,
+        high: mean + half_width,
+    })
 }
 
 /// Σa/Σb over units and its standard error, linearised.
@@ -98,7 +103,7 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     } else {
         return Err("no run has measurements".to_owned());
     };
-    if units.len() < 3 {
+    if units.len() < MIN_HELD_OUT_UNITS {
         return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
     }
     let fold_of = folds(fit, &units, blocks);
@@ -106,20 +111,13 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     let prior = prior(fit, terms);
     let mut scored: Vec<Unit> = Vec::new();
     let mut models: Vec<Model> = Vec::new();
-    for fold in 0..FOLDS {
+    for fold in 0..HOLD_OUT_FOLDS {
         let mut others = units.iter().zip(&fold_of).filter(|(_, of)| **of != fold).map(|(unit, _)| unit);
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: NormalEquations = first.clone();
         others.for_each(|unit| sum.add(unit, 1.0));
-        let mut own = sum.of(&fit.columns);
-        // What the other runs do not show of an effect is none of it, not any: a payload that only the held-out run carried.
-        for (k, &(size, precision)) in prior.iter().enumerate() {
-            own.matrix[(k, k)] += precision;
-            own.gradient[k] += precision * size;
-        }
-        let covariance = inverse(&own.along(&free).matrix, RIDGE)
+        let step = refit_step(sum.of(&fit.columns), &prior, &free)
             .ok_or("the other runs do not determine the model once some are held out")?;
-        let step: DVector<f64> = &free * (-(covariance * (free.transpose() * own.gradient)));
         let mut model = fit.solution.model.clone();
         fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
@@ -130,7 +128,8 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     }
     let mut ends = Vec::new();
     for (fold, model) in models.iter().enumerate() {
-        // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a part of it.
+        // Blocks of a run lie in several folds: its drift is taken once, under the first fold that holds a
+        // part of it.
         let held =
             |run: (usize, usize)| scored.iter().find(|unit| unit.run == run).is_some_and(|unit| unit.fold == fold);
         ends.extend(fit.dead_reckoned_of(model, terms, held));
@@ -140,7 +139,20 @@ fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec
     Ok((scored, ends))
 }
 
-/// For each column its size and how precisely it is known before: a term's is normal about nothing, as large as is plausible.
+/// One step of the fit to other runs, with the prior of each column: its size, and how precisely it is
+/// known before. What the other runs do not show of an effect, such as a payload that only the held-out run
+/// carried, is then none of it.
+fn refit_step(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -> Option<DVector<f64>> {
+    for (k, &(size, precision)) in prior.iter().enumerate() {
+        own.matrix[(k, k)] += precision;
+        own.gradient[k] += precision * size;
+    }
+    let covariance = inverse(&own.along(free).matrix, RIDGE)?;
+    Some(free * (-(covariance * (free.transpose() * own.gradient))))
+}
+
+/// For each column its size and how precisely it is known before: a term's is normal about nothing, as
+/// large as is plausible.
 fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
     let prior_sigma: Vec<f64> =
         terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.prior_sigma).collect();
@@ -154,26 +166,71 @@ fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
 /// The fold of each unit: each protocol's units in turn.
 fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usize> {
     if blocks {
-        return (0..units.len()).map(|unit| unit % FOLDS).collect();
+        return (0..units.len()).map(|unit| unit % HOLD_OUT_FOLDS).collect();
     }
     let protocol = |run: (usize, usize)| {
         fit.records.segments.iter().find(|segment| segment.run == run).and_then(|segment| segment.info.protocol)
     };
-    let mut seen: Vec<Option<dataset::Protocol>> = Vec::new();
+    let mut protocols: Vec<Option<dataset::Protocol>> = Vec::new();
     let mut order: Vec<(usize, usize)> = units
         .iter()
         .enumerate()
         .map(|(position, unit)| {
             let of = protocol(unit.run);
-            let kind = seen.iter().position(|kind| *kind == of).unwrap_or_else(|| {
-                seen.push(of);
-                seen.len() - 1
+            let kind = protocols.iter().position(|kind| *kind == of).unwrap_or_else(|| {
+                protocols.push(of);
+                protocols.len() - 1
             });
             (kind, position)
         })
         .collect();
     order.sort_unstable();
     let mut fold = vec![0; units.len()];
-    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % FOLDS);
+    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % HOLD_OUT_FOLDS);
     fold
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn information() -> Information {
+        Information {
+            matrix: DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]),
+            gradient: DVector::from_column_slice(&[-2.0, -4.0]),
+        }
+    }
+
+    fn is_near(found: &DVector<f64>, expected: [f64; 2]) -> bool {
+        // The ridge changes a step of order 1 by 1e-11 at most.
+        (found - DVector::from_column_slice(&expected)).amax() < 1e-11
+    }
+
+    #[test]
+    fn the_step_to_other_runs_is_that_on_paper() {
+        let free = DMatrix::identity(2, 2);
+        // −I⁻¹g = −[[3, −2], [−2, 4]]/8 · (−2, −4) = (−1/4, 3/2). Rejects a step along the gradient, of the
+        // other sign.
+        let step = refit_step(information(), &[(0.0, 0.0); 2], &free).expect("determined");
+        assert!(is_near(&step, [-0.25, 1.5]), "{step}");
+        // A prior of precision 1 about nothing, the second size being 2: I = [[4, 2], [2, 4]], g = (−2,
+        // −2), step (1/3, 1/3). Rejects a prior about the estimate, which leaves g as it was.
+        let step = refit_step(information(), &[(0.0, 0.0), (2.0, 1.0)], &free).expect("determined");
+        assert!(is_near(&step, [1.0 / 3.0, 1.0 / 3.0]), "{step}");
+        // Only the first column free: 2/4. Rejects a step of all columns cut to the free ones, −1/4.
+        let first = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+        let step = refit_step(information(), &[(0.0, 0.0); 2], &first).expect("determined");
+        assert!(is_near(&step, [0.5, 0.0]), "{step}");
+    }
+
+    #[test]
+    fn a_gain_per_observation_has_the_error_of_a_ratio() {
+        // Two units of equal count: mean (1 + 3)/2 = 2, residuals ∓1, √(2 · 2/1)/2 = 1. Rejects n/(n − 1)
+        // forgotten: 1/√2.
+        let (mean, error) = ratio(&[(1.0, 1.0), (3.0, 1.0)]);
+        assert_eq!((mean, error), (2.0, 1.0));
+        // Gains in proportion to the counts are no scatter. Rejects a mean of ratios with the scatter of
+        // the gains.
+        assert_eq!(ratio(&[(1.0, 1.0), (3.0, 3.0), (6.0, 6.0)]), (1.0, 0.0));
+    }
 }

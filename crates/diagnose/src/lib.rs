@@ -1,8 +1,11 @@
-//! What a calibrated model gets wrong: residuals → what is wrong → its name, or that it cannot be told → the extended model → the gain on unseen runs.
+//! What a calibrated model gets wrong: residuals → findings and their causes → the extended model → the
+//! gain on held-out runs.
 //!
-//! Order: gross faults by likelihood; a base fit; a score scan over the catalogue's mean terms, each with base and nuisances projected out; refits of the
-//! rivals; checks of what is left; scatter named from failed checks; a sparse term where structure is left that no name explains; the gain on held-out runs.
-//! It never reads what a simulator hid: it depends on the measured records and the hypotheses of [`effects`] alone. docs/diagnose.md says what the numbers mean.
+//! Order: record faults by likelihood; a base fit; a score scan over the catalogue's mean terms, with base
+//! and nuisances projected out; refits of the rivals; tests of the residuals; noise effects by failed
+//! tests; sparse terms where residuals are not explained; the gain on held-out runs. It depends on the
+//! measured records and the hypotheses of [`effects`] alone, never on what a simulator hid.
+//! docs/diagnose.md says what the numbers mean.
 
 mod alternatives;
 mod augmented_model;
@@ -18,6 +21,7 @@ mod finding;
 mod findings;
 mod fit_cache;
 mod gain;
+mod large_errors;
 mod log_rows;
 mod mean_structure;
 mod model_comparison;

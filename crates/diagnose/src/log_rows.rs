@@ -1,62 +1,55 @@
-//! What the records show by themselves, before any model: rows whose counts are not where the rows around them go on, and clocks that do not count the same time.
+//! What the records show before any model: outlying rows, and clocks that do not count the same time.
 //!
-//! A wheel that turns steadily before and after a row turned as fast in between. Of the speeds of two rows before an increment and two after it (the next one
-//! may give back what was astray) the range R is known; were the increment as uncertain as these four, it would be 20 R off with a chance of 1.6e-5 only: P(R < r) ≈
-//! 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables. What is so far off so often has a cause, whether it has a name or not.
+//! A wheel that turns steadily before and after a row turned as fast in between. The speeds of two rows
+//! before an increment and of two after it have the range R; the next row is left out, as it may give back
+//! what was outlying. If the increment were as uncertain as these four, it would be 20 R off with
+//! probability 1.6e-5: P(R < r) ≈ 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables.
 
 use dataset::{Dataset, Odometry, Run, WheelLog};
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::check::{Check, TestResult};
+use crate::settings::records::{
+    COUNT_ROUNDING, LOG_ROWS_LEVEL, MAX_CLOCK_RATIO, OUTLYING_ROW_PROBABILITY, OUTLYING_ROW_RANGES,
+    STANDSTILL_RATE_RATIO,
+};
 
-/// An increment that is off by so many ranges of the four around it is astray.
-const OUTLYING: f64 = 20.0;
-/// Chance of an increment to be that by the scatter of steady wheels.
-const BY_CHANCE: f64 = 1.6e-5;
-/// Two increments of a steady wheel differ by as many counts, and their range is not less.
-const ROUNDING: f64 = 2.0;
-/// A wheel that does less than this share of what the rows around it do stands: a robot may stop for a row.
-const STANDS: f64 = 0.1;
-/// Chance at which a log shows that something is wrong with it.
-const LOG_LEVEL: f64 = 1e-6;
-
-/// A log that lasts so many times as long as what was seen of the robot, or so many times less, is of another clock.
-const OTHER_CLOCK: f64 = 30.0;
-
-/// Whether the log lasts about as long as what was seen: the middle run's ratio. Looks need not begin and end with the log.
+/// Whether log and measurements span about the same time, by the median over the runs of the ratio of
+/// spans.
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let ratio = |run: &Run| {
-        let ends = run.displacements.iter().flat_map(|seen| [seen.t0_s, seen.t1_s]);
-        let seen_s = run.truth.iter().map(|measurement| measurement.t_s).chain(ends);
-        let (first_s, last_s) = seen_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t_s| (a.min(t_s), b.max(t_s)));
+        let ends = run.displacements.iter().flat_map(|displacement| [displacement.t0_s, displacement.t1_s]);
+        let measured_s = run.truth.iter().map(|measurement| measurement.t_s).chain(ends);
+        let (first_s, last_s) =
+            measured_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t_s| (a.min(t_s), b.max(t_s)));
         let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
         (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
     };
     let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
     ratios.sort_by(f64::total_cmp);
     let statistic = *ratios.get(ratios.len() / 2)?;
-    let passes = (OTHER_CLOCK.recip()..OTHER_CLOCK).contains(&statistic);
-    // No chance makes a clock thirty times as fast.
+    let passes = (MAX_CLOCK_RATIO.recip()..MAX_CLOCK_RATIO).contains(&statistic);
+    // No scatter makes a clock thirty times as fast: the p-value is 0 or 1.
     Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
 }
 
-/// How many increments a log has, and how many of them are astray.
+/// Number of increments of a log, and of outlying ones.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Rows {
     all: usize,
     outlying: usize,
 }
 
-/// Asks the counts of all runs; robots that report no counts are not asked.
+/// Tests the counts of all runs; `None` for robots that report none.
 pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
     let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
         let of = of_run(&run.odometry, run.info.continuous);
         Rows { all: sum.all + of.all, outlying: sum.outlying + of.outlying }
     });
-    let chance = Poisson::new(BY_CHANCE * rows.all as f64).ok()?;
-    let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| chance.sf(fewer as u64));
+    let expected = Poisson::new(OUTLYING_ROW_PROBABILITY * rows.all as f64).ok()?;
+    let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| expected.sf(fewer as u64));
     let statistic = rows.outlying as f64;
-    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_LEVEL })
+    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
 }
 
 fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
@@ -76,16 +69,16 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         .map(|(t_s, ticks)| (t_s[1] - t_s[0], (ticks[1] - ticks[0]) as f64))
         .map(|(dt_s, counts)| (dt_s, counts / dt_s))
         .collect();
-    for near in rates.windows(6) {
-        let (dt_s, rate) = near[2];
-        let around = [near[0].1, near[1].1, near[4].1, near[5].1];
+    for window in rates.windows(6) {
+        let (dt_s, rate) = window[2];
+        let around = [window[0].1, window[1].1, window[4].1, window[5].1];
         let mean = around.iter().sum::<f64>() / 4.0;
         let (least, most) =
             around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), rate| (a.min(*rate), b.max(*rate)));
         rows.all += 1;
-        let uncertain = ((most - least) * dt_s).max(ROUNDING);
-        let stands = rate.abs() < STANDS * mean.abs() || mean == 0.0;
-        if !stands && ((rate - mean) * dt_s).abs() > OUTLYING * uncertain {
+        let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING);
+        let is_standing = rate.abs() < STANDSTILL_RATE_RATIO * mean.abs() || mean == 0.0;
+        if !is_standing && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain {
             rows.outlying += 1;
         }
     }
@@ -103,19 +96,19 @@ mod tests {
             let stopped = (3.0..3.04).contains(&t_s);
             if stopped { 0.0 } else { 30_000.0 * (t_s - 0.5).clamp(0.0, 1.0).min((7.0 - t_s).clamp(0.0, 1.0)) }
         };
-        let (mut way, mut last_s) = (0.0, 0.0);
+        let (mut distance, mut last_s) = (0.0, 0.0);
         let row = |row| {
             let t_s = stamp_s(row);
-            way += speed(0.5 * (t_s + last_s)) * (t_s - last_s);
+            distance += speed(0.5 * (t_s + last_s)) * (t_s - last_s);
             last_s = t_s;
-            let counts = f64::round(way) as i64;
+            let counts = f64::round(distance) as i64;
             (t_s, counts)
         };
         (0..400).map(row).unzip()
     }
 
     #[test]
-    fn a_sound_log_has_no_rows_astray() {
+    fn a_sound_log_has_no_outlying_rows() {
         for jitter_s in [0.0, 1e-3, 5e-3] {
             let (t_s, ticks) = column(jitter_s);
             assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, outlying: 0 }, "{jitter_s}");
@@ -123,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_torn_or_lost_with_their_counts_are_astray() {
+    fn rows_that_are_torn_or_lost_with_their_counts_are_outlying() {
         let (t_s, sound) = column(0.0);
         let mut torn = sound.clone();
         [100, 130, 200].into_iter().for_each(|row: usize| torn[row] += 256);

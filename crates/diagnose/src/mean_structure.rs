@@ -1,4 +1,9 @@
 //! The mean model: which effects and sparse terms a base fit needs.
+//!
+//! Stages, each a function of the results before it: search, ungated search, ungated sparse terms,
+//! comparison with one sparse term, thinning of autocorrelated measurements, search at a higher level,
+//! sparse terms beside the effects. Once sparse terms are found, the stages after that leave the model as
+//! it is.
 
 use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
@@ -12,33 +17,31 @@ use crate::model_comparison::{log_bayes_factor, log_odds_margin, relative_odds};
 use crate::record_faults::sessions;
 use crate::residual_tests::{Checked, check};
 use crate::selection::{SearchResult, search, search_ungated};
-use crate::settings::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, UNLISTED_LEVEL};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
 use crate::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
-
-/// Measurements whose errors resemble the ones before by this much, and by so many standard errors, are not taken for independent.
-const CORRELATED: f64 = 0.05;
-
-const CORRELATED_SIGMAS: f64 = 4.0;
 
 const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 fn is_white(checked: &Checked) -> bool {
     let (coefficient, sigmas) = checked.correlation;
-    coefficient.abs() < CORRELATED || (sigmas.abs() < CORRELATED_SIGMAS && !checked.autocorrelated)
+    coefficient.abs() < MIN_AUTOCORRELATION || (sigmas.abs() < AUTOCORRELATION_SIGMAS && !checked.autocorrelated)
 }
 
-/// The mean model after the search: what was found in it, what is there without a name, and the tests of the residuals that are left.
+/// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals
+/// that are left.
 pub(crate) struct MeanStructure<'a> {
     pub(crate) base: ModelFit<'a>,
     pub(crate) found: SearchResult<'a>,
     pub(crate) checked: Checked,
-    /// What is there without a name.
     pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
-    /// Correlation of measurements that follow each other, where they had to be thinned.
+    /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
     pub(crate) correlated: Option<(f64, f64)>,
-    /// A term made looks likelier for certain and odometry drift more: something is there that is not that term.
+    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
+    /// cause is present.
     pub(crate) spurious: bool,
-    /// The chance of one term that is in no catalogue over that of all the names together, where it has any and does not stand in their place.
+    /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it
+    /// replaced them.
     pub(crate) competing: Option<f64>,
 }
 
@@ -47,131 +50,168 @@ impl<'a> MeanStructure<'a> {
     pub(crate) fn model(&self) -> &AugmentedModel<'a> {
         self.unlisted.as_ref().map_or(&self.found.model, |unlisted| &unlisted.model)
     }
+}
 
-    /// Terms without a name are there.
-    fn keep(&mut self, unlisted: UncataloguedTerms<'a>) {
-        self.checked = check(&unlisted.model);
-        self.unlisted = Some(unlisted);
+/// What a stage hands to the next one: effects, sparse terms where any are needed, and the tests of the
+/// residuals left.
+struct MeanModel<'a> {
+    found: SearchResult<'a>,
+    unlisted: Option<UncataloguedTerms<'a>>,
+    checked: Checked,
+    competing: Option<f64>,
+}
+
+impl<'a> MeanModel<'a> {
+    fn of_effects(found: SearchResult<'a>) -> Self {
+        Self { checked: check(&found.model), found, unlisted: None, competing: None }
     }
 
-    /// Holds the names against one term that is in no catalogue: where that explains more than all of them together, something without a name is there. Whether it is.
-    fn compare_with_sparse(&mut self) -> bool {
-        self.competing = None;
-        let alone = AugmentedModel::base(&self.base);
-        if self.found.model.candidates.is_empty() {
-            return false;
-        }
-        let Some(sparse_search) = SparseSearch::beside(&self.base, &alone) else { return false };
-        let named = log_bayes_factor(&alone.fit, &self.found.model);
-        let finding = sparse_search.finding(UNLISTED_LEVEL);
-        let unnamed = finding.as_ref().map_or_else(
-            || sparse_search.log_bayes_factor(),
-            |sparse| sparse_search.log_bayes_factor_of(&sparse.model),
-        );
-        let Some(sparse) = finding.filter(|_| unnamed > named + log_odds_margin(named)) else {
-            // A cause that nobody wrote down is less likely before any data.
-            let unnamed = unnamed + finding::uncatalogued_log_odds();
-            self.competing = Some(relative_odds(unnamed, named)).filter(|_| unnamed > named - MIN_LOG_ODDS_MARGIN);
-            return false;
-        };
-        let instead = UncataloguedTerms::from(&self.base, sparse);
-        let beside = self
-            .terms_beside()
-            .filter(|beside| beside.log_bayes_factor(&alone.fit) >= instead.log_bayes_factor(&alone.fit));
-        if beside.is_none() {
-            // The names only stand round it.
-            self.found.model = alone;
-            self.found.names.clear();
-            self.found.tests.clear();
-        }
-        self.keep(beside.unwrap_or(instead));
-        true
+    fn with_terms(self, unlisted: UncataloguedTerms<'a>) -> Self {
+        Self { checked: check(&unlisted.model), unlisted: Some(unlisted), ..self }
     }
 
-    /// What is there without a name beside the names that were found.
-    fn terms_beside(&self) -> Option<UncataloguedTerms<'a>> {
-        sparse(&self.base, &self.found.model, UNLISTED_LEVEL).map(|sparse| UncataloguedTerms::from(&self.base, sparse))
-    }
-
-    /// Whether more measurements lie far off than chance makes.
+    /// Whether more measurements are outliers than the noise model predicts.
     fn has_outliers(&self) -> bool {
         self.checked.checks.iter().any(|test| test.check == Check::Outliers && !test.passes)
     }
 
-    /// Whether residuals go with something that was recorded.
-    fn depends_on_something(&self) -> bool {
+    /// Whether residuals depend on a recorded quantity.
+    fn shows_dependence(&self) -> bool {
         self.checked.checks.iter().any(TestResult::shows_dependence)
+    }
+
+    /// Uncatalogued terms beside the effects that were found.
+    fn terms_beside(&self, base: &ModelFit<'a>) -> Option<UncataloguedTerms<'a>> {
+        sparse(base, &self.found.model, SPARSE_TERM_LEVEL).map(|sparse| UncataloguedTerms::from(base, sparse))
     }
 }
 
-/// Family-wise rate of false positives of the scan where a check has already found that something is there.
-const SURE_LEVEL: f64 = 0.2;
-
-/// Searches the mean model of a base fit: selection over the catalogue, sparse terms, thinning where residuals are autocorrelated, and a bolder search where residuals
-/// depend on something recorded. `restored`: counts that were lost have been restored, and make later errors alike.
+/// Searches the mean model of a base fit. `restored`: lost counts were restored roughly.
 pub(crate) fn mean_structure<'a>(
     datasets: &'a [Dataset],
     base: ModelFit<'a>,
     catalogue: &[Candidate],
     restored: bool,
 ) -> MeanStructure<'a> {
-    let found = search(&base, catalogue, SCAN_LEVEL, FitCache::default());
-    let checked = check(&found.model);
-    let mut asked =
-        MeanStructure { base, found, checked, unlisted: None, correlated: None, spurious: false, competing: None };
-    if asked.has_outliers()
-        && let Some(found) = search_ungated(&asked.base, &asked.found, catalogue)
-    {
-        asked.checked = check(&found.model);
-        asked.found = found;
+    let model = MeanModel::of_effects(search(&base, catalogue, SCAN_LEVEL, FitCache::default()));
+    let model = search_ungated_if_outliers(&base, model, catalogue);
+    let model = ungated_terms_if_outliers(&base, model);
+    let model = compare_with_sparse(&base, model);
+    let Decorrelated { base, model, correlated, spurious } =
+        thin_if_autocorrelated(datasets, base, model, catalogue, restored);
+    let model = search_if_dependent(&base, model, catalogue);
+    let model = terms_if_dependent(&base, model);
+    let MeanModel { found, unlisted, checked, competing } = model;
+    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+}
+
+/// Where outliers are in excess: what a search among all measurements finds, if it explains the outliers.
+fn search_ungated_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
+    let ungated = if model.has_outliers() { search_ungated(base, &model.found, catalogue) } else { None };
+    ungated.map_or(model, MeanModel::of_effects)
+}
+
+/// Where outliers are in excess and residuals depend on something, but no effect is found: sparse terms
+/// among all measurements.
+fn ungated_terms_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
+    if !(model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence()) {
+        return model;
     }
-    if asked.has_outliers()
-        && asked.found.model.candidates.is_empty()
-        && asked.depends_on_something()
-        && let Some(unlisted) = UncataloguedTerms::ungated_terms(&asked.base)
-    {
-        asked.keep(unlisted);
-        return asked;
+    match UncataloguedTerms::ungated_terms(base) {
+        Some(unlisted) => model.with_terms(unlisted),
+        None => model,
     }
-    if asked.compare_with_sparse() {
-        return asked;
+}
+
+/// Compares the effects with one sparse term. Where that explains more than all effects together, sparse
+/// terms come beside the effects, or replace them if that explains more.
+fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
+    if model.unlisted.is_some() || model.found.model.candidates.is_empty() {
+        return model;
     }
-    // What was lost of the counts and is restored roughly makes measurements after it err alike: they are no fault of the instrument's.
-    if !restored && !is_white(&asked.checked) {
-        // Measurements that resemble each other are believed too much, each for itself. Perhaps a term that is not in the catalogue makes them so; else farther
-        // apart they are independent, and what stands out then may be believed.
-        let tried =
-            sparse(&asked.base, &asked.found.model, UNLISTED_LEVEL).map(|sparse| (check(&sparse.model), sparse));
-        asked.spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
-        let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
-        if let Some((_, sparse)) = explains {
-            asked.keep(UncataloguedTerms::from(&asked.base, sparse));
-            return asked;
-        }
-        if let Ok(thinned) = THINNED.fit(&sessions(datasets)) {
-            asked.correlated = Some(asked.checked.correlation);
-            asked.found = search(&thinned, catalogue, SCAN_LEVEL, FitCache::default());
-            asked.checked = check(&asked.found.model);
-            asked.base = thinned;
-            if asked.compare_with_sparse() {
-                return asked;
-            }
-        }
+    let without = AugmentedModel::base(base);
+    let Some(sparse_search) = SparseSearch::beside(base, &without) else { return model };
+    let named = log_bayes_factor(&without.fit, &model.found.model);
+    let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
+    let unnamed = finding
+        .as_ref()
+        .map_or_else(|| sparse_search.log_bayes_factor(), |sparse| sparse_search.log_bayes_factor_of(&sparse.model));
+    let Some(sparse) = finding.filter(|_| unnamed > named + log_odds_margin(named)) else {
+        // The prior of an uncatalogued cause is lower.
+        let unnamed = unnamed + finding::uncatalogued_log_odds();
+        let competing = Some(relative_odds(unnamed, named)).filter(|_| unnamed > named - MIN_LOG_ODDS_MARGIN);
+        return MeanModel { competing, ..model };
+    };
+    let instead = UncataloguedTerms::from(base, sparse);
+    let log_bayes_factor_instead = instead.log_bayes_factor(&without.fit);
+    let beside = model.terms_beside(base);
+    match beside.filter(|beside| beside.log_bayes_factor(&without.fit) >= log_bayes_factor_instead) {
+        Some(beside) => model.with_terms(beside),
+        None => MeanModel { found: model.found.without_effects(without), ..model }.with_terms(instead),
     }
-    if asked.depends_on_something() {
-        // Something is there: what it is may be asked more boldly.
-        let found = search(&asked.base, catalogue, SURE_LEVEL, asked.found.known.clone());
-        if found.model.candidates.len() > asked.found.model.candidates.len() {
-            asked.checked = check(&found.model);
-            asked.found = found;
-            // What was refused before, or hardly stands out, is one name of what there is.
-            asked.competing = Some(1.0);
-        }
+}
+
+/// The base and the model after autocorrelation of the measurements is dealt with.
+struct Decorrelated<'a> {
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    /// As in [`MeanStructure`].
+    correlated: Option<(f64, f64)>,
+    spurious: bool,
+}
+
+/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, a new
+/// search on them, and its comparison with one sparse term. Autocorrelated measurements taken as
+/// independent make any effect too significant.
+fn thin_if_autocorrelated<'a>(
+    datasets: &'a [Dataset],
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    catalogue: &[Candidate],
+    restored: bool,
+) -> Decorrelated<'a> {
+    // Counts that were restored roughly make the errors of the measurements after them alike; the
+    // instrument has no part in it.
+    if model.unlisted.is_some() || restored || is_white(&model.checked) {
+        return Decorrelated { base, model, correlated: None, spurious: false };
     }
-    if asked.depends_on_something()
-        && let Some(unlisted) = asked.terms_beside()
-    {
-        asked.keep(unlisted);
+    let tried = sparse(&base, &model.found.model, SPARSE_TERM_LEVEL).map(|sparse| (check(&sparse.model), sparse));
+    let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
+    let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
+    if let Some((_, sparse)) = explains {
+        let model = model.with_terms(UncataloguedTerms::from(&base, sparse));
+        return Decorrelated { base, model, correlated: None, spurious };
     }
-    asked
+    let Ok(thinned) = THINNED.fit(&sessions(datasets)) else {
+        return Decorrelated { base, model, correlated: None, spurious };
+    };
+    let correlated = Some(model.checked.correlation);
+    let model = MeanModel::of_effects(search(&thinned, catalogue, SCAN_LEVEL, FitCache::default()));
+    let model = compare_with_sparse(&thinned, model);
+    Decorrelated { base: thinned, model, correlated, spurious }
+}
+
+/// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds
+/// more effects.
+fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
+    if model.unlisted.is_some() || !model.shows_dependence() {
+        return model;
+    }
+    let found = search(base, catalogue, SCAN_LEVEL_IF_DEPENDENT, model.found.known.clone());
+    if found.model.candidates.len() <= model.found.model.candidates.len() {
+        return model;
+    }
+    // What the first search refused, or what is of low significance, is one candidate cause among others.
+    MeanModel { competing: Some(1.0), ..MeanModel::of_effects(found) }
+}
+
+/// Where residuals depend on something recorded still: sparse terms beside the effects.
+fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
+    if model.unlisted.is_some() || !model.shows_dependence() {
+        return model;
+    }
+    match model.terms_beside(base) {
+        Some(unlisted) => model.with_terms(unlisted),
+        None => model,
+    }
 }

@@ -1,7 +1,9 @@
-//! What only scatters: single measurements far off, jumps that stay, measurements that err alike, and turns that scatter more than the wheels explain.
+//! Noise effects: isolated outliers, jumps, autocorrelated measurements, and turns that scatter more than
+//! the wheels explain.
 //!
-//! A scatter has no mean to be scanned: failed checks of the fit show most of it. Noise of the turns is in every fit; a fit without it says what it is worth,
-//! with half a χ² of one degree of freedom for a variance at its boundary (Chernoff 1954; Self & Liang 1987).
+//! A noise effect has no mean to be scanned; failed tests of the residuals show most of them. Turn noise is
+//! in every fit: a fit without it is compared, with half a χ² of one degree of freedom for a variance at
+//! its boundary (Chernoff 1954; Self & Liang 1987).
 
 use std::collections::BTreeMap;
 
@@ -17,64 +19,65 @@ use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
 use crate::outlier_attribution::{ErrorSource, log_likelihoods};
-use crate::residual_tests::what_follows;
+use crate::residual_tests::residual_persistence;
 use crate::run_to_run::differs_from_run_to_run;
-use crate::settings::TURNS_LEVEL;
+use crate::settings::levels::TURN_SCATTER_LEVEL;
+use crate::settings::residuals::{
+    DEPENDENCE_BEYOND_TAILS_LEVEL, ISOLATED_TO_PERSISTENT_RATIO, MAX_OUTLIER_FRACTION, NOISE_EFFECT_LEVEL,
+};
 use crate::statistics::{p_of_chi_square, p_of_z};
 
-/// Gates of what only scatters: each at a family-wise rate of a thousandth or less.
-const SCATTER_LEVEL: f64 = 1e-3;
-/// Where tails are heavy, what residuals seem to go with must do so beyond doubt: few large errors make such a test fail.
-const CERTAINLY: f64 = 1e-6;
-/// With more, it is the model that is off, and not the measurements.
-const MAX_OUTLIERS: f64 = 0.2;
-
 /// Scatter that failed checks show.
-pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
+pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let outliers = asked.checked.outliers;
-    let tests = &asked.checked.checks;
-    let far = outliers.isolated + outliers.staying;
-    if far as f64 > MAX_OUTLIERS * (outliers.measurements + far) as f64 {
+    let outliers = structure.checked.outliers;
+    let tests = &structure.checked.checks;
+    let rejected = outliers.isolated + outliers.persistent;
+    if rejected as f64 > MAX_OUTLIER_FRACTION * (outliers.measurements + rejected) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
-    let turns = of_turns(asked, without_ids);
-    let with_something = tests.iter().filter(|test| test.shows_dependence());
-    let with_something = with_something.map(|test| test.p_value).fold(1.0, f64::min);
+    let turns = of_turns(structure, without_ids);
+    let p_of_dependence = tests.iter().filter(|test| test.shows_dependence());
+    let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
     let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
-    let depends_on_something = with_something < tails.max(CERTAINLY);
+    let is_dependent = p_of_dependence < tails.max(DEPENDENCE_BEYOND_TAILS_LEVEL);
     // After the end of a run nothing follows that could be back.
-    let followed =
-        asked.base.selections.first().is_some_and(|taken| taken.mean_measurements(&asked.base.records) >= 2.0);
-    if followed && outliers.p_value < SCATTER_LEVEL && outliers.isolated >= 3 * outliers.staying {
-        let share = outliers.isolated as f64 / (outliers.measurements + far) as f64;
+    let has_successors =
+        structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
+    if has_successors
+        && outliers.p_value < NOISE_EFFECT_LEVEL
+        && outliers.isolated >= ISOLATED_TO_PERSISTENT_RATIO * outliers.persistent
+    {
+        let share = outliers.isolated as f64 / (outliers.measurements + rejected) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
-        let of = outliers.measurements + far;
+        let of = outliers.measurements + rejected;
         let causes = with_sign(Sign::IsolatedErrors, without_ids);
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
         let basis = Basis::IsolatedErrors(outliers.isolated, of);
         findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
     }
-    if depends_on_something {
-        // Other large errors that go with what was driven are no scatter; but turns that scatter go with everything that turns, by chance, and less so.
-        findings.extend(turns.filter(|turns| turns.p_value < with_something));
+    if is_dependent {
+        // Large errors that depend on what was driven are no noise effect. Turn scatter correlates with
+        // everything that turns, but less than its own significance.
+        findings.extend(turns.filter(|turns| turns.p_value < p_of_dependence));
         return findings;
     }
     if findings.is_empty() {
-        // Tails of one component, and what follows them, say whether the robot jumped or the instrument erred.
+        // Tails of one component, and what follows them, say whether the robot jumped or the instrument
+        // erred.
         let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::DistanceJumps)];
         let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
         let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
-        let far_off = outliers.p_value < SCATTER_LEVEL && (outliers.staying > 0 || !followed);
+        let has_outliers = outliers.p_value < NOISE_EFFECT_LEVEL && (outliers.persistent > 0 || !has_successors);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(component, number, sign)| {
             let fails = test(component).filter(|test| !test.passes);
-            let p_value = fails.map(|test| test.p_value).or(far_off.then_some(outliers.p_value))?;
-            Some((p_value, what_follows(&asked.found.model.fit, number), sign))
+            let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
+            Some((p_value, residual_persistence(&structure.found.model.fit, number), sign))
         });
-        if let Some((p_value, follows, sign)) = jump {
+        if let Some((p_value, persistence, sign)) = jump {
             let named = |signs: &[Sign]| {
                 let mut ids: Vec<&'static str> = Vec::new();
                 for id in signs.iter().flat_map(|sign| finding::with_sign(*sign, without_ids)) {
@@ -85,34 +88,34 @@ pub(crate) fn scatter(asked: &MeanStructure<'_>, without_ids: &[String]) -> Vec<
                 ids
             };
             // What jumps ahead may turn as well: a bump costs one wheel its way.
-            let jumps: &[Sign] = if sign == Sign::DistanceJumps {
+            let signs: &[Sign] = if sign == Sign::DistanceJumps {
                 &[Sign::HeadingJumps, Sign::DistanceJumps]
             } else {
                 &[Sign::HeadingJumps]
             };
-            let (stays, errs) = (named(jumps), named(&[Sign::IsolatedErrors, Sign::TailsAtLowSpeed]));
-            let (ids, any): (_, &[ErrorSource]) = match follows {
-                ResidualPersistence::Persistent => (stays, &[ErrorSource::Robot]),
-                ResidualPersistence::Reverting => (errs, &[ErrorSource::Instrument]),
+            let (jumps, errors) = (named(signs), named(&[Sign::IsolatedErrors, Sign::TailsAtLowSpeed]));
+            let (ids, any): (_, &[ErrorSource]) = match persistence {
+                ResidualPersistence::Persistent => (jumps, &[ErrorSource::Robot]),
+                ResidualPersistence::Reverting => (errors, &[ErrorSource::Instrument]),
                 ResidualPersistence::Undecided => {
-                    ([&stays[..], &errs].concat(), &[ErrorSource::Robot, ErrorSource::Instrument])
+                    ([&jumps[..], &errors].concat(), &[ErrorSource::Robot, ErrorSource::Instrument])
                 }
             };
             // Tails have many causes.
-            let or_unlisted = follows == ResidualPersistence::Undecided;
-            let likelihoods = log_likelihoods(asked.model(), &ids, any);
+            let or_unlisted = persistence == ResidualPersistence::Undecided;
+            let likelihoods = log_likelihoods(structure.model(), &ids, any);
             let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
             let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
-            let basis = Basis::LargeErrors(follows);
+            let basis = Basis::LargeErrors(persistence);
             findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
         }
     }
-    if let Some((coefficient, sigmas)) = asked.correlated
+    if let Some((coefficient, sigmas)) = structure.correlated
         && coefficient > 0.0
     {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        if !causes.is_empty() && (asked.spurious || !asked.found.model.candidates.is_empty()) {
+        if !causes.is_empty() && (structure.spurious || !structure.found.model.candidates.is_empty()) {
             causes.push(Cause::Unknown);
         }
         let basis = Basis::Autocorrelated(coefficient);
@@ -128,13 +131,13 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 }
 
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
-fn of_turns(asked: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
-    let model = asked.model();
+fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
+    let model = structure.model();
     let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
     let most = count(&without).max(count(&model.fit));
     let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
     let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));
-    if p_value >= TURNS_LEVEL {
+    if p_value >= TURN_SCATTER_LEVEL {
         return None;
     }
     let sigma = model.fit.solution.noise.sigma(NoiseComponent::Turn);

@@ -1,16 +1,21 @@
-//! Whose single large errors are: how likely each cause makes what the innovations at and after them look like.
+//! Attribution of large errors: the likelihood of each cause, by the innovations at and after them.
 //!
-//! Model: a large error at look k is a jump of the robot on its way there or an error of the measurement, of unknown size: innovations respond to it linearly, and their normal
-//! equation by its size, (I, u), is what a score test has anyway. The size integrated out, normal about zero with covariance T or one-sided, the chance of the data over
-//! that without it is |1 + TI|^(−½) exp(½ uᵀ(I + T⁻¹)⁻¹u). Causes differ in the directions they jump in and in where they happen:
-//! `bumps` cost one wheel some of its way, anywhere on it; `traction_loss` costs way where a wheel becomes faster and gives some where it becomes slower; `stick_slip` leaves a wheel behind
-//! at starts and stops, and gives it back; `truth_outliers` err in x, y and heading, at any measurement, and at that measurement alone: both displacements that share it are off.
-//! Scales are common to the errors of a cause and integrated over a grid. One error in twenty may be something else's, so none speaks against a cause by more than ln 20.
-//! Jumps and errors in any direction, anywhere, say what a cause without a name would do as well.
+//! Model: a large error at measurement k is a jump of the robot on its way there, or an error of the
+//! measurement, of unknown size. Innovations respond to it linearly, and their normal equation by its size
+//! is (I, u). The size is integrated out, normal about zero with covariance T or one-sided; the likelihood
+//! ratio is |1 + TI|^(−½) exp(½ uᵀ(I + T⁻¹)⁻¹u).
+//!
+//! Causes differ in direction and in place. `bumps` cost one wheel some of its travel, anywhere.
+//! `traction_loss` costs travel where a wheel becomes faster, and gives some where it becomes slower.
+//! `stick_slip` leaves a wheel behind at starts and stops, and gives it back. `truth_outliers` err in x, y
+//! and heading at one measurement: both displacements that share it are off. Scales are common to the
+//! errors of a cause and averaged over a grid. Each error may be another cause's with probability 0.05, so
+//! that none speaks against a cause by more than ln 20. Jumps and errors in any direction say what an
+//! uncatalogued cause would explain.
 //! Reference: Willsky & Jones 1976 (jumps in the innovations of a filter); Tukey 1960 (contamination).
 
 use effects::IsolatedError;
-use estimation::{Column, InnovationComponent, ModelFit, NormalEquations, Segment, total};
+use estimation::{Column, ModelFit, NormalEquations, total};
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -19,64 +24,33 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
+use crate::large_errors::{LargeError, large_errors, mean_speed_m_s};
+use crate::settings::residuals::{
+    ERRORS_PER_PASS, INSTANT_TOLERANCE_S, JUMP_TIME_FRACTIONS, MAX_LARGE_ERRORS, MEASUREMENT_ERROR_SCALES,
+    OTHER_CAUSE_PROBABILITY,
+};
 
-/// An innovation this large, in standard deviations, is one that the tails are made of.
-const LARGE: f64 = 3.5;
-/// Large innovations with so few measurements between them are one error: a filter that followed it wrongly comes back.
-const APART: usize = 3;
-/// Most errors that are asked, the largest: each takes a term's share of a pass.
-const MOST: usize = 24;
-/// Errors that are asked in one pass.
-const AT_ONCE: usize = 4;
-/// Share of the large errors that may have another cause.
-const OTHERS: f64 = 0.05;
-/// Share of the errors of wheels that stick or slide that lie at starts and stops.
-const AT_RAMPS: f64 = 0.9;
-/// A measurement this near to an instant is at it, seconds.
-const AT_S: f64 = 1e-6;
-
-/// Errors of a measurement, metres and radians.
-const ERRORS: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
-
-/// A large error.
-#[derive(Debug, Clone)]
-struct Large {
-    run: (usize, usize),
-    run_id: String,
-    /// The measurement before, and the measurement that is off.
-    from_s: f64,
-    at_s: f64,
-    /// What each wheel went between them.
-    travel_m: Wheels<f64>,
-    is_displacement: bool,
-    /// The way there over that to other measurements, on average.
-    way: f64,
-    /// How much more often than at other measurements wheels that stick or slide err at this one.
-    ramp: f64,
-    z: f64,
-}
-
-/// Places of a jump between two measurements, as shares of the time.
-const PLACES: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
-/// Columns of a large error: each wheel's lost way at each place; way lost for a change of its speed; the error of the measurement, and of the one before; a jump before the measurement.
-const SLIDES: usize = 2 * PLACES.len();
+/// Columns of a large error: travel that each wheel loses at each instant; travel lost for a change of its
+/// speed; errors of the measurement, and of the one before; a jump before the measurement.
+const SLIDES: usize = 2 * JUMP_TIME_FRACTIONS.len();
 const AT: usize = SLIDES + 2;
 const FROM: usize = AT + 3;
 const ANY: usize = FROM + 3;
 const COLUMNS: usize = ANY + 3;
 
 const PARAMETERS: [TermParameter; COLUMNS] = {
-    const WAY: TermParameter = TermParameter { name: "lost_m", unit: "m", prior_sigma: 1e-3 };
+    const LOST: TermParameter = TermParameter { name: "lost_m", unit: "m", prior_sigma: 1e-3 };
     const SLIDE: TermParameter = TermParameter { name: "slides_s", unit: "s", prior_sigma: 1e-2 };
     const ERROR: TermParameter = TermParameter { name: "off_m", unit: "m", prior_sigma: 1e-2 };
     const TURN: TermParameter = TermParameter { name: "off_rad", unit: "rad", prior_sigma: 1e-2 };
-    [WAY, WAY, WAY, WAY, WAY, WAY, SLIDE, SLIDE, ERROR, ERROR, TURN, ERROR, ERROR, TURN, ERROR, ERROR, TURN]
+    [LOST, LOST, LOST, LOST, LOST, LOST, SLIDE, SLIDE, ERROR, ERROR, TURN, ERROR, ERROR, TURN, ERROR, ERROR, TURN]
 };
 
 /// Ahead, aside, and turned.
-const ANYWHERE: [Pose; 3] = [Pose::new(1.0, 0.0, 0.0), Pose::new(0.0, 1.0, 0.0), Pose::new(0.0, 0.0, 1.0)];
+const POSE_AXES: [Pose; 3] = [Pose::new(1.0, 0.0, 0.0), Pose::new(0.0, 1.0, 0.0), Pose::new(0.0, 0.0, 1.0)];
 
-/// What a large error may be: a jump on the way to its look, or an error of one of the two measurements.
+/// The term of a large error: a jump before its measurement, or an error of that measurement or of the one
+/// before.
 #[derive(Debug, Clone)]
 struct Jump {
     run_id: String,
@@ -95,21 +69,22 @@ impl ModelTerm for Jump {
         if middle_s < self.from_s || middle_s > self.at_s || interval.run.id != self.run_id {
             return;
         }
-        let on = |side: Side, way: f64| interval.change(Wheels::from_sides(|of| if of == side { -way } else { 0.0 }));
-        for (index, share) in PLACES.iter().enumerate() {
+        let lost =
+            |side: Side, lost_m: f64| interval.change(Wheels::from_sides(|of| if of == side { -lost_m } else { 0.0 }));
+        for (index, share) in JUMP_TIME_FRACTIONS.iter().enumerate() {
             let instant_s = self.from_s + share * (self.at_s - self.from_s);
             if start_s <= instant_s && instant_s < end_s {
                 for (k, side) in Side::BOTH.into_iter().enumerate() {
-                    gradient[2 * index + k] = on(side, sense(interval.travel_m[side]));
+                    gradient[2 * index + k] = lost(side, sense(interval.travel_m[side]));
                 }
             }
         }
         let (speed_m_s, before_m_s) = (interval.speed_m_s(), interval.previous_speed_m_s());
         for (k, side) in Side::BOTH.into_iter().enumerate() {
-            gradient[SLIDES + k] = on(side, speed_m_s[side] - before_m_s[side]);
+            gradient[SLIDES + k] = lost(side, speed_m_s[side] - before_m_s[side]);
         }
-        if end_s > self.at_s - AT_S {
-            gradient[ANY..].copy_from_slice(&ANYWHERE);
+        if end_s > self.at_s - INSTANT_TOLERANCE_S {
+            gradient[ANY..].copy_from_slice(&POSE_AXES);
         }
     }
 
@@ -118,19 +93,19 @@ impl ModelTerm for Jump {
             return;
         }
         for (at_s, column) in [(self.at_s, AT), (self.from_s, FROM)] {
-            if (measurement.t_s - at_s).abs() < AT_S {
-                gradient[column..column + 3].copy_from_slice(&ANYWHERE);
+            if (measurement.t_s - at_s).abs() < INSTANT_TOLERANCE_S {
+                gradient[column..column + 3].copy_from_slice(&POSE_AXES);
             }
         }
     }
 }
 
-/// The sign of a way; none of no way.
-fn sense(way: f64) -> f64 {
-    if way == 0.0 { 0.0 } else { way.signum() }
+/// The sign of a wheel's travel; 0 of none.
+fn sense(travel_m: f64) -> f64 {
+    if travel_m == 0.0 { 0.0 } else { travel_m.signum() }
 }
 
-/// Whose large errors are.
+/// What errs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ErrorSource {
     /// The robot jumps.
@@ -139,31 +114,33 @@ pub(crate) enum ErrorSource {
     Instrument,
 }
 
-/// Log of the chance of the large errors of a model under each of some causes, and the largest under any cause of some kinds, up to what is common to all; `None` where
-/// there are none, or a cause has no such model.
+/// Log likelihoods of the large errors of a model under each cause, and the largest under any cause of some
+/// sources, up to a common constant. `None` where there are no large errors, or a cause has no such model.
 pub(crate) fn log_likelihoods(
     model: &AugmentedModel<'_>,
     ids: &[&'static str],
     any: &[ErrorSource],
 ) -> Option<(Vec<f64>, f64)> {
     let fit = model.fit.evaluated_ungated();
-    let mut large = large(&fit, &fit.scan(&mut terms(&model.candidates)).innovations);
+    let mut large = large_errors(&fit, &fit.scan(&mut terms(&model.candidates)).innovations);
     large.sort_by(|a, b| b.z.total_cmp(&a.z));
-    large.truncate(MOST);
-    let of_passes: Vec<Vec<Measured>> = large.par_chunks(AT_ONCE).map(|large| seen(model, &fit, large)).collect();
-    let seen = of_passes.concat();
-    if seen.is_empty() {
+    large.truncate(MAX_LARGE_ERRORS);
+    let of_passes: Vec<Vec<ErrorResponse>> =
+        large.par_chunks(ERRORS_PER_PASS).map(|large| responses(model, &fit, large)).collect();
+    let responses = of_passes.concat();
+    if responses.is_empty() {
         return None;
     }
-    let speed_m_s = usual_speed_m_s(&large);
-    let mut causes: Vec<Vec<Vec<f64>>> = ids.iter().map(|id| of_cause(id, &seen, speed_m_s)).collect::<Option<_>>()?;
-    causes.extend(any.iter().map(|source| of_any(*source, &seen)));
+    let speed_m_s = mean_speed_m_s(&large);
+    let mut causes: Vec<Vec<Vec<f64>>> =
+        ids.iter().map(|id| of_cause(id, &responses, speed_m_s)).collect::<Option<_>>()?;
+    causes.extend(any.iter().map(|source| of_any(*source, &responses)));
     let mut likelihoods = of_causes(&causes);
     let any = likelihoods.split_off(ids.len()).into_iter().fold(f64::NEG_INFINITY, f64::max);
     Some((likelihoods, any))
 }
 
-/// The chances of causes, from those of each large error at each of their scales.
+/// Log likelihoods of causes, from those of each large error at each of their scales.
 fn of_causes(causes: &[Vec<Vec<f64>>]) -> Vec<f64> {
     let errors = causes.iter().flatten().map(Vec::len).min().unwrap_or(0);
     let best: Vec<f64> = (0..errors)
@@ -171,7 +148,10 @@ fn of_causes(causes: &[Vec<Vec<f64>>]) -> Vec<f64> {
         .collect();
     let at_scale = |own: &Vec<f64>| -> f64 {
         // Over the best explanation of each: what is common to all causes.
-        own.iter().zip(&best).map(|(own, best)| ((1.0 - OTHERS) * (own - best).exp() + OTHERS).ln()).sum()
+        own.iter()
+            .zip(&best)
+            .map(|(own, best)| ((1.0 - OTHER_CAUSE_PROBABILITY) * (own - best).exp() + OTHER_CAUSE_PROBABILITY).ln())
+            .sum()
     };
     causes.iter().map(|scales| log_mean(&scales.iter().map(at_scale).collect::<Vec<_>>())).collect()
 }
@@ -185,108 +165,42 @@ fn log_mean(logs: &[f64]) -> f64 {
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / count).ln()
 }
 
-/// The large errors, from the innovations on every measurement.
-fn large(fit: &ModelFit<'_>, innovations: &[Vec<InnovationComponent>]) -> Vec<Large> {
-    let Some(phase) = innovations.first() else { return Vec::new() };
-    let segments = &fit.records.segments;
-    let since: Vec<Vec<(f64, Wheels<f64>)>> = segments.iter().map(Segment::since_previous_measurement).collect();
-    let at_ramp: Vec<Vec<bool>> = segments.iter().map(Segment::changes_of_speed).collect();
-    let m_per_rad = fit.solution.model.m_per_rad;
-    // Of each measurement, with the measurement before that is taken: its own error, and where it is.
-    let mut measurements: Vec<(Large, (usize, bool))> = Vec::new();
-    let mut before = None;
-    for of_look in phase.chunk_by(|a, b| (a.segment, a.measurement) == (b.segment, b.measurement)) {
-        let (segment, measurement) = (of_look[0].segment, of_look[0].measurement);
-        let of_segment = &segments[segment];
-        let first = match before {
-            Some((last, taken)) if last == segment => taken + 1,
-            _ if of_segment.is_displacement() => 0,
-            // The segment starts at a measurement.
-            _ => 1.min(measurement),
-        };
-        before = Some((segment, measurement));
-        let turned = since[segment][first..=measurement]
-            .iter()
-            .fold(Wheels::both(0.0), |sum, (_, turned)| sum.zip_with(*turned, |a, b| a + b));
-        let travel_m = m_per_rad.zip_with(turned, |m_per_rad, rad| m_per_rad * rad);
-        let ways = since[segment][first..=measurement]
-            .iter()
-            .map(|(_, turned)| m_per_rad.zip_with(*turned, |a, b| (a * b).abs()));
-        let way = ways.map(|distance_m| 0.5 * (distance_m.left + distance_m.right)).sum();
-        let own = Large {
-            run: of_segment.run,
-            run_id: of_segment.info.id.clone(),
-            from_s: since[segment][first].0,
-            at_s: fit.records.measurement_s(segment, measurement).unwrap_or(0.0),
-            travel_m,
-            is_displacement: of_segment.is_displacement(),
-            way,
-            ramp: 0.0,
-            z: of_look.iter().map(|innovation| innovation.z.abs()).fold(0.0, f64::max),
-        };
-        measurements.push((own, (segment, at_ramp[segment][first..=measurement].contains(&true))));
-    }
-    let count = measurements.len() as f64;
-    let way = measurements.iter().map(|(measurement, _)| measurement.way).sum::<f64>() / count;
-    let share = measurements.iter().filter(|(_, (_, ramp))| *ramp).count() as f64 / count;
-    let mut found = Vec::new();
-    let mut last: Option<(usize, usize)> = None;
-    for (number, (measurement, (segment, ramp))) in measurements.into_iter().enumerate() {
-        if measurement.z <= LARGE {
-            continue;
-        }
-        let follows = last.is_some_and(|(at, of)| number - at <= APART && fit.records.are_in_series(of, segment));
-        last = Some((number, segment));
-        if follows {
-            continue;
-        }
-        let mostly = AT_RAMPS.max(share);
-        let ramp = if ramp { mostly / share } else { (1.0 - mostly) / (1.0 - share) };
-        let way = if way > 0.0 { measurement.way / way } else { 0.0 };
-        found.push(Large { way, ramp, ..measurement });
-    }
-    found
-}
-
-/// How fast the robot went where it erred, m/s.
-fn usual_speed_m_s(large: &[Large]) -> f64 {
-    let distance_m: f64 =
-        large.iter().map(|large| 0.5 * (large.travel_m.left.abs() + large.travel_m.right.abs())).sum();
-    let time_s: f64 = large.iter().map(|large| large.at_s - large.from_s).sum();
-    if time_s > 0.0 && distance_m > 0.0 { distance_m / time_s } else { 1.0 }
-}
-
-/// What the run of a large error says of its size in each column: information and score, what is free in the fit taken out.
+/// Information and score of a large error's columns by its run, the free columns of the fit projected out.
 #[derive(Debug, Clone)]
-struct Measured {
-    large: Large,
+struct ErrorResponse {
+    large: LargeError,
     separation_m: f64,
     information: DMatrix<f64>,
     score: DVector<f64>,
 }
 
 /// The same of some large errors, from one pass.
-fn seen(model: &AugmentedModel<'_>, fit: &ModelFit<'_>, large: &[Large]) -> Vec<Measured> {
+fn responses(model: &AugmentedModel<'_>, fit: &ModelFit<'_>, large: &[LargeError]) -> Vec<ErrorResponse> {
     let mut all = terms(&model.candidates);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-    for Large { run_id, from_s, at_s, .. } in large {
+    for LargeError { run_id, from_s, at_s, .. } in large {
         all.push(Box::new(Jump { run_id: run_id.clone(), from_s: *from_s, at_s: *at_s }));
     }
     let runs: Vec<NormalEquations> = fit.scan_parts(&mut all, &vec![COLUMNS; large.len()]);
     let Some(projection) = total(&runs).and_then(|all| fit.eliminated(&all, &[])) else { return Vec::new() };
-    let of = |(number, large): (usize, &Large)| {
+    let of = |(number, large): (usize, &LargeError)| {
         let run = runs.iter().find(|run| run.run == large.run)?;
         let own: Vec<usize> = (0..COLUMNS).map(|column| first + number * COLUMNS + column).collect();
         let of_run = projection.of_columns(run, &own);
         let separation_m = fit.solution.model.separation_m;
         // The gradient is the cost's.
-        Some(Measured { large: large.clone(), separation_m, information: of_run.information, score: -of_run.gradient })
+        Some(ErrorResponse {
+            large: large.clone(),
+            separation_m,
+            information: of_run.information,
+            score: -of_run.gradient,
+        })
     };
     large.iter().enumerate().filter_map(of).collect()
 }
 
-impl Measured {
-    /// Log of the chance with a size along a direction that is normal with a scale, but not negative, over that without.
+impl ErrorResponse {
+    /// Log Bayes factor of a size along a direction, half-normal with a scale, over none.
     fn one_sided(&self, direction: &DVector<f64>, scale: f64) -> f64 {
         let information = (direction.transpose() * &self.information * direction)[0].max(0.0);
         let score = direction.dot(&self.score);
@@ -310,20 +224,21 @@ impl Measured {
         DVector::from_fn(self.score.len(), |row, _| f64::from(u8::from(row == column)))
     }
 
-    /// One wheel loses some of its way, where the robot drives.
+    /// One wheel loses some of its travel, where the robot drives.
     fn of_bump(&self, lost_m: f64) -> f64 {
         let indices: Vec<f64> = (0..SLIDES).map(|column| self.one_sided(&self.column(column), lost_m)).collect();
-        log_mean(&indices) + self.large.way.ln()
+        log_mean(&indices) + self.large.relative_distance.ln()
     }
 
-    /// One wheel or both lose way as they become faster, and go on as they become slower.
+    /// One wheel or both lose travel as they become faster, and gain some as they become slower.
     fn of_slide(&self, slides_s: f64) -> f64 {
         let [left, right] = [0, 1].map(|side| self.column(SLIDES + side));
-        let ways = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, slides_s));
-        log_mean(&ways) + self.large.ramp.ln()
+        let by_wheel = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, slides_s));
+        log_mean(&by_wheel) + self.large.ramp_odds.ln()
     }
 
-    /// One wheel or both are behind at the measurement, or fall behind as they become slower and are back as they become faster.
+    /// One wheel or both are behind at the measurement, or fall behind as they become slower and are back
+    /// as they become faster.
     fn of_wind_up(&self, wound_m: f64, speed_m_s: f64) -> f64 {
         let behind = |side: Side| {
             let lost_m = Wheels::from_sides(|of| if of == side { -sense(self.large.travel_m[side]) } else { 0.0 });
@@ -332,51 +247,56 @@ impl Measured {
             at.into_iter().fold(DVector::zeros(self.score.len()), |sum, (column, by)| sum + self.column(column) * by)
         };
         let [left, right] = Side::BOTH.map(behind);
-        let at_look = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, wound_m));
+        let at_measurement = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, wound_m));
         let [left, right] = [0, 1].map(|side| -self.column(SLIDES + side));
         let scale_s = wound_m / speed_m_s;
-        let on_the_way = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, scale_s));
-        log_mean(&[log_mean(&at_look), log_mean(&on_the_way)]) + self.large.ramp.ln()
+        let before_measurement = [&left, &right, &(&left + &right)].map(|direction| self.one_sided(direction, scale_s));
+        log_mean(&[log_mean(&at_measurement), log_mean(&before_measurement)]) + self.large.ramp_odds.ln()
     }
 
-    /// The measurement errs, or the one from which the way there is counted.
-    fn of_look(&self, jump_m: f64, jump_rad: f64) -> f64 {
+    /// The measurement errs, or the one before.
+    fn of_measurement(&self, jump_m: f64, jump_rad: f64) -> f64 {
         log_mean(&[AT, FROM].map(|column| self.error(column, jump_m, jump_rad)))
     }
 }
 
 /// For each scale of a cause, what it makes of each large error; `None` where its errors are not single ones.
-fn of_cause(id: &str, seen: &[Measured], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
-    let each = |of: &dyn Fn(&Measured) -> f64| seen.iter().map(of).collect::<Vec<f64>>();
+fn of_cause(id: &str, responses: &[ErrorResponse], speed_m_s: f64) -> Option<Vec<Vec<f64>>> {
+    let each = |of: &dyn Fn(&ErrorResponse) -> f64| responses.iter().map(of).collect::<Vec<f64>>();
     Some(match effects::description(id)?.isolated_error? {
         IsolatedError::LostOnTheWay { scales_m } => {
-            scales_m.iter().map(|lost_m| each(&|seen| seen.of_bump(*lost_m))).collect()
+            scales_m.iter().map(|lost_m| each(&|response| response.of_bump(*lost_m))).collect()
         }
         IsolatedError::LostWithSpeedChange { scales_s } => {
-            scales_s.iter().map(|slides_s| each(&|seen| seen.of_slide(*slides_s))).collect()
+            scales_s.iter().map(|slides_s| each(&|response| response.of_slide(*slides_s))).collect()
         }
         IsolatedError::WoundUp { scales_m } => {
-            scales_m.iter().map(|wound_m| each(&|seen| seen.of_wind_up(*wound_m, speed_m_s))).collect()
+            scales_m.iter().map(|wound_m| each(&|response| response.of_wind_up(*wound_m, speed_m_s))).collect()
         }
-        IsolatedError::OfInstrument => of_any(ErrorSource::Instrument, seen),
+        IsolatedError::OfInstrument => of_any(ErrorSource::Instrument, responses),
     })
 }
 
-/// The same of jumps or errors that may be any. An instrument that says how the robot moved may err in each displacement, as if the robot had jumped, or in each measurement
-/// of which it takes the difference: it does one or the other.
-fn of_any(source: ErrorSource, seen: &[Measured]) -> Vec<Vec<f64>> {
-    type Of = fn(&Measured, f64, f64) -> f64;
-    let before_look: Of = |seen, jump_m, jump_rad| seen.error(ANY, jump_m, jump_rad);
+/// The same of jumps or errors that may be any. An instrument that says how the robot moved may err in each
+/// displacement, as if the robot had jumped, or in each measurement of which it takes the difference: it
+/// does one or the other.
+fn of_any(source: ErrorSource, responses: &[ErrorResponse]) -> Vec<Vec<f64>> {
+    type Of = fn(&ErrorResponse, f64, f64) -> f64;
+    let of_jump: Of = |response, jump_m, jump_rad| response.error(ANY, jump_m, jump_rad);
     let kinds: &[Of] = match source {
-        ErrorSource::Robot => &[before_look],
-        ErrorSource::Instrument if seen.iter().all(|seen| seen.large.is_displacement) => {
-            &[Measured::of_look, before_look]
+        ErrorSource::Robot => &[of_jump],
+        ErrorSource::Instrument if responses.iter().all(|response| response.large.is_displacement) => {
+            &[ErrorResponse::of_measurement, of_jump]
         }
-        ErrorSource::Instrument => &[Measured::of_look],
+        ErrorSource::Instrument => &[ErrorResponse::of_measurement],
     };
-    let both =
-        kinds.iter().flat_map(|of| ERRORS.iter().flat_map(move |m| ERRORS.iter().map(move |rad| (of, *m, *rad))));
-    both.map(|(of, jump_m, jump_rad)| seen.iter().map(|seen| of(seen, jump_m, jump_rad)).collect()).collect()
+    let both = kinds.iter().flat_map(|of| {
+        MEASUREMENT_ERROR_SCALES
+            .iter()
+            .flat_map(move |m| MEASUREMENT_ERROR_SCALES.iter().map(move |rad| (of, *m, *rad)))
+    });
+    both.map(|(of, jump_m, jump_rad)| responses.iter().map(|response| of(response, jump_m, jump_rad)).collect())
+        .collect()
 }
 
 #[cfg(test)]
@@ -395,7 +315,7 @@ mod tests {
     const SEPARATION_M: f64 = 0.363;
     const NAMES: [&str; 4] = ["traction_loss", "bumps", "truth_outliers", "stick_slip"];
 
-    /// What a wheel's tread goes in a row: starts and stops every eight seconds and a half, with turns both ways.
+    /// Travel of each wheel in a row: starts and stops every eight seconds and a half, with turns both ways.
     fn tread_m(run: u32, row: u32) -> Wheels<f64> {
         let (drive, at) = ((row / 85 + run) % 4, row % 85);
         let share = (f64::from(at) / 5.0).min(f64::from(75_u32.saturating_sub(at)) / 5.0).clamp(0.0, 1.0);
@@ -404,7 +324,8 @@ mod tests {
         Wheels { left: share * left, right: share * right }
     }
 
-    /// Six runs of a robot whose wheels lose way and whose measurements err as `cause` does, with white errors of a millimetre or so.
+    /// Six runs of a robot whose wheels lose way and whose measurements err as `cause` does, with white
+    /// errors of a millimetre or so.
     fn driven(cause: &str, mahalanobis_distance: bool) -> Dataset {
         let mut runs = Vec::new();
         for run in 0..6_u32 {
@@ -485,7 +406,7 @@ mod tests {
         Dataset { provenance, robot, truth_noise, points, runs }
     }
 
-    /// The names with the logs of their chances, the likeliest first, and that of any cause.
+    /// Causes with their log likelihoods, the likeliest first, and that of any cause.
     fn order(dataset: &Dataset) -> (Vec<(&'static str, f64)>, f64) {
         let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
         let any = [ErrorSource::Robot, ErrorSource::Instrument];
@@ -506,7 +427,8 @@ mod tests {
             ("stick_slip", false),
         ] {
             let (order, any) = order(&driven(cause, mahalanobis_distance));
-            // Twenty to one: with the signs of ways lost the wrong way round, the first two are not the first.
+            // Twenty to one: with the signs of ways lost the wrong way round, the first two are not the
+            // first.
             assert_eq!(order[0].0, cause, "{mahalanobis_distance}: {order:?} {any}");
             assert!(order[0].1 > order[1].1 + 3.0, "{cause} {mahalanobis_distance}: {order:?} {any}");
             assert!(order[0].1 > any - 3.0, "{cause} {mahalanobis_distance}: {order:?} {any}");

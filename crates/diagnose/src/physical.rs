@@ -5,6 +5,7 @@ use estimation::NoiseComponent;
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
+use crate::settings::search::{INSIGNIFICANT_ESTIMATE_SIGMAS, MAX_CONTACT_VARIANCE_RATIO};
 use crate::wald::wald_test;
 
 /// Whether a candidate's sizes make an effect that can be: a share that is lost is no gain.
@@ -16,20 +17,19 @@ pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
     effect_of(candidate, &test.estimates).is_some_and(scatters)
 }
 
-/// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one. What is within its error of nothing counts as nothing.
+/// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one.
+/// What is within its error of nothing counts as nothing.
 pub(crate) fn effect_of(candidate: &Candidate, estimates: &[(f64, f64)]) -> Option<Effect> {
     let parameters = candidate.parameters();
     let fitted = parameters.iter().zip(estimates);
     let estimates: Vec<(&str, f64)> = fitted
-        .map(|(parameter, (size, sigma))| (parameter.name, if size.abs() < IN_ERROR * sigma { 0.0 } else { *size }))
+        .map(|(parameter, (size, sigma))| {
+            (parameter.name, if size.abs() < INSIGNIFICANT_ESTIMATE_SIGMAS * sigma { 0.0 } else { *size })
+        })
         .chain(candidate.fixed())
         .collect();
     effect_from_estimates(candidate.id(), &estimates).filter(|effect| effect.physical().check().is_ok())
 }
-
-/// A scatter of more than so many times a measurement's variance would be seen in the noise, though it be there in some measurements only: a robot creeps or stands in a fourth of them at
-/// least where its wheels are seen to stick. Of sticking wheels of the blind benchmark it is 2.7 at the most, of play in the wheels that is taken for it 6.8.
-const SEEN_SCATTER: f64 = 4.0;
 
 /// Whether the noise of a fit leaves room for what the contacts of both wheels scatter by.
 fn scatters_enough(extended: &AugmentedModel<'_>, contact_m: f64) -> bool {
@@ -41,8 +41,5 @@ fn scatters_enough(extended: &AugmentedModel<'_>, contact_m: f64) -> bool {
     let along = variance(NoiseComponent::MeasurementPosition) + 0.5 * wheel;
     let heading = variance(NoiseComponent::MeasurementHeading) + 2.0 * wheel / separation_m.powi(2);
     let of_both = contact_m * contact_m;
-    (0.5 * of_both / along).max(2.0 * of_both / separation_m.powi(2) / heading) <= SEEN_SCATTER
+    (0.5 * of_both / along).max(2.0 * of_both / separation_m.powi(2) / heading) <= MAX_CONTACT_VARIANCE_RATIO
 }
-
-/// A size within so many standard deviations of nothing may be nothing.
-const IN_ERROR: f64 = 3.0;

@@ -1,21 +1,16 @@
-//! Shape parameters that may be anything between the values that the scan tries: a hinge speed, a time constant. They are fitted by their profile, and what is not
-//! known of them widens the sizes.
+//! Continuous variant parameters, such as a hinge speed or a time constant. They are fitted by their
+//! profile likelihood, and their uncertainty widens the sizes.
 //!
-//! Near its minimum the cost is a parabola of the parameter's logarithm; its curvature is what is known of it, beside that it lies in the range that is tried.
-//! A size that goes with the variant is known by as much less: σ² = σ²(θ | x) + w², w being how far the size goes, either way, over the variants that 95 % of chance
-//! leaves, over 1.96. Where little is known of the variant, a size is far from going with it in a line.
+//! Near its minimum the cost is a parabola in the parameter's logarithm. Its curvature, and the range that
+//! is tried, say how well the parameter is known. A size that depends on the parameter has σ² = σ²(θ | x) +
+//! w². w is the change of the size over the parameter's 95 % interval, to either side, over 1.96.
 //! Reference: Cox & Hinkley 1974 (profile likelihood).
 
 use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
-
-/// Times that the parabola is drawn anew, each time closer.
-const ROUNDS: usize = 2;
-/// Standard deviations either way that hold 95 % of chance.
-const WITHIN_95: f64 = 1.96;
-/// How much closer, at the most.
-const CLOSER: f64 = 0.25;
+use crate::settings::levels::NORMAL_QUANTILE_95;
+use crate::settings::search::{MIN_PROFILE_STEP_RATIO, PROFILE_ITERATIONS, PROFILE_STEP_SIGMAS};
 
 /// One value of the parameter's logarithm, with the fit there.
 struct Point<'a> {
@@ -23,7 +18,8 @@ struct Point<'a> {
     model: AugmentedModel<'a>,
 }
 
-/// Fits the variant of a candidate of a model, where it has one that may be anything, and says how much wider its sizes are for it: their standard deviations.
+/// Fits the variant of a candidate of a model, where it has one that may be anything, and says how much
+/// wider its sizes are for it: their standard deviations.
 pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a>, index: usize) -> Vec<f64> {
     let candidate = model.candidates[index].clone();
     let parameters = candidate.parameters().len();
@@ -33,9 +29,10 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     let (Some(&low), Some(&high), Some(&(_, fixed))) = (grid.first(), grid.last(), candidate.fixed().first()) else {
         return none;
     };
-    let mut reach = (high - low) / (grid.len().max(2) - 1) as f64;
-    // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other variants.
-    let (low_end, high_end) = (low - 0.5 * reach, high + 0.5 * reach);
+    let mut step = (high - low) / (grid.len().max(2) - 1) as f64;
+    // Beyond the values that are tried by half of a step of theirs: farther out nobody has looked for other
+    // variants.
+    let (low_end, high_end) = (low - 0.5 * step, high + 0.5 * step);
     let at = |x: f64| -> Option<Point<'a>> {
         let x = x.clamp(low_end, high_end);
         let mut candidates = model.candidates.clone();
@@ -44,33 +41,33 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     };
     let mut best = Point { x: fixed.ln(), model: model.clone() };
     let mut sigma = 0.0;
-    for _ in 0..ROUNDS {
-        let middle = best.x.clamp(low_end + 0.5 * reach, high_end - 0.5 * reach);
+    for _ in 0..PROFILE_ITERATIONS {
+        let middle = best.x.clamp(low_end + 0.5 * step, high_end - 0.5 * step);
         if middle != best.x {
             let Some(point) = at(middle) else { return none };
             best = point;
         }
-        reach = reach.min(high_end - best.x).min(best.x - low_end);
-        let (Some(below), Some(above)) = (at(best.x - reach), at(best.x + reach)) else { return none };
+        step = step.min(high_end - best.x).min(best.x - low_end);
+        let (Some(below), Some(above)) = (at(best.x - step), at(best.x + step)) else { return none };
         let most = [&below, &best, &above].map(|point| count(&point.model.fit)).into_iter().fold(0.0, f64::max);
         let costs = [&below, &best, &above].map(|point| cost(&point.model.fit, most));
         let (slope, curvature) =
-            ((costs[2] - costs[0]) / (2.0 * reach), (costs[2] - 2.0 * costs[1] + costs[0]) / (reach * reach));
+            ((costs[2] - costs[0]) / (2.0 * step), (costs[2] - 2.0 * costs[1] + costs[0]) / (step * step));
         // Where nothing is known of it, it lies anywhere in the range that is tried.
         sigma = curvature.max(0.0).sqrt().recip().min(high_end - low_end);
-        let vertex = if curvature > 0.0 { best.x + (-slope / curvature).clamp(-reach, reach) } else { best.x };
+        let vertex = if curvature > 0.0 { best.x + (-slope / curvature).clamp(-step, step) } else { best.x };
         let points = [Some(below), at(vertex), Some(above)].into_iter().flatten();
         best = points.fold(best, |best, point| {
             let most = count(&best.model.fit).max(count(&point.model.fit));
             if cost(&point.model.fit, most) < cost(&best.model.fit, most) { point } else { best }
         });
-        reach = (1.5 * sigma).clamp(CLOSER * reach, reach);
+        step = (PROFILE_STEP_SIGMAS * sigma).clamp(MIN_PROFILE_STEP_RATIO * step, step);
     }
-    let ends = [best.x - WITHIN_95 * sigma, best.x + WITHIN_95 * sigma].map(at);
+    let ends = [best.x - NORMAL_QUANTILE_95 * sigma, best.x + NORMAL_QUANTILE_95 * sigma].map(at);
     let size = |point: &Point<'_>, k: usize| point.model.fit.solution.model.term_values[first + k];
     let extra_sigma = |k: usize| {
         let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
-        moved.fold(0.0, f64::max) / WITHIN_95
+        moved.fold(0.0, f64::max) / NORMAL_QUANTILE_95
     };
     let extra_sigma = (0..parameters).map(extra_sigma).collect();
     *model = best.model;

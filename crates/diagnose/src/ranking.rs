@@ -5,13 +5,13 @@ use crate::physical::effect_of;
 use crate::scan::Scored;
 use crate::statistics::sidak;
 
-/// One candidate of an effect: its best variant, with its chance after paying for all variants.
+/// An effect of the scan: its best variant, with the p-value corrected for all variants.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
     pub(crate) scored: Scored,
     pub(crate) p_value: f64,
     pub(crate) variants: usize,
-    /// Shapes that can be seen and that the scan gives a size that can be, with their statistics, that which explains most first.
+    /// Detectable variants with physical estimates, with their statistics, the largest first.
     possible: Vec<(Candidate, f64)>,
 }
 
@@ -55,7 +55,46 @@ pub(crate) fn best_variants(scored: &[Scored]) -> Vec<Entry> {
     entries
 }
 
-/// How many effects of a scan can be seen at all, each a test: at least one.
+/// Number of detectable effects of a scan, each a test: at least one.
 pub(crate) fn tests_in(entries: &[Entry]) -> f64 {
     entries.iter().filter(|entry| entry.scored.dimensions > 0).count().max(1) as f64
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::statistics::p_of_chi_square;
+
+    /// A score of a first variant: its statistic and log odds along so many directions, without estimates.
+    pub(crate) fn scored(id: &'static str, statistic: f64, log_odds: f64, dimensions: usize) -> Scored {
+        Scored {
+            candidate: Candidate::Effect { id, variant: 0, at: None },
+            parameters: Vec::new(),
+            information: DMatrix::zeros(0, 0),
+            dimensions,
+            statistic,
+            p_value: if dimensions > 0 { p_of_chi_square(statistic, dimensions as f64) } else { 1.0 },
+            estimates: Vec::new(),
+            log_odds,
+        }
+    }
+
+    #[test]
+    fn an_effect_is_its_best_variant_and_pays_for_all() {
+        let second = |statistic| Scored {
+            candidate: Candidate::Effect { id: "slip_speed", variant: 1, at: None },
+            ..scored("slip_speed", statistic, 0.0, 1)
+        };
+        let all = [scored("slip_speed", 9.0, 0.0, 1), second(16.0), scored("backlash", 25.0, 0.0, 0)];
+        let entries = best_variants(&all);
+        assert_eq!((entries.len(), entries[0].scored.statistic, entries[0].variants), (2, 16.0, 2));
+        // Šidák: 1 − (1 − p)². Rejects the p-value of the best alone, which is half as large.
+        let p = all[1].p_value;
+        assert!((entries[0].p_value / (2.0 * p - p * p) - 1.0).abs() < 1e-12);
+        // The other one may be tried still; one without a direction is no test.
+        assert_eq!(entries[0].others(9.0).collect::<Vec<_>>(), [&all[0].candidate]);
+        assert_eq!(tests_in(&entries), 1.0);
+    }
 }

@@ -1,35 +1,21 @@
-//! Gross faults first: swapped or reversed wheels, factors, wraps, torn reads. Each is a rewriting of the records, judged by the likelihood of a base fit.
+//! Record faults: swapped or reversed wheels, factors, wraps, torn reads. Each is a correction of the
+//! records, compared by the likelihood of a base fit.
 //!
-//! A factor on both wheels is no matter of the likelihood, which fits any lengths: how plausible the fitted lengths are decides. A fault that a fit
-//! hides is worse than none.
+//! A factor on both wheels does not change the likelihood, which fits any geometry; the prior of the
+//! geometry decides. A fault that the fit absorbs is worse than none.
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
 use estimation::{FitSettings, ModelFit, NoiseComponent};
 
 use crate::augmented_model::{cost, count};
-
-/// A rewriting must make the data likelier by this factor, e^20, over the records as they are: dozens are tried, and each claims much.
-const GAIN: f64 = 20.0;
-/// Wheels are known to a few per cent; the separation, to which skid steering adds, less well.
-const WHEEL_SD: f64 = 0.05;
-const SEPARATION_SD: f64 = 0.3;
-/// Swapped wheels are, to the likelihood, reversed ones under an instrument that looks backward; an instrument mostly looks ahead.
-const MOUNT_SD_RAD: f64 = 0.3;
-/// A wheel noise, m/√m, beyond which counts hardly follow the robot.
-const WHEEL_SIGMA: f64 = 0.01;
-/// The same of turns, rad/√rad.
-const TURN_SIGMA: f64 = 0.05;
-/// So many times as much and the counts do not follow the robot at all.
-const LOST: f64 = 3.0;
-/// Measurements that err by this share of how far they saw the robot go, or by so many radians, hardly saw it.
-const BLURRED: f64 = 0.3;
-/// A share of measurements that do not fit beyond which something is wrong with the records.
-const OUTLIERS: f64 = 0.01;
-/// Share of the measurements that did not fit before which may still not fit in records that are rewritten, and a share of all measurements that may: tails are heavy, rows are lost as
-/// well, and each such look is charged.
-const STILL_OFF: f64 = 0.5;
-const MAY_BE_OFF: f64 = 0.1;
+use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
+use crate::settings::records::{
+    FACTOR_TOLERANCE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_REMAINING_OUTLIER_RATIO, MAX_SENSOR_HEADING_RAD,
+    MAX_SEPARATION_DEVIATION_SIGMAS, MAX_SOUND_OUTLIER_FRACTION, MAX_TURN_SIGMA_RAD_PER_SQRT_RAD,
+    MAX_WHEEL_DEVIATION_SIGMAS, MAX_WHEEL_SIGMA_M_PER_SQRT_M, MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA,
+    UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR, WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
+};
 
 /// A fault with the records without it.
 pub(crate) struct Fault {
@@ -50,14 +36,12 @@ impl Fault {
 
 const PLAIN: FitSettings = FitSettings::GEOMETRY_ONLY;
 
-/// An instrument turned farther than this on the robot is more of a claim than the fault.
-const MAX_ROTATED_RAD: f64 = 1.0;
-
 pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one; `outlying` leaves it at the former.
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one;
+/// `outlying` leaves it at the former.
 pub(crate) fn fault(
     datasets: &[Dataset],
     base: Option<&ModelFit<'_>>,
@@ -65,7 +49,7 @@ pub(crate) fn fault(
     outlying: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
-    let lost = base.is_some_and(|base| !follows(base));
+    let uncorrelated = base.is_some_and(|base| !is_correlated(base));
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
@@ -80,13 +64,16 @@ pub(crate) fn fault(
             }
             let own = sessions(&records);
             let Ok(fit) = PLAIN.fit(&own) else { continue };
-            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they show it by themselves. What was lost is not
-            // restored to the last count: measurements may still lie off, but far fewer of them.
-            let most_outliers = base.map_or(MAY_BE_OFF, |base| MAY_BE_OFF.max(STILL_OFF * rejected_share(base)));
-            let follows = is_drive(&fit)
+            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless
+            // they show it by themselves. What was lost is not restored to the last count: measurements may
+            // still lie off, but far fewer of them.
+            let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
+                MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
+            });
+            let is_plausible = is_drive(&fit)
                 && rejected_share(&fit) < most_outliers
-                && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_ROTATED_RAD;
-            if !follows && !visible_in_log {
+                && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
+            if !is_plausible && !visible_in_log {
                 continue;
             }
             let gain = base.map_or(f64::MAX, |base| {
@@ -94,17 +81,21 @@ pub(crate) fn fault(
                 let measurements = count(base).max(count(&fit));
                 cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
             });
-            // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
-            let least = match visible_in_log {
-                true if lost => f64::NEG_INFINITY,
-                true => -GAIN,
-                false => GAIN,
+            // What the log shows needs no instrument; one must not contradict it, where it has anything to
+            // say.
+            let min_gain = match visible_in_log {
+                true if uncorrelated => f64::NEG_INFINITY,
+                true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
+                false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
             };
-            let better = |(shown, known): &(bool, Fault)| {
-                (visible_in_log, gain) > (*shown, known.gain + f64::from(u8::from(*shown)))
+            let better = |(known_visible, known): &(bool, Fault)| {
+                (visible_in_log, gain) > (*known_visible, known.gain + f64::from(u8::from(*known_visible)))
             };
-            if gain > least && best.as_ref().is_none_or(better) {
-                best = Some((visible_in_log, Fault { id, values, sentence, records, gain: gain.max(GAIN) }));
+            if gain > min_gain && best.as_ref().is_none_or(better) {
+                best = Some((
+                    visible_in_log,
+                    Fault { id, values, sentence, records, gain: gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN) },
+                ));
             }
         }
     }
@@ -115,10 +106,10 @@ pub(crate) fn fault(
 fn implausible(fit: &ModelFit<'_>) -> f64 {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let off = |of: f64, nominal: f64, sd: f64| 0.5 * ((of / nominal).abs().ln() / sd).powi(2);
-    off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_SD)
-        + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_SD)
-        + off(model.separation_m, nominal.separation_m, SEPARATION_SD)
-        + 0.5 * (model.body_from_sensor.theta_rad / MOUNT_SD_RAD).powi(2)
+    off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_PRIOR_SIGMA)
+        + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_PRIOR_SIGMA)
+        + off(model.separation_m, nominal.separation_m, SEPARATION_PRIOR_SIGMA)
+        + 0.5 * (model.body_from_sensor.theta_rad / SENSOR_HEADING_PRIOR_SIGMA_RAD).powi(2)
 }
 
 /// Share of measurements that a fit takes for outliers.
@@ -126,40 +117,38 @@ pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
     fit.solution.pass.outliers.len() as f64 / fit.records.measurements().max(1) as f64
 }
 
-/// Does a base fit look like a robot whose counts follow it?
+/// Whether a base fit is plausible and rejects few measurements.
 fn is_sound(fit: &ModelFit<'_>) -> bool {
-    is_drive(fit) && rejected_share(fit) < OUTLIERS
+    is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
 }
 
-/// Does the robot go where a drive of any lengths would, by the counts?
-pub(crate) fn follows(fit: &ModelFit<'_>) -> bool {
+/// Whether the odometry is correlated with the measurements, for some geometry.
+pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.solution.noise.sigma(of);
-    sigma(NoiseComponent::Wheel) < LOST * WHEEL_SIGMA
-        && sigma(NoiseComponent::Turn) < LOST * TURN_SIGMA
-        && sigma(NoiseComponent::MeasurementPosition) < BLURRED * fit.records.extent_m()
-        && sigma(NoiseComponent::MeasurementHeading) < BLURRED
+    sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
+        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * fit.records.extent_m()
+        && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA
 }
 
 /// Are a fit's lengths and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
-    let near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
-    near(model.m_per_rad.left, nominal.m_per_rad.left, 2.0 * WHEEL_SD)
-        && near(model.m_per_rad.right, nominal.m_per_rad.right, 2.0 * WHEEL_SD)
-        && near(model.separation_m, nominal.separation_m, 1.5 * SEPARATION_SD)
-        && fit.solution.noise.sigma(NoiseComponent::Wheel) < WHEEL_SIGMA
-        && fit.solution.noise.sigma(NoiseComponent::Turn) < TURN_SIGMA
+    let is_near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
+    is_near(model.m_per_rad.left, nominal.m_per_rad.left, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
+        && is_near(model.m_per_rad.right, nominal.m_per_rad.right, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
+        && is_near(model.separation_m, nominal.separation_m, MAX_SEPARATION_DEVIATION_SIGMAS * SEPARATION_PRIOR_SIGMA)
+        && fit.solution.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
         && fit.solution.converged
 }
 
-/// Wheels that are farther from nominal than by this factor are not what they are believed to be.
-const ANOTHER_ROBOT: f64 = 1.3;
-
-/// By which factor the wheels of a fit are too large or too small for the robot that its description tells of, if they are.
+/// By which factor the wheels of a fit are too large or too small for the robot that its description tells
+/// of, if they are.
 pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
     let ratio = fit.solution.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
     let factor = (ratio.left * ratio.right).sqrt();
-    (factor.ln().abs() > ANOTHER_ROBOT.ln()).then_some(factor)
+    (factor.ln().abs() > WRONG_WHEELS_FACTOR.ln()).then_some(factor)
 }
 
 /// A form of a fault.
@@ -172,13 +161,10 @@ struct Form {
     records: Vec<Dataset>,
 }
 
-/// Factors of sessions that were estimated, each for itself, agree within this.
-const SAME_FACTOR: f64 = 0.05;
-
 /// Whether two sessions' rewritings undo the same fault. How often it strikes may differ.
 fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
     let same = |(a, b): (&(&str, f64), &(&str, f64))| {
-        a.0 == b.0 && (a.0 == "probability" || (a.1 - b.1).abs() <= SAME_FACTOR * a.1.abs())
+        a.0 == b.0 && (a.0 == "probability" || (a.1 - b.1).abs() <= FACTOR_TOLERANCE * a.1.abs())
     };
     a.len() == b.len() && a.iter().zip(b).all(same)
 }

@@ -1,7 +1,8 @@
-//! Omnibus checks of the residuals: size, whiteness, tails, run against run, and whether they go with anything that was recorded.
+//! Tests of the residuals: size, whiteness, tails, run against run, and dependence on what was recorded.
 //!
-//! Innovations of a right model are white, normal and of the size that the model says (Kailath 1968). Covariates are asked by score tests of products on
-//! every channel, beside what the model has: a regression of innovations would be blurred by the filter.
+//! Innovations of a right model are white, normal and of the predicted variance (Kailath 1968). Dependence
+//! on covariates is tested by score tests of products on every channel, beside what the model has: the
+//! filter would blur a regression of innovations.
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
@@ -13,26 +14,17 @@ use crate::candidate::Candidate;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariates::{of_cycles, of_runs};
 use crate::scan::{freedom, principal, scan_parts_of};
-use crate::settings::CHECKS_LEVEL;
+use crate::settings::levels::CHECKS_LEVEL;
+use crate::settings::residuals::{
+    AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS, MIN_WHITENESS_PAIRS,
+    OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
+};
+use crate::settings::search::MIN_DETECTABLE_SIGMAS;
 use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z, sidak};
-
-/// Correlations with so many measurements before are summed.
-const LAGS: usize = 5;
-/// A measurement off by this much is an outlier with a chance of 1e-5.
-const OUTLIER_CHANCE: f64 = 1e-5;
-/// The measurement after an outlier fits unless its chance is below this.
-const BACK_AGAIN: f64 = 0.01;
-/// An innovation this large, in standard deviations, comes from the tail.
-const LARGE: f64 = 3.0;
-/// What follows large errors is told from chance at this many standard errors.
-const FOLLOWS: f64 = 2.6;
-/// Two displacements undo each other when together they are off by less than this share of the one that is far off: that is by five standard deviations or more,
-/// and the sum of two right ones by √2 of them.
-const UNDONE: f64 = 0.5;
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
-    /// Displacements that fail to be white: they resemble each other for longer, and less plainly, than what a filter leaves of measurements.
+    /// Displacements are autocorrelated, if less plainly than poses would be after a filter.
     pub(crate) autocorrelated: bool,
     pub(crate) checks: Vec<TestResult>,
     /// Correlation of innovations that follow each other: coefficient at lag one, and standard errors.
@@ -43,18 +35,19 @@ pub(crate) struct Checked {
 /// Measurements that do not fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Outliers {
-    /// Those after which the robot is seen where it should be: of displacements, pairs that undo each other.
+    /// Isolated ones: the next measurement is right. Of displacements, pairs that cancel.
     pub(crate) isolated: usize,
-    /// Those after which the robot is seen where the outlier was, and displacements that no neighbour undoes.
-    pub(crate) staying: usize,
+    /// Persistent ones: the next measurement errs as well. Of displacements, those that no neighbour
+    /// cancels.
+    pub(crate) persistent: usize,
     pub(crate) measurements: usize,
     pub(crate) p_value: f64,
 }
 
-/// What residuals may go with.
+/// A quantity on which residuals may depend.
 struct Question {
     name: String,
-    /// In groups, each of which is tested as a whole: the best of them answers, and pays for all.
+    /// Groups that are tested as a whole; the smallest p-value answers, corrected for the number of groups.
     groups: Vec<Vec<Candidate>>,
 }
 
@@ -123,7 +116,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let correlation = whiteness(fit, &mut add);
     tails(fit, &mut add);
     let outliers = outliers(fit);
-    add(Check::Outliers, (outliers.isolated + outliers.staying) as f64, outliers.p_value);
+    add(Check::Outliers, (outliers.isolated + outliers.persistent) as f64, outliers.p_value);
     covariates(model, &mut add);
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
@@ -148,7 +141,8 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
             continue;
         }
         let mean = squares.iter().sum::<f64>() / n;
-        // The noise is fitted to all three together: one of them can still be off. Its own tails say how well a mean square is known.
+        // The noise is fitted to all three together: one of them can still be off. Its own tails say how
+        // well a mean square is known.
         let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let z = (mean - 1.0) / (variance.max(2.0) / n).sqrt();
         add(Check::InnovationSize(name), mean, p_of_z(z));
@@ -169,20 +163,20 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     }
 }
 
-/// Ljung & Box over the measurements of each segment and the displacements of each run; returns the correlation that stands out most: its
-/// coefficient at lag one, and its standard errors.
+/// Ljung–Box test over the measurements of each segment and the displacements of each run. Returns the most
+/// significant correlation: coefficient at lag one, and standard errors.
 fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64, f64) {
     let mut strongest = (0.0, 0.0_f64);
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
-        if n < 20.0 {
+        if n < MIN_WHITENESS_INNOVATIONS {
             continue;
         }
         let variance = series.iter().map(|innovation| innovation.z.powi(2)).sum::<f64>() / n;
         let (mut statistic, mut lags, mut coefficient) = (0.0, 0.0, 0.0);
-        let (mut resembles, mut weights) = (0.0, 0.0_f64);
-        for lag in 1..=LAGS {
+        let (mut weighted_products, mut squared_weights) = (0.0, 0.0_f64);
+        for lag in 1..=WHITENESS_LAGS {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
             let follows =
                 |pair: &&[&InnovationComponent]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
@@ -190,10 +184,10 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
                 products += pair[0].z * pair[lag].z;
                 pairs += 1.0;
                 let weight = fit.records.weight_of_pair(pair[0].segment, pair[lag].segment, lag as i32);
-                resembles += weight * pair[0].z * pair[lag].z;
-                weights += weight * weight;
+                weighted_products += weight * pair[0].z * pair[lag].z;
+                squared_weights += weight * weight;
             }
-            if pairs < 10.0 {
+            if pairs < MIN_WHITENESS_PAIRS {
                 break;
             }
             let z = products / variance / pairs.sqrt();
@@ -204,7 +198,7 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
             lags += 1.0;
         }
         if lags > 0.0 {
-            let z = resembles / variance / weights.sqrt();
+            let z = weighted_products / variance / squared_weights.sqrt();
             if z.abs() > f64::abs(strongest.1) {
                 strongest = (coefficient, z);
             }
@@ -218,7 +212,7 @@ fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
-        if n < 50.0 {
+        if n < MIN_KURTOSIS_INNOVATIONS {
             continue;
         }
         let moment = |power: i32| series.iter().map(|innovation| innovation.z.powi(power)).sum::<f64>() / n;
@@ -240,27 +234,29 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
     ((1.0 - 2.0 / (9.0 * a)) - ((1.0 - 2.0 / a) / low.abs()).cbrt() * low.signum()) / (2.0 / (9.0 * a)).sqrt()
 }
 
-/// Measurements far off, and what follows large innovations: after a jump of the robot the next measurements are off the same way, as the filter has followed only in part;
-/// after an error of one measurement they are off the other way, or not at all where the measurement was left out.
+/// Outliers, isolated or persistent. After a jump of the robot the next measurements err the same way, as
+/// the filter has followed only in part. After an error of one measurement they err the other way, or not
+/// at all where the measurement was rejected.
 ///
-/// A displacement starts anew where the instrument stood, and the next is right after a jump of the robot as after an error of its own. But where it is the
-/// difference of two measurements, a measurement that errs spoils the displacement to it and the one from it, and both together are right.
+/// A displacement starts anew where the instrument stood: the next one is right after a jump as after an
+/// error. But where displacements are differences of measurements, one error spoils two of them, and both
+/// together are right.
 fn outliers(fit: &ModelFit<'_>) -> Outliers {
     let mut found = Outliers { measurements: innovations(fit, 0).len(), ..Outliers::default() };
-    let far = &fit.solution.pass.outliers;
+    let rejected = &fit.solution.pass.outliers;
     let phase = fit.solution.pass.innovations.first().map_or(&[][..], Vec::as_slice);
-    let mut undone_by = None;
-    for (position, &(segment, measurement)) in far.iter().enumerate() {
+    let mut cancelled_by = None;
+    for (position, &(segment, measurement)) in rejected.iter().enumerate() {
         if fit.records.segments[segment].is_displacement() {
-            if undone_by == Some(segment) {
-                undone_by = None;
-            } else if undo(fit, segment, segment + 1, segment) {
-                undone_by = Some(segment + 1);
+            if cancelled_by == Some(segment) {
+                cancelled_by = None;
+            } else if cancel(fit, segment, segment + 1, segment) {
+                cancelled_by = Some(segment + 1);
                 found.isolated += 1;
-            } else if segment > 0 && undo(fit, segment - 1, segment, segment) {
+            } else if segment > 0 && cancel(fit, segment - 1, segment, segment) {
                 found.isolated += 1;
             } else {
-                found.staying += 1;
+                found.persistent += 1;
             }
             continue;
         }
@@ -269,42 +265,44 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
             phase.partition_point(|innovation| (innovation.segment, innovation.measurement) <= (segment, measurement));
         let after = phase[next..].iter().take(3).filter(|innovation| innovation.segment == segment);
         let (square, values) = after.fold((0.0, 0.0), |(sum, n), innovation| (sum + innovation.z.powi(2), n + 1.0));
-        let followed = far.get(position + 1).is_some_and(|&(c, l)| c == segment && l == measurement + 1);
-        let follows =
-            position.checked_sub(1).is_some_and(|before| far[before].0 == segment && far[before].1 + 1 == measurement);
-        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < BACK_AGAIN) {
-            found.staying += 1;
+        let followed = rejected.get(position + 1).is_some_and(|&(c, l)| c == segment && l == measurement + 1);
+        let follows = position
+            .checked_sub(1)
+            .is_some_and(|before| rejected[before].0 == segment && rejected[before].1 + 1 == measurement);
+        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < AFTER_OUTLIER_LEVEL) {
+            found.persistent += 1;
         } else {
             found.isolated += 1;
         }
     }
-    let (count, expected) = (far.len() as f64, (found.measurements + far.len()) as f64 * OUTLIER_CHANCE);
-    // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice the mean.
+    let (count, expected) = (rejected.len() as f64, (found.measurements + rejected.len()) as f64 * OUTLIER_PROBABILITY);
+    // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice
+    // the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
     found
 }
 
-/// Do two displacements that follow each other undo what is wrong with one of them? Together they must be nearer to the wheels by half.
-fn undo(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
+/// Whether two successive displacements cancel: whether together they are nearer to dead reckoning.
+fn cancel(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
     let of = |segments| fit.mahalanobis_distance(segments).unwrap_or(f64::INFINITY);
-    fit.records.continues(second) && of(first..second + 1) < UNDONE * of(wrong..wrong + 1)
+    fit.records.continues(second) && of(first..second + 1) < CANCELLATION_RATIO * of(wrong..wrong + 1)
 }
 
-/// What follows large innovations of a component: the mean of the next in the direction of the large one, in standard errors. After a displacement, which starts
-/// anew, there is nothing to stay: the same says that errors last, and not whose they are.
-pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
+/// Persistence of large innovations of a component: the mean of the next ones in the same direction, in
+/// standard errors. Successive displacements start anew, and cannot show a jump.
+pub(crate) fn residual_persistence(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
     let series = innovations(fit, component);
-    let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > LARGE;
+    let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > TAIL_INNOVATION_SIGMAS;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));
         if count > 0.0 { sum / count.sqrt() } else { 0.0 }
     };
-    let of_looks = follows(&|segment, next| next == segment);
+    let of_measurements = follows(&|segment, next| next == segment);
     let of_displacements = follows(&|segment, next| next == segment + 1 && fit.records.continues(next));
-    if of_looks > FOLLOWS {
+    if of_measurements > PERSISTENCE_SIGMAS {
         ResidualPersistence::Persistent
-    } else if of_looks.min(of_displacements) < -FOLLOWS {
+    } else if of_measurements.min(of_displacements) < -PERSISTENCE_SIGMAS {
         ResidualPersistence::Reverting
     } else {
         ResidualPersistence::Undecided
@@ -315,16 +313,18 @@ pub(crate) fn what_follows(fit: &ModelFit<'_>, component: usize) -> ResidualPers
 fn covariates(model: &AugmentedModel<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     let questions = questions(&model.fit);
     let parts: Vec<&[Candidate]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
-    // Statistic and chance of each group that can be seen.
+    // Statistic and p-value of each detectable group.
     let answers = scan_parts_of(
         &model.fit,
         &model.candidates,
         &parts,
         |own, Projected { information, gradient, .. }, equations| {
             let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
-            let shown = principal(information, gradient, &parameters).into_iter().filter(|(value, _)| *value >= 1.0);
+            let directions = principal(information, gradient, &parameters)
+                .into_iter()
+                .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
             let (statistic, dimensions) =
-                shown.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
+                directions.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
             let freedom = freedom(&model.fit, equations);
             (dimensions > 0).then(|| (statistic, p_of_score(statistic, dimensions, equations.count, freedom)))
         },
@@ -380,7 +380,8 @@ mod tests {
         (Dataset { provenance, robot, truth_noise, points, runs }, poses)
     }
 
-    /// Errors as good as normal ones: millimetres and milliradians, the sum of twelve uniform ones by `SplitMix64` (Steele, Lea & Flood 2014).
+    /// Errors as good as normal ones: millimetres and milliradians, the sum of twelve uniform ones by
+    /// `SplitMix64` (Steele, Lea & Flood 2014).
     fn error(state: &mut u64) -> [f64; 3] {
         let mut uniform = || {
             *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -443,9 +444,10 @@ mod tests {
         assert_eq!(names, ["truth_correlated_noise"]);
     }
 
-    /// A measurement that errs spoils the displacement to it and the one from it; a displacement that errs alone may be the robot's jump as well.
+    /// A measurement that errs spoils the displacement to it and the one from it; a displacement that errs
+    /// alone may be the robot's jump as well.
     #[test]
-    fn only_displacements_that_undo_each_other_are_errors_of_a_look() {
+    fn only_displacements_that_cancel_are_errors_of_a_measurement() {
         let ((mut dataset, paths), mut state) = (driven(), 11);
         let wrong = Pose::new(0.05, -0.03, 0.04);
         for (number, (run, path)) in dataset.runs.iter_mut().zip(&paths).enumerate() {
@@ -464,7 +466,7 @@ mod tests {
         let fit = fitted(&dataset);
         assert_eq!(fit.solution.pass.outliers, [(19, 0), (20, 0), (60, 0)]);
         let found = outliers(&fit);
-        assert_eq!((found.isolated, found.staying), (1, 1));
+        assert_eq!((found.isolated, found.persistent), (1, 1));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Rival models of one place: every effect that explains about as much, refitted, most probable first.
+//! Rival models of one candidate: every effect that explains about as much, refitted, most probable first.
 
 use estimation::ModelFit;
 use nalgebra::DVector;
@@ -9,36 +9,26 @@ use crate::fit_cache::FitCache;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::physical::is_physical;
 use crate::ranking::Entry;
+use crate::settings::search::{
+    CLOSE_RIVAL_FRACTION, CLOSE_RIVAL_STATISTIC, MAX_CLOSE_RIVALS, MAX_FURTHER_VARIANTS, MAX_RIVALS,
+    MIN_RIVAL_STATISTIC_RATIO,
+};
 use crate::wald::wald_test;
 
-/// A name for a finding.
+/// A candidate cause of a finding.
 #[derive(Debug, Clone)]
 pub(crate) struct Name {
     pub(crate) candidate: Candidate,
     pub(crate) log_odds: f64,
-    /// Log likelihood at its best, less what its freedom gains by chance: half of a χ² for each direction.
+    /// Log likelihood less its expected gain without the effect: half of a χ² for each direction.
     pub(crate) explains: f64,
-    /// Sizes that no effect can have explain more: something is there that looks like this one, and is none of the names.
+    /// A model with unphysical sizes explains more: the cause resembles this one, and may be none of the
+    /// candidates.
     pub(crate) outdone: bool,
 }
 
-/// A candidate that explains less than this share of what the best does, before any refit, is not its rival.
-const RIVAL_SHARE: f64 = 0.5;
-
-/// One that explains less by no more than this, or by this share of the best, may come near it: the log of its odds is off by half of it, and the refit may find that much again.
-const NEAR: f64 = 12.0;
-
-const NEAR_SHARE: f64 = 0.1;
-
-/// Most rivals that are refitted, and most with those that may come near the best.
-const MAX_RIVALS: usize = 6;
-
-const MAX_NEAR: usize = 10;
-
-/// Most further variants of an effect that are tried where the best one's size is none that it can have.
-const MAX_VARIANTS: usize = 3;
-
-/// The rivals of one place in a model whose other candidates stay, each refitted: the best variant of each effect that explains enough, most probable first.
+/// The rivals of one candidate in a model whose others stay, each refitted: the best variant of each effect
+/// that explains enough, most probable first.
 pub(crate) fn rivals<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     without: &AugmentedModel<'a>,
@@ -46,28 +36,19 @@ pub(crate) fn rivals<'a>(
     entries: &[Entry],
     best: f64,
 ) -> Vec<(Name, AugmentedModel<'a>)> {
-    let near = best - NEAR.max(NEAR_SHARE * best);
-    let least = near.min(RIVAL_SHARE * best);
-    let mut contenders: Vec<&Entry> =
-        entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
-    contenders.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
-    let ranked = contenders.into_iter().enumerate();
-    let mut contenders: Vec<&Entry> = ranked
-        .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= near)
-        .map(|(_, entry)| entry)
-        .take(MAX_NEAR)
-        .collect();
+    let close = close_statistic(best);
+    let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
     let mut fits = known.with_each(base, without, index, &best_variants);
-    // With another variant, about as good, an effect may have a size that can be.
+    // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
         fits.iter().filter(is_its).any(|extended| is_physical(extended, index))
     };
-    contenders.retain(|entry| entry.scored.statistic >= near && !can_be(&fits, entry));
-    for variant in 0..MAX_VARIANTS {
+    contenders.retain(|entry| entry.scored.statistic >= close && !can_be(&fits, entry));
+    for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
-            contenders.iter().filter_map(|entry| entry.others(near).nth(variant)).cloned().collect();
+            contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
         fits.extend(known.with_each(base, without, index, &next));
         contenders.retain(|entry| !can_be(&fits, entry));
     }
@@ -78,19 +59,16 @@ pub(crate) fn rivals<'a>(
         .map(|extended| {
             let candidate = extended.candidates[index].clone();
             let variants = entries.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
-            let trials = (variants.map_or(1, |entry| entry.variants.max(1)) as f64).ln();
+            let trials = variants.map_or(1, |entry| entry.variants.max(1));
             let likelier = base_cost - cost(&extended.fit, most);
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
-            // Its likelihood times how well its sizes agree with what is plausible, the others staying.
-            let log_odds =
-                directions.as_ref().map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions))
-                    - trials;
-            let explains = likelier - 0.5 * directions.map_or(0, |directions| directions.len()) as f64;
+            let (log_odds, explains) = evidence(likelier, directions.as_deref(), trials);
             (Name { candidate, log_odds, explains, outdone: false }, extended)
         })
         .collect();
     named.sort_by(|a, b| b.0.log_odds.total_cmp(&a.0.log_odds));
-    // What no effect can be is no name; where it explains more than all that can, no name is right alone.
+    // Unphysical candidates are no causes. Where one explains more than all others, the first of those is
+    // doubted.
     let best = named.first().map_or(f64::NEG_INFINITY, |(name, _)| name.log_odds);
     named.retain(|(_, extended)| is_physical(extended, index));
     if let Some((name, _)) = named.first_mut() {
@@ -99,19 +77,102 @@ pub(crate) fn rivals<'a>(
     named
 }
 
-/// Variances of sizes by what the candidate beside them is not known to be: how far they go where it has another of its names, by the names' chances. For each other candidate
-/// of the likeliest model, its sizes in turn.
+/// The score statistic from which on a candidate is a close rival of the best.
+fn close_statistic(best: f64) -> f64 {
+    best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best)
+}
+
+/// The candidates that are refitted, by their scores: those that explain enough, most probable first, and
+/// no more of them than are worth it; close rivals beyond that.
+fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
+    let close = close_statistic(best);
+    let least = close.min(MIN_RIVAL_STATISTIC_RATIO * best);
+    let mut ranked: Vec<&Entry> =
+        entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
+    ranked.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
+    let refitted = ranked.into_iter().enumerate();
+    refitted
+        .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= close)
+        .map(|(_, entry)| entry)
+        .take(MAX_CLOSE_RIVALS)
+        .collect()
+}
+
+/// Log odds of a candidate over none, and its log likelihood less what its freedom gains by accident: from
+/// how much likelier it makes the data, its sizes along principal directions, and how many variants were
+/// tried.
+fn evidence(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
+    let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
+    let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
+    (log_odds - (trials as f64).ln(), explains)
+}
+
+/// Variances of the other candidates' sizes over the causes of one candidate: how far they move if it has
+/// another cause, weighed by the causes' odds. For each other candidate of the most probable model, its
+/// sizes in turn.
 pub(crate) fn over_names(index: usize, names: &[(Name, AugmentedModel<'_>)]) -> Vec<(Candidate, Vec<f64>)> {
     let Some((top, likeliest)) = names.first() else { return Vec::new() };
-    let weights: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
-    let all: f64 = weights.iter().sum();
+    let odds: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
     let variances = |other: usize| {
-        let own = likeliest.estimates(other);
-        let moved = |model: &AugmentedModel<'_>| (model.estimates(other) - &own).map(|by| by * by);
-        let sum = names.iter().zip(&weights).fold(DVector::zeros(own.len()), |sum, ((_, model), occam_factor)| {
-            sum + moved(model) * (occam_factor / all)
-        });
-        (likeliest.candidates[other].clone(), sum.as_slice().to_vec())
+        let sizes: Vec<DVector<f64>> = names.iter().map(|(_, model)| model.estimates(other)).collect();
+        (likeliest.candidates[other].clone(), variances_between(&sizes, &odds).as_slice().to_vec())
     };
     (0..likeliest.candidates.len()).filter(|other| *other != index).map(variances).collect()
+}
+
+/// Mean squares of sizes about the first ones, weighed by the odds of the models that have them.
+fn variances_between(sizes: &[DVector<f64>], odds: &[f64]) -> DVector<f64> {
+    let all: f64 = odds.iter().sum();
+    let moved = |own: &DVector<f64>| (own - &sizes[0]).map(|by| by * by);
+    sizes.iter().zip(odds).fold(DVector::zeros(sizes[0].len()), |sum, (own, odds)| sum + moved(own) * (odds / all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranking::best_variants;
+    use crate::ranking::tests::scored;
+
+    fn ids(entries: &[&Entry]) -> Vec<&'static str> {
+        entries.iter().map(|entry| entry.scored.candidate.id()).collect()
+    }
+
+    #[test]
+    fn contenders_explain_half_of_the_best_or_are_close_to_it() {
+        // The best explains 100: half of it is 50; a close rival lacks 12 at the most. One without a
+        // direction is none.
+        let all = [
+            scored("slip_speed", 100.0, 40.0, 1),
+            scored("lateral_skid", 51.0, 20.0, 1),
+            scored("carpet_nap", 49.0, 30.0, 1),
+            scored("backlash", 90.0, 41.0, 1),
+            scored("slope", 100.0, 50.0, 0),
+        ];
+        // Rejects an order by the statistic, which puts slip_speed first, and a limit at 12 below the best
+        // for all.
+        assert_eq!(ids(&contenders(&best_variants(&all), 100.0)), ["backlash", "slip_speed", "lateral_skid"]);
+        // A weak best: 15 less 12 is 3, below half of it. Rejects half of the best as the only limit.
+        let weak =
+            [scored("slip_speed", 15.0, 4.0, 1), scored("backlash", 3.5, 1.0, 1), scored("carpet_nap", 2.5, 2.0, 1)];
+        assert_eq!(ids(&contenders(&best_variants(&weak), 15.0)), ["slip_speed", "backlash"]);
+    }
+
+    #[test]
+    fn odds_are_likelihood_less_freedom_and_trials() {
+        // Two directions of no information cost nothing but what they explain: none at size 0. Four
+        // variants cost ln 4.
+        let (log_odds, explains) = evidence(10.0, Some(&[(0.0, 0.0), (0.0, 0.0)]), 4);
+        assert!((log_odds - (10.0 - 4_f64.ln())).abs() < 1e-15);
+        // Half of χ² with two degrees of freedom, on average. Rejects a whole one a direction, 8.
+        assert_eq!(explains, 9.0);
+        // What cannot be tested has no odds, whatever it explains.
+        assert_eq!(evidence(10.0, None, 1), (f64::NEG_INFINITY, 10.0));
+    }
+
+    #[test]
+    fn sizes_that_differ_between_causes_are_known_less_well() {
+        // Odds 3 : 1, sizes (1, 0) and (3, 0): a quarter of (3 − 1)². Rejects a variance about the mean, 3/4.
+        let sizes = [[1.0, 0.0], [3.0, 0.0]].map(|size| DVector::from_column_slice(&size));
+        assert_eq!(variances_between(&sizes, &[3.0, 1.0]).as_slice(), [1.0, 0.0]);
+    }
 }

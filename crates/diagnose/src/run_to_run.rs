@@ -5,11 +5,14 @@ use estimation::{Column, total};
 use crate::augmented_model::AugmentedModel;
 use crate::statistics::p_of_chi_square;
 
-/// The chance of a wheelbase that differs as much from run to run, were it one: scores of the runs, each with the variance that it should have.
+/// p-value of a wheelbase that differs so much between runs, were it constant: scores of the runs, each
+/// with its variance.
 ///
-/// Noise of the turns grows with their root, and is soon lost in that of the wheels; a wheelbase that is drawn for each motion errs in proportion to the turn. u_r being
-/// the score of run r by the wheelbase, the other free columns taken out, and V_r its variance, Σ u_r² is a weighted sum of χ²s, in law about like one χ² with as much mean
-/// and variance. References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
+/// Turn noise grows with the root of the turn, and is soon lost in that of the wheels; a wheelbase that is
+/// drawn for each motion errs in proportion to the turn. With u_r the score of run r by the wheelbase, the
+/// other free columns projected out, and V_r its variance, Σ u_r² is a weighted sum of χ² variables. It is
+/// approximated by one χ² of the same mean and variance.
+/// References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
 pub(crate) fn differs_from_run_to_run(model: &AugmentedModel<'_>) -> f64 {
     let runs: Vec<_> = model.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
     let Some(equations) = total(&model.fit.solution.pass.runs) else { return 1.0 };

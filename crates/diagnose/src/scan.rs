@@ -1,9 +1,10 @@
 //! Score tests: what a term would add to a fit, from one pass at the fit's values.
 //!
-//! With the normal equation (I, g) over all columns, n what the fit holds free and c a candidate's parameters: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc,
-//! g_c|n = g_c − I_cn I_nn⁻¹ g_n, and gᵀI⁻¹g is χ² without the effect and noncentral with λ = sizeᵀ I_c|n size. In units of what would be a large size,
-//! directions that even such a size would not show are left out: they cost power and show nothing.
-//! Reference: Rao 1948 (score test); Laplace's approximation for the chance of the data under a prior of the sizes.
+//! With the normal equation (I, g) over all columns, n what the fit holds free and c a candidate's
+//! parameters: I_c|n = I_cc − I_cn I_nn⁻¹ I_nc, g_c|n = g_c − I_cn I_nn⁻¹ g_n, and gᵀI⁻¹g is χ² without the
+//! effect and noncentral with λ = sizeᵀ I_c|n size. In units of what would be a large size, directions that
+//! even such a size would not show are left out: they cost power and show nothing.
+//! Reference: Rao 1948 (score test); Laplace's approximation of the evidence under a prior of the sizes.
 
 use estimation::{Column, ModelFit, NormalEquations, Projected, RIDGE, inverse, total};
 use model_term::TermParameter;
@@ -11,12 +12,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::candidate::{Candidate, terms, terms_together};
+use crate::settings::search::{
+    DECIMATION_STEP_S, MAX_COLUMNS_PER_PASS, MIN_COLUMN_SHARE, MIN_DETECTABLE_SIGMAS, PRIOR_SCALES,
+};
 use crate::statistics::p_of_score;
-
-/// A size that is large for a real robot must stand out by at least this many standard deviations in a direction for that to be tested.
-const MIN_DETECTABLE: f64 = 1.0;
-/// What is left of a column beside the others, as a share of its information, below which it is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A candidate's test.
 #[derive(Debug, Clone)]
@@ -29,13 +28,14 @@ pub(crate) struct Scored {
     pub(crate) dimensions: usize,
     pub(crate) statistic: f64,
     pub(crate) p_value: f64,
-    /// Its sizes as one step of the fit finds them, and their standard deviations; none where they cannot be told from each other.
+    /// Its sizes by one step of the fit, and their standard deviations; none where they are not determined.
     pub(crate) estimates: Vec<(f64, f64)>,
-    /// Log of the chance of the data with the effect over that without, sizes being normal about zero with what is plausible.
+    /// Log Bayes factor of the effect over none, with a normal prior of the sizes about zero.
     pub(crate) log_odds: f64,
 }
 
-/// A candidate's information and gradient in units of what is plausible, along its principal directions: eigenvalue and gradient of each.
+/// A candidate's information and gradient in units of what is plausible, along its principal directions:
+/// eigenvalue and gradient of each.
 pub(crate) fn principal(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -50,13 +50,12 @@ pub(crate) fn principal(
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
 }
 
-/// Scales of the prior of sizes: what is plausible, halved again and again.
-const SCALES: i32 = 11;
-
-/// Log of the chance of the data with some sizes free over that with the best ones: what their freedom costs, and how well they agree with what is plausible.
+/// Log Occam factor: log evidence with some sizes free over that at the best sizes. It is what their
+/// freedom costs, and how well they agree with their prior.
 ///
-/// Sizes are normal about zero with a scale of their own, which is anything from what is plausible down to a thousandth of it with even chances in its logarithm (a
-/// mixture of g-priors; Liang et al. 2008): a small effect is not less likely because a large one would have been plausible. `directions` are principal ones: the
+/// Sizes are normal about zero. The scale is anything from what is plausible down to a thousandth of it,
+/// with equal probabilities in its logarithm (a mixture of g-priors; Liang et al. 2008): a small effect is
+/// not less likely because a large one would have been plausible. `directions` are principal ones: the
 /// information of a plausible size, and the χ² that the direction explains.
 pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     let at = |scale: i32| -> f64 {
@@ -66,10 +65,10 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
         };
         directions.iter().map(of).sum()
     };
-    let all: Vec<f64> = (0..SCALES).map(at).collect();
+    let all: Vec<f64> = (0..PRIOR_SCALES).map(at).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let sum: f64 = all.iter().map(|weight| (weight - most).exp()).sum();
-    most + (sum / f64::from(SCALES)).ln()
+    let sum: f64 = all.iter().map(|log_factor| (log_factor - most).exp()).sum();
+    most + (sum / f64::from(PRIOR_SCALES)).ln()
 }
 
 /// How many values the noise was estimated from, after the free columns.
@@ -78,22 +77,16 @@ pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
     (equations.count - columns).max(1.0)
 }
 
-/// Most columns of a pass over a scan's candidates: a whole number of products on three channels. What every pass does for itself, the filter and the model's own terms, is done
-/// again for so many, and a state of so many stays near the processor.
-const MAX_COLUMNS: usize = 126;
-
-/// What candidates go with hardly changes within such a time, seconds: rows of a fast log are taken together.
-const STEP_S: f64 = 0.05;
-
-/// Asks something of parts of a scan, each of candidates that are tested as a whole beside the candidates that the fit already has: of its candidates, what the fit leaves of
-/// their columns, and the evidence. Nothing where the fit's own columns are not determined.
+/// Evaluates parts of a scan. The candidates of a part are tested as a whole beside those that the fit has.
+/// `answer` gets them, what the fit leaves of their columns, and the normal equations. Nothing where the
+/// fit's own columns are not determined.
 pub(crate) fn scan_parts_of<T: Send>(
     fit: &ModelFit<'_>,
     chosen: &[Candidate],
     parts: &[&[Candidate]],
     answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
-    let Some(coarse) = fit.decimated(&mut terms(chosen), STEP_S) else {
+    let Some(coarse) = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S) else {
         return scan_parts_row_by_row(fit, chosen, parts, &answer);
     };
     let goes_by_rows = |part: &&[Candidate]| part.iter().any(Candidate::goes_by_rows);
@@ -116,7 +109,7 @@ fn scan_parts_row_by_row<T: Send>(
         let own = part.iter().map(|candidate| candidate.parameters().len()).sum::<usize>();
         columns += own;
         match passes.last_mut() {
-            Some(last) if columns <= MAX_COLUMNS => last.push((own, part)),
+            Some(last) if columns <= MAX_COLUMNS_PER_PASS => last.push((own, part)),
             _ => {
                 passes.push(vec![(own, part)]);
                 columns = own;
@@ -143,37 +136,118 @@ fn scan_parts_row_by_row<T: Send>(
 /// Tests every candidate beside the candidates that the fit already has.
 pub(crate) fn scan(fit: &ModelFit<'_>, chosen: &[Candidate], candidates: &[Candidate]) -> Vec<Scored> {
     let each: Vec<&[Candidate]> = candidates.chunks(1).collect();
-    scan_parts_of(fit, chosen, &each, |own, Projected { information, gradient, share }, equations| {
-        let freedom = freedom(fit, equations);
-        // Noise is estimated by likelihood, without its degrees of freedom.
-        let shrink = freedom / equations.count.max(1.0);
-        let candidate = own[0].clone();
-        let parameters = candidate.parameters();
-        let shown = share.iter().any(|share| *share > ROUNDING);
-        let mut directions = Vec::new();
-        if shown {
-            directions = principal(information, gradient, &parameters);
-            directions.retain(|(value, _)| *value >= MIN_DETECTABLE * MIN_DETECTABLE);
-        }
-        let dimensions = directions.len();
-        let explained: Vec<(f64, f64)> =
-            directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
-        let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
-        let log_odds = 0.5 * statistic + log_occam_factor(&explained);
-        let p_value = p_of_score(statistic / shrink, dimensions, equations.count, freedom);
-        let estimates = inverse(information, RIDGE).map_or(Vec::new(), |covariance| {
-            let step = -(&covariance * gradient);
-            step.iter().zip(covariance.diagonal().iter()).map(|(size, var)| (*size, var.sqrt())).collect()
-        });
-        Scored {
-            candidate,
-            parameters,
-            information: information.clone(),
-            dimensions,
-            statistic,
-            p_value,
-            estimates,
-            log_odds,
-        }
+    scan_parts_of(fit, chosen, &each, |own, projected, equations| {
+        score_test(&own[0], own[0].parameters(), projected, (equations.count, freedom(fit, equations)))
     })
+}
+
+/// The score test of a candidate by what the fit leaves of its columns; `count` observations, of which the
+/// free columns leave `freedom`.
+fn score_test(
+    candidate: &Candidate,
+    parameters: Vec<TermParameter>,
+    Projected { information, gradient, share }: &Projected,
+    (count, freedom): (f64, f64),
+) -> Scored {
+    // Noise is estimated by likelihood, without its degrees of freedom.
+    let shrink = freedom / count.max(1.0);
+    let mut directions = Vec::new();
+    if share.iter().any(|share| *share > MIN_COLUMN_SHARE) {
+        directions = principal(information, gradient, &parameters);
+        directions.retain(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
+    }
+    let dimensions = directions.len();
+    let explained: Vec<(f64, f64)> =
+        directions.iter().map(|(value, gradient)| (*value, shrink * gradient * gradient / value)).collect();
+    let statistic: f64 = explained.iter().map(|(_, explained)| explained).sum();
+    let log_odds = 0.5 * statistic + log_occam_factor(&explained);
+    let p_value = p_of_score(statistic / shrink, dimensions, count, freedom);
+    let estimates = inverse(information, RIDGE).map_or(Vec::new(), |covariance| {
+        let step = -(&covariance * gradient);
+        step.iter().zip(covariance.diagonal().iter()).map(|(size, var)| (*size, var.sqrt())).collect()
+    });
+    Scored {
+        candidate: candidate.clone(),
+        parameters,
+        information: information.clone(),
+        dimensions,
+        statistic,
+        p_value,
+        estimates,
+        log_odds,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: TermParameter = TermParameter { name: "a", unit: "1", prior_sigma: 1.0 };
+
+    /// I = [[4, 2], [2, 3]] and g = (−2, −4): I⁻¹ = [[3, −2], [−2, 4]]/8, −I⁻¹g = (−1/4, 3/2), gᵀI⁻¹g =
+    /// 11/2. Eigenvalues (7 ± √17)/2 = 5.56 and 1.44.
+    fn projected() -> Projected {
+        Projected {
+            information: DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]),
+            gradient: DVector::from_column_slice(&[-2.0, -4.0]),
+            share: vec![1.0, 1.0],
+        }
+    }
+
+    fn tested(prior_sigma: [f64; 2], of: (f64, f64)) -> Scored {
+        let candidate = Candidate::Effect { id: "slip_speed", variant: 0, at: None };
+        let parameters = prior_sigma.map(|prior_sigma| TermParameter { prior_sigma, ..UNIT }).to_vec();
+        score_test(&candidate, parameters, &projected(), of)
+    }
+
+    #[test]
+    fn the_score_test_of_two_parameters_is_that_on_paper() {
+        let scored = tested([1.0, 1.0], (1e9, 1e9));
+        assert_eq!(scored.dimensions, 2);
+        // Rejects (Σg)²/ΣI = 36/11, and a sum of gᵢ²/Iᵢᵢ = 1 + 16/3. Rounding and the ridge change it by
+        // 1e-11 at most.
+        assert!((scored.statistic - 5.5).abs() < 1e-11, "{}", scored.statistic);
+        // χ² with two degrees of freedom: e^(−11/4). The tail of F with 1e9 degrees of freedom rounds by
+        // some 1e-6 of it.
+        assert!((scored.p_value / f64::exp(-2.75) - 1.0).abs() < 1e-5, "{}", scored.p_value);
+        let expected = [(-0.25, 0.375_f64.sqrt()), (1.5, 0.5_f64.sqrt())];
+        for ((size, sigma), (of, sd)) in scored.estimates.iter().zip(expected) {
+            // Rejects a step along the gradient, +I⁻¹g.
+            assert!((size - of).abs() < 1e-11 && (sigma - sd).abs() < 1e-11, "{:?}", scored.estimates);
+        }
+    }
+
+    #[test]
+    fn directions_that_a_plausible_effect_does_not_show_are_not_tested() {
+        // A prior sigma of 0.1 on the second: [[4, 0.2], [0.2, 0.03]], eigenvalues 4.0100 and 0.0199.
+        // Rejects a threshold in the parameters' own units, which keeps both.
+        let scored = tested([1.0, 0.1], (1e9, 1e9));
+        assert_eq!(scored.dimensions, 1);
+        // The estimates are those of both parameters still.
+        assert!((scored.estimates[1].0 - 1.5).abs() < 1e-11);
+        assert_eq!(tested([0.1, 0.1], (1e9, 1e9)).dimensions, 0);
+    }
+
+    #[test]
+    fn few_degrees_of_freedom_shrink_the_statistic() {
+        // 20 observations, 5 free columns: 15/20 of 5.5. Rejects a variance over the count, which leaves 5.5.
+        let scored = tested([1.0, 1.0], (20.0, 15.0));
+        assert!((scored.statistic - 4.125).abs() < 1e-11, "{}", scored.statistic);
+    }
+
+    #[test]
+    fn the_occam_factor_is_a_mean_over_scales() {
+        // Nothing known of the size: the data are as likely with the effect as without.
+        assert!((0.5 * 9.0 + log_occam_factor(&[(0.0, 9.0)])).abs() < 1e-15);
+        // Information V = 1e12: each scale 2⁻ˢ costs ½ ln(4⁻ˢ V), and the mean over eleven is Σ2ˢ/11 =
+        // 2047/11 over √V. The smallest 4⁻ˢV is 1e6, hence 1e-5. Rejects a mean of the logs, which gives 5
+        // ln 2 in place of ln 186.
+        let found = log_occam_factor(&[(1e12, 9.0)]);
+        assert!((found - (f64::ln(2047.0 / 11.0) - 0.5 * f64::ln(1e12))).abs() < 1e-5, "{found}");
+        // Freedom costs: two such directions cost about twice the root of V, and share their scale: Σ4ˢ/11
+        // over V.
+        let found = log_occam_factor(&[(1e12, 0.0), (1e12, 0.0)]);
+        let scales: f64 = (0..11).map(|scale| 4_f64.powi(scale)).sum();
+        assert!((found - ((scales / 11.0).ln() - f64::ln(1e12))).abs() < 1e-5, "{found}");
+    }
 }

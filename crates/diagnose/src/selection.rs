@@ -1,4 +1,4 @@
-//! Which effects the data show: forward selection over the catalogue with refits, and which other names would do as well.
+//! Forward selection over the catalogue with refits, and the causes that the data do not discriminate.
 
 use estimation::ModelFit;
 
@@ -11,29 +11,33 @@ use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, over_names, rivals};
 use crate::run_to_run::differs_from_run_to_run;
-use crate::settings::{MAX_EFFECTS, RUNS_LEVEL, SCAN_LEVEL, TURNS_LEVEL};
+use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
+use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
 use crate::wald::{Test, cluster_robust_test, tests_of, wald_test};
 
-/// Most candidates that are tried for the next effect: where the best is not confirmed, another may be.
-const MAX_TRIED: usize = 3;
-/// Odometry must drift more with a name by so many times what the 95 % interval reaches before the name is none: within one of it an effect that is there, and does
-/// nothing to the drift, would be refused once in forty times.
-const NAMES_DRIFT: f64 = 2.0;
 /// What the search found.
 #[derive(Debug, Clone)]
 pub(crate) struct SearchResult<'a> {
     pub(crate) model: AugmentedModel<'a>,
-    /// For each candidate of the model: its names with itself, most probable first.
+    /// For each candidate of the model: its possible causes, most probable first.
     pub(crate) names: Vec<Vec<Name>>,
     /// For each candidate, its test at the end, in the presence of the others.
     pub(crate) tests: Vec<Test>,
-    /// By how much a candidate's variant and the names beside it, not being known for certain, widen each of its sizes.
+    /// For each candidate, the standard deviation that uncertain variants and causes add to each of its
+    /// sizes.
     extra_sigma: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
-    /// What was asked of the base.
+    /// Cache of the scans and fits on the base.
     pub(crate) known: FitCache<'a>,
+}
+
+impl<'a> SearchResult<'a> {
+    /// The same search where another explanation replaces its effects; `base` is the model without any.
+    pub(crate) fn without_effects(self, base: AugmentedModel<'a>) -> Self {
+        Self { model: base, names: Vec::new(), tests: Vec::new(), ..self }
+    }
 }
 
 /// The best of a scan, refitted, if that confirms it; else its name.
@@ -52,10 +56,10 @@ fn confirmed<'a>(
     let (name, extended) = found.swap_remove(0);
     // A size that the refit does not confirm was an accident of the score.
     let is_an_accident = wald_test(&extended, index).is_none_or(|(test, _)| test.p_value * tests > level);
-    // Nor is one of a few runs a size: what differs from run to run is none. Where turns scatter from run to run still, what goes with turns stands out by chance:
-    // it must hold over the runs as if measurements said nothing.
-    let scattered = differs_from_run_to_run(&extended) < TURNS_LEVEL;
-    let over_runs = if scattered { level / tests } else { RUNS_LEVEL };
+    // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
+    // seems significant: it must be significant over the runs alone.
+    let scattered = differs_from_run_to_run(&extended) < TURN_SCATTER_LEVEL;
+    let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
     if is_an_accident || !cluster_robust_test(&extended, index, over_runs) {
         return Err(name.candidate.id());
     }
@@ -70,13 +74,8 @@ fn grown<'a>(
     level: f64,
 ) -> Option<AugmentedModel<'a>> {
     let tests = tests_in(&entries);
-    for _ in 0..MAX_TRIED {
-        let best = entries
-            .iter()
-            .min_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic)))?;
-        if best.p_value * tests > level {
-            return None;
-        }
+    for _ in 0..MAX_CANDIDATES_TRIED {
+        let best = most_significant(&entries, tests, level)?;
         match confirmed((base, &mut *known), model, &entries, (best, tests), level) {
             Ok(grown) => return Some(grown),
             // What comes next may be what is there.
@@ -86,8 +85,30 @@ fn grown<'a>(
     None
 }
 
-/// Adds effects while the scan finds some, then asks of each whether it is needed beside the others, and what else it may be.
-/// `known` is what has been asked of the same base before.
+/// The most significant effect of a scan, if it is significant at a family-wise level over so many tests
+/// (Bonferroni: the smallest p-value is the first step of Holm's order). Where p-values are equal, as where
+/// both are 0, the larger statistic.
+fn most_significant(entries: &[Entry], tests: f64, level: f64) -> Option<&Entry> {
+    let order = |a: &&Entry, b: &&Entry| {
+        a.p_value.total_cmp(&b.p_value).then(b.scored.statistic.total_cmp(&a.scored.statistic))
+    };
+    entries.iter().min_by(order).filter(|best| best.p_value * tests <= level)
+}
+
+/// Which causes are not discriminated from the first, the most probable one: those within the margin of its
+/// log odds, or, as neither the prior nor what is plausible may exclude a cause that explains as much, of
+/// the most that any explains. Log odds and explained log likelihood of each.
+fn is_not_discriminated(causes: &[(f64, f64)]) -> Vec<bool> {
+    let top = causes.first().map_or(0.0, |(log_odds, _)| *log_odds);
+    let most = causes.iter().map(|(_, explains)| *explains).fold(f64::MIN, f64::max);
+    let is_close = |(log_odds, explains): &(f64, f64)| {
+        *log_odds > top - log_odds_margin(top) || *explains > most - log_odds_margin(most)
+    };
+    causes.iter().map(is_close).collect()
+}
+
+/// Adds effects while the scan finds some. Then tests whether each is needed beside the others, and finds
+/// its possible causes. `known` is the cache of the same base.
 pub(crate) fn search<'a>(
     base: &ModelFit<'a>,
     catalogue: &[Candidate],
@@ -113,7 +134,7 @@ pub(crate) fn search<'a>(
         let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
         let mut found = rivals((base, &mut known), &without, index, &entries, best);
         if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
-            // Another one took over what this one stood for, or beside the others it is none that can be.
+            // Another candidate explains it, or beside the others no physical one does.
             model = without;
             continue;
         }
@@ -121,26 +142,24 @@ pub(crate) fn search<'a>(
             entries.iter().find(|entry| entry.scored.candidate.id() == id).map_or(1, |entry| entry.variants.max(1))
         };
         let tests = tests_in(&entries);
-        let stands = |(name, extended): &(Name, AugmentedModel<'_>)| {
+        let is_significant = |(name, extended): &(Name, AugmentedModel<'_>)| {
             wald_test(extended, index)
                 .is_some_and(|(test, _)| sidak(test.p_value, variants(name.candidate.id())) * tests <= level)
         };
-        // A term that predicts unseen runs worse than none, or with which odometry drifts more for certain, is none. It is asked beside the others: alone, a part of
-        // what is there may predict worse.
+        // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is
+        // refused. It is tested beside the others: alone, a part of a larger effect may predict worse.
         let predicts = gain(&without, &found[0].1).map_or(true, |gain| {
             let score = gain.log_score_per_observation;
-            score.low + score.high > 0.0 && !gain.drifts_more_by(NAMES_DRIFT)
+            score.low + score.high > 0.0 && !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS)
         });
-        if !predicts || !found.iter().any(stands) {
-            // Nor does a name that came in its place.
+        if !predicts || !found.iter().any(is_significant) {
+            // No cause that replaced it is significant either.
             model = without;
             continue;
         }
-        let (top, most) = (found[0].0.log_odds, found.iter().map(|(name, _)| name.explains).fold(f64::MIN, f64::max));
-        // Neither what is plausible nor the prior of sizes may silence a name that explains as much.
-        found.retain(|(name, _)| {
-            name.log_odds > top - log_odds_margin(top) || name.explains > most - log_odds_margin(most)
-        });
+        let evidence: Vec<(f64, f64)> = found.iter().map(|(name, _)| (name.log_odds, name.explains)).collect();
+        let mut kept = is_not_discriminated(&evidence).into_iter();
+        found.retain(|_| kept.next().unwrap_or(false));
         names.push(found.iter().map(|(name, _)| name.clone()).collect());
         beside.extend(over_names(index, &found));
         model = found.swap_remove(0).1;
@@ -157,7 +176,7 @@ pub(crate) fn search<'a>(
                 .for_each(|(extra_sigma, variance)| *extra_sigma = extra_sigma.hypot(variance.sqrt()));
         }
     }
-    // What stood for a variant that was not met is not needed any more.
+    // Candidates that stood in for a variant that is fitted now are not needed any more.
     let tests = tests_in(&first_scan);
     for index in (0..names.len()).rev() {
         if wald_test(&model, index).is_some_and(|(test, _)| test.p_value * tests <= level) {
@@ -172,8 +191,8 @@ pub(crate) fn search<'a>(
     SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, known }
 }
 
-/// What a search among all measurements finds, those too that lie far off by the model that was found: a large effect that shows in few measurements makes them lie far off, and among
-/// the others it is not seen.
+/// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
+/// among the others it is not seen.
 pub(crate) fn search_ungated<'a>(
     base: &ModelFit<'a>,
     found: &SearchResult<'a>,
@@ -187,13 +206,46 @@ pub(crate) fn search_ungated<'a>(
     let model = regated(bold.model, base, &found.model, 0.0)?;
     let tests = tests_of(&model, &bold.extra_sigma);
     let trials = tests_in(&bold.first_scan);
-    let stands = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
-    let predicts = gain(&AugmentedModel::base(base), &model).map_or(true, |gain| !gain.drifts_more_by(NAMES_DRIFT));
-    (stands && predicts).then(|| SearchResult {
+    let is_significant = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
+    let predicts = gain(&AugmentedModel::base(base), &model)
+        .map_or(true, |gain| !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
+    (is_significant && predicts).then(|| SearchResult {
         model,
         tests,
         first_scan: found.first_scan.clone(),
         known: found.known.clone(),
         ..bold
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranking::tests::scored;
+
+    #[test]
+    fn the_most_significant_effect_is_next_if_it_pays_for_all() {
+        // χ² with one degree of freedom: 6.63 has p = 0.01, 3.84 has p = 0.05.
+        let all = [scored("slip_speed", 3.84, 9.0, 1), scored("backlash", 6.635, 1.0, 1)];
+        let entries = best_variants(&all);
+        let next = |tests, level| most_significant(&entries, tests, level).map(|entry| entry.scored.candidate.id());
+        // Two tests at 3 %: 0.01 · 2 ≤ 0.03. Rejects the most probable, which is not the most significant.
+        assert_eq!(next(2.0, 0.03), Some("backlash"));
+        // Four: 0.04 > 0.03. Rejects an uncorrected p-value.
+        assert_eq!(next(4.0, 0.03), None);
+        // Both underflow: the larger statistic. Rejects the first in the catalogue's order.
+        let large = best_variants(&[scored("slip_speed", 5e3, 9.0, 1), scored("backlash", 6e3, 1.0, 1)]);
+        assert_eq!(most_significant(&large, 2.0, 0.03).map(|entry| entry.scored.candidate.id()), Some("backlash"));
+    }
+
+    #[test]
+    fn causes_within_the_margin_are_not_discriminated() {
+        // Margin 3 below log odds of 300 and less. Rejects a margin of the best's share alone, 0.2.
+        assert_eq!(is_not_discriminated(&[(20.0, 30.0), (17.1, 20.0), (16.9, 20.0)]), [true, true, false]);
+        // 1 % of 1000. Rejects the margin of 3.
+        assert_eq!(is_not_discriminated(&[(1000.0, 1010.0), (991.0, 0.0), (989.0, 0.0)]), [true, true, false]);
+        // Far less probable, but it explains as much: its prior alone excludes it. Rejects the odds as the
+        // only criterion.
+        assert_eq!(is_not_discriminated(&[(20.0, 30.0), (5.0, 29.0)]), [true, true]);
+    }
 }

@@ -1,4 +1,4 @@
-//! Structure that no name of the catalogue explains: sparse terms, each if it earns its place on runs that it was not fitted to.
+//! Sparse terms: products of covariates that are in no catalogue, each if it predicts held-out runs better.
 
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
@@ -11,11 +11,9 @@ use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
 use crate::model_comparison::{log_bayes_factor, regated};
 use crate::scan::{Scored, scan};
-use crate::settings::UNLISTED_LEVEL;
+use crate::settings::levels::SPARSE_TERM_LEVEL;
+use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
 use crate::statistics::sidak;
-
-/// Refits of the best by their scores.
-const TRIED: usize = 3;
 
 /// A sparse term with its model.
 pub(crate) struct FoundTerm<'a> {
@@ -23,33 +21,31 @@ pub(crate) struct FoundTerm<'a> {
     pub(crate) p_value: f64,
     /// How many products were tried.
     pub(crate) trials: usize,
-    /// It gains on held-out runs by more than twice what chance does in 95 % of cases: correlated measurements, which differ from run to run, do not do that.
+    /// Its gain on held-out runs is more than two half-widths of the 95 % interval above zero;
+    /// autocorrelated measurements, which differ from run to run, do not reach that.
     pub(crate) certain: bool,
     /// Measurements are likelier with it, but odometry drifts more: it stands for something else.
     pub(crate) drifts_more: bool,
 }
 
-/// Log of the trials that a sparse term has to pay for.
+/// Log of the trials of a sparse term.
 fn log_trials(trials: usize) -> f64 {
     (trials as f64).ln()
 }
 
-/// Sparse terms of one thing at the most: a wheel's phase has a sine and a cosine, and there are two wheels.
-const MAX_TERMS: usize = 4;
-
-/// What is there without a name: a model, the last of whose candidates are sparse terms.
+/// Uncatalogued terms: a model whose last candidates are sparse terms.
 pub(crate) struct UncataloguedTerms<'a> {
     pub(crate) model: AugmentedModel<'a>,
-    /// Of each sparse term, its chance and how many were tried.
+    /// Of each sparse term, its p-value and how many were tried.
     pub(crate) tried: Vec<(f64, usize)>,
 }
 
 impl<'a> UncataloguedTerms<'a> {
-    /// A term that was found, and what is left beside it.
+    /// A term that was found, and further ones beside it.
     pub(crate) fn from(base: &ModelFit<'a>, first: FoundTerm<'a>) -> Self {
         let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
-        while all.tried.len() < MAX_TERMS
-            && let Some(next) = sparse(base, &all.model, UNLISTED_LEVEL).filter(|next| !next.drifts_more)
+        while all.tried.len() < MAX_SPARSE_TERMS
+            && let Some(next) = sparse(base, &all.model, SPARSE_TERM_LEVEL).filter(|next| !next.drifts_more)
         {
             all.model = next.model;
             all.tried.push((next.p_value, next.trials));
@@ -57,26 +53,28 @@ impl<'a> UncataloguedTerms<'a> {
         all
     }
 
-    /// What is there among all measurements, those too that lie far off by a model without anything: what is large in few measurements hides them.
+    /// Terms that an ungated search finds: what is large in few measurements makes them outliers.
     pub(crate) fn ungated_terms(base: &ModelFit<'a>) -> Option<Self> {
         let open = base.refit_ungated().ok()?;
-        let first = sparse(&open, &AugmentedModel::base(&open), UNLISTED_LEVEL).filter(|first| !first.drifts_more)?;
+        let first =
+            sparse(&open, &AugmentedModel::base(&open), SPARSE_TERM_LEVEL).filter(|first| !first.drifts_more)?;
         let all = Self::from(&open, first);
         let log_trials = all.log_trials();
         Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
     }
 
-    /// Log of the chance of the data under it over that under a fit without anything, the trials paid for.
+    /// Log Bayes factor over a fit without terms, corrected for the trials.
     pub(crate) fn log_bayes_factor(&self, alone: &ModelFit<'a>) -> f64 {
         log_bayes_factor(alone, &self.model) - self.log_trials()
     }
 
-    /// Log of the trials that its sparse terms have to pay for.
+    /// Log of the trials of its sparse terms.
     fn log_trials(&self) -> f64 {
         self.tried.iter().map(|(_, trials)| log_trials(*trials)).sum()
     }
 
-    /// The places of its sparse terms among the model's candidates, each with its chance and how many were tried.
+    /// The indices of its sparse terms among the model's candidates, each with its p-value and how many
+    /// were tried.
     pub(crate) fn terms(&self) -> impl Iterator<Item = (usize, f64, usize)> {
         let first = self.model.candidates.len() - self.tried.len();
         self.tried.iter().enumerate().map(move |(k, &(p_value, trials))| (first + k, p_value, trials))
@@ -138,12 +136,18 @@ fn library(fit: &ModelFit<'_>) -> Vec<Candidate> {
     // On a spin a bend is the sense of the turn: of the yaw alone it says what speeds do not.
     let bends = [AbsSpeed, AbsYawRate]
         .map(|rate| Candidate::Sparse(Sparse { channel: Channel::Yaw, covariates: vec![rate, Curvature] }));
-    let seen = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
-    let seen = seen.into_iter().flat_map(|covariates| {
+    let of_instrument = [vec![], vec![Speed], vec![YawRate], vec![CosHeading], vec![SinHeading], vec![RunTime]];
+    let of_instrument = of_instrument.into_iter().flat_map(|covariates| {
         Channel::INSTRUMENT.map(|channel| Candidate::Sparse(Sparse { channel, covariates: covariates.clone() }))
     });
     let cycles = Side::BOTH.into_iter().flat_map(of_cycles).map(Candidate::Sparse);
-    moved.chain(bends).chain(wheels).chain(cycles).chain(seen).chain([Candidate::Sparse(Sparse::of_rows())]).collect()
+    moved
+        .chain(bends)
+        .chain(wheels)
+        .chain(cycles)
+        .chain(of_instrument)
+        .chain([Candidate::Sparse(Sparse::of_rows())])
+        .collect()
 }
 
 /// What wheels may do by themselves. Their way alone is their size, which every fit has.
@@ -181,7 +185,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
         Self::up_to(1.0, base, model)
     }
 
-    /// The same if the best stands out by its score.
+    /// The same if the best is significant by its score.
     fn up_to(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         let (scored, p_value) = best_first(base, model)?;
         let trials = scored.len();
@@ -195,11 +199,11 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             model,
             p_value,
             trials,
-            refitted: scored[..TRIED.min(trials)].par_iter().filter_map(with).collect(),
+            refitted: scored[..MAX_SPARSE_REFITS.min(trials)].par_iter().filter_map(with).collect(),
         })
     }
 
-    /// The best of them that earns its place, if the best stands out by its score.
+    /// The best of them that predicts held-out runs better, if the best is significant by its score.
     pub(crate) fn finding(&self, level: f64) -> Option<FoundTerm<'a>> {
         if self.p_value > level {
             return None;
@@ -222,7 +226,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             })
     }
 
-    /// Log of the chance of the data under the likeliest of them over that without, the trials paid for.
+    /// Log Bayes factor of the likeliest of them, corrected for the trials.
     pub(crate) fn log_bayes_factor(&self) -> f64 {
         self.refitted.iter().map(|model| self.log_bayes_factor_of(model)).fold(f64::NEG_INFINITY, f64::max)
     }
@@ -233,13 +237,14 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     }
 }
 
-/// The best sparse term's score beside a model, and its chance where all is explained; `None` where no term can be seen.
+/// Score of the best sparse term beside a model, and its p-value; `None` where no term is detectable.
 pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(f64, f64)> {
     let (scored, p_value) = best_first(base, model)?;
     Some((scored.first()?.statistic, p_value))
 }
 
-/// Sparse terms by their scores beside a model, the best first, and the best's chance; `None` where no term can be seen.
+/// Sparse terms by their scores beside a model, the best first, and its p-value; `None` where none is
+/// detectable.
 fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Scored>, f64)> {
     let library = library(base);
     let mut scored: Vec<Scored> =

@@ -5,8 +5,8 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 use statrs::function::erf::erfc_inv;
 
-/// Chance of a sum of `dimensions` squared normal variables over their variance this large, when the variance itself was estimated from about
-/// `freedom` values.
+/// p-value of a sum of `dimensions` squared normal variables over their variance, when the variance was
+/// estimated from about `freedom` values.
 pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) -> f64 {
     if dimensions == 0 || !statistic.is_finite() {
         return 1.0;
@@ -15,8 +15,9 @@ pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) ->
     FisherSnedecor::new(dimensions, freedom.max(1.0)).map_or(1.0, |f| f.sf(statistic.max(0.0) / dimensions))
 }
 
-/// The same of a score's statistic, g'I⁻¹g, whose variance was estimated from `count` values that have what is tested in them: it is at most `count`, and what it
-/// leaves of that is what the variance should have been estimated from (exact for one variance: F of the regression).
+/// The same of a score's statistic, g'I⁻¹g, whose variance was estimated from `count` values that have what
+/// is tested in them: it is at most `count`, and what it leaves of that is what the variance should have
+/// been estimated from (exact for one variance: F of the regression).
 pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom: f64) -> f64 {
     let left = freedom - dimensions as f64;
     if dimensions == 0 || !statistic.is_finite() || left < 1.0 {
@@ -26,22 +27,22 @@ pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom:
     p_of_statistic(left * share / (1.0 - share), dimensions, left)
 }
 
-/// Chance of a χ² this large.
+/// p-value of a χ² variable.
 pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom.max(1.0)).map_or(1.0, |chi| chi.sf(statistic.max(0.0)))
 }
 
-/// Two-sided chance of a normal variable this far out.
+/// Two-sided p-value of a normal variable.
 pub(crate) fn p_of_z(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| 2.0 * normal.sf(z.abs()))
 }
 
-/// Two-sided chance of a Student variable this far out.
+/// Two-sided p-value of a Student variable.
 pub(crate) fn p_of_student(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| 2.0 * student.sf(t.abs()))
 }
 
-/// How far out a normal variable of this two-sided chance is.
+/// Standard normal quantile of a two-sided p-value.
 pub(crate) fn z_of_p(p: f64) -> f64 {
     std::f64::consts::SQRT_2 * erfc_inv(p.clamp(1e-300, 1.0))
 }
@@ -51,7 +52,7 @@ pub(crate) fn student_95(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
 }
 
-/// The chance that the best of so many trials is as good as `p`; Šidák 1967.
+/// Probability that the best of so many trials is as good as `p`; Šidák 1967.
 pub(crate) fn sidak(p: f64, trials: usize) -> f64 {
     let trials = trials as f64;
     -f64::exp_m1(trials * f64::ln_1p(-p.min(1.0 - 1e-16)))
@@ -77,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chances_and_quantiles_are_each_others_inverse() {
+    fn probabilities_and_quantiles_are_each_others_inverse() {
         for z in [0.5, 1.959_964, 4.0, 12.0] {
             assert!((z_of_p(p_of_z(z)) - z).abs() < 1e-6 * z, "{z}");
         }

@@ -39,7 +39,7 @@ fn listed(values: &BTreeMap<String, Value>) -> String {
 
 /// The candidates, what speaks for them, and what casts doubt on them.
 fn sentence(finding: &Finding) -> String {
-    // Doubts that came after the finding are told after it; its candidates are those that it was found with.
+    // Doubts come after the finding in print; its candidates are those that it was found with.
     let added = |doubt: &Doubt| *doubt != Doubt::ProbablyPartOfUnlisted;
     let is_doubted = finding.doubts.iter().any(added);
     let skipped = usize::from(finding.doubts.contains(&Doubt::ProbablyPartOfUnlisted));
@@ -145,7 +145,7 @@ pub(crate) fn summary(findings: &[Finding], gain: Option<&Gain>) -> String {
     let names = |finding: &Finding| {
         let ids: Vec<&str> = finding.causes.iter().map(Cause::id).collect();
         match finding.first() {
-            // An uncatalogued term is told by what it depends on.
+            // An uncatalogued term is described by its covariates.
             Cause::Term(term) => {
                 format!("{} ({} with {})", ids.join(" or "), term.channel, term.covariates.join(" · "))
             }

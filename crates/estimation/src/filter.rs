@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
+use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
@@ -59,6 +60,8 @@ impl OutlierGate {
 pub(crate) struct PassOptions<'p> {
     pub(crate) noise_score: bool,
     pub(crate) innovations: bool,
+    /// How the robot moved before each measurement, by the counts; not with propagation that was kept.
+    pub(crate) samples: bool,
     pub(crate) gate: OutlierGate,
     /// Record the propagations, for passes at models near this one.
     pub(crate) keep: bool,
@@ -107,6 +110,7 @@ pub(super) struct Filter<'f, 'a> {
     by_measurement: Derivatives,
     pub(super) sums: Sums<'f>,
     pub(super) innovations: Vec<InnovationComponent>,
+    pub(super) samples: Vec<KinematicSample>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
     /// Derivatives of a component of the measurement by each column: directly, and in all.
@@ -143,13 +147,17 @@ impl<'f, 'a> Filter<'f, 'a> {
         let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
         // One more for a free heading.
         let all = columns + 1;
+        let mut propagator = Propagator::new(segment, model, terms);
+        if pass_options.samples {
+            propagator.take_samples();
+        }
         Self {
             segment,
             number,
             model,
             instrument: model.instrument(segment.run),
             noise,
-            propagator: Propagator::new(segment, model, terms),
+            propagator,
             pass_options,
             pose: Pose::IDENTITY,
             covariance: Covariance::ZERO,
@@ -159,6 +167,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             by_measurement: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
             innovations: Vec::new(),
+            samples: Vec::new(),
             outliers: Vec::new(),
             noise_score: NoiseScore::zero(),
             direct: vec![0.0; all],
@@ -282,6 +291,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
         self.by.set(Column::Latency.index(), moved);
         self.measurement(propagations, t_s, twist);
+        // What went before the start is not since the measurement before the next one.
+        let _ = self.propagator.sample(self.pose, (self.number, 0));
         for (number, size) in self.model.term_values.iter().enumerate() {
             let measurement = self.by_measurement.get(number);
             self.by.set(Column::Term(number).index(), -measurement);
@@ -353,6 +364,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
         let twist = self.propagator.twist(&interval);
         self.measurement(number + 1, measured.t_s, twist);
+        let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
@@ -399,6 +411,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             return false;
         }
         self.covariance = covariance;
+        self.samples.extend(sample);
         // The geometry, and a free heading, which is the last column, act through the pose alone.
         let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -moved];
         for (component, update) in measured.iter().enumerate().take(components) {

@@ -260,12 +260,22 @@ impl ModelFit<'_> {
     /// made of. The terms of the fit come first.
     #[must_use]
     pub fn scan(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        self.scan_with(terms, PassOptions { innovations: true, ..PassOptions::default() })
+    }
+
+    /// The same with samples of how the robot moved before each measurement.
+    #[must_use]
+    pub fn scan_with_samples(&self, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        self.scan_with(terms, PassOptions { innovations: true, samples: true, ..PassOptions::default() })
+    }
+
+    fn scan_with(&self, terms: &mut [Box<dyn ModelTerm>], options: PassOptions<'_>) -> Pass {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
         // Terms of the fit come first and keep their values.
         let mut model = self.solution.model.clone();
         model.term_values.resize(parameters, 0.0);
         let Solution { noise, free_headings, .. } = &self.solution;
-        let pass_options = PassOptions { innovations: true, gate: self.gate(), ..PassOptions::default() };
+        let pass_options = PassOptions { gate: self.gate(), ..options };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
     }
 
@@ -307,12 +317,7 @@ impl ModelFit<'_> {
     /// in parts of these sizes, and columns of two parts have no products.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
-        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        let mut model = self.solution.model.clone();
-        model.term_values.resize(parameters, 0.0);
-        let Solution { noise, free_headings, .. } = &self.solution;
-        let pass_options = PassOptions { parts, gate: self.gate(), ..PassOptions::default() };
-        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
+        self.scan_with(terms, PassOptions { parts, ..PassOptions::default() }).runs
     }
 
     /// The fit with further terms, whose values are free beside the columns that are free already, on the

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::filter::{Filter, InnovationComponent, NoiseScore, PassOptions};
 use crate::group_extrinsics::GroupResponse;
+use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::normal_equations::NormalEquations;
@@ -23,6 +24,9 @@ pub struct Pass {
     pub runs: Vec<NormalEquations>,
     /// The whitened innovations, phase by phase, in the order of segments and measurements.
     pub innovations: Vec<Vec<InnovationComponent>>,
+    /// How the robot moved before each measurement, phase by phase, in the order of the innovations; empty
+    /// where it is not asked for.
+    pub samples: Vec<Vec<KinematicSample>>,
     /// Outliers of the first phase: segment and measurement.
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
@@ -52,6 +56,7 @@ impl Pass {
         Self {
             runs: Vec::new(),
             innovations: Vec::new(),
+            samples: Vec::new(),
             outliers: Vec::new(),
             noise: NoiseScore::zero(),
             headings: Vec::new(),
@@ -78,6 +83,8 @@ pub(crate) fn pass(
     let runs = runs(&records.segments);
     result.runs =
         runs.iter().map(|segments| NormalEquations::new(records.segments[segments.start].run, columns)).collect();
+    // Terms and samples remember what was driven before.
+    let has_memory = !terms.is_empty() || pass_options.samples;
     let reused = pass_options.by.map(|cached| (cached, cached.change_to(model)));
     let of_segment = |(phase, number): (usize, usize),
                       propagations: &[PropagationInterval],
@@ -95,9 +102,10 @@ pub(crate) fn pass(
         }
         filter.run(propagations, free_headings[number]);
         *carried = Some(filter.carried());
+        let samples = std::mem::take(&mut filter.samples);
         let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
         let (equations, heading) = sums.eliminated(segment.run, columns);
-        (equations, OfSegment { number, heading, innovations, outliers, noise_score, cached })
+        (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, cached })
     };
     let mut phases = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {
@@ -107,8 +115,8 @@ pub(crate) fn pass(
             let mut found = Vec::with_capacity(segments.len());
             for number in segments.clone() {
                 let unobservable = propagations[number].is_empty();
-                // The state of terms goes on over displacements that are not taken.
-                let remember = !terms.is_empty() && pass_options.by.is_none();
+                // The state of terms, and what samples hold, go on over displacements that are not taken.
+                let remember = has_memory && pass_options.by.is_none();
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
                 }
@@ -125,7 +133,7 @@ pub(crate) fn pass(
             if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
         };
         let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= MIN_PARALLEL_WORK;
-        let found: Vec<Vec<OfSegment>> = if at_once && terms.is_empty() {
+        let found: Vec<Vec<OfSegment>> = if at_once && !has_memory {
             let of = |number: usize| {
                 (!propagations[number].is_empty())
                     .then(|| of_segment((phase, number), &propagations[number], &mut [], &mut None))
@@ -148,12 +156,14 @@ pub(crate) fn pass(
         };
         let reused = found.iter().flatten().map(|of| of.innovations.len()).sum();
         let mut innovations = Vec::with_capacity(reused);
+        let mut samples = Vec::new();
         let mut cached = vec![None; if pass_options.keep { propagations.len() } else { 0 }];
         for of in found.into_iter().flatten() {
             if pass_options.keep {
                 cached[of.number] = of.cached;
             }
             innovations.extend(of.innovations);
+            samples.extend(of.samples);
             if phase == 0 {
                 result.outliers.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
             }
@@ -166,6 +176,9 @@ pub(crate) fn pass(
         phases.push(cached);
         if pass_options.innovations {
             result.innovations.push(innovations);
+        }
+        if pass_options.samples {
+            result.samples.push(samples);
         }
     }
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
@@ -191,6 +204,7 @@ struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,
     innovations: Vec<InnovationComponent>,
+    samples: Vec<KinematicSample>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
     cached: Option<SegmentCache>,

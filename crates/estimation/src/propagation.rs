@@ -12,6 +12,7 @@ use model_term::{Interval, Measurement, ModelTerm};
 use nalgebra::Vector3;
 
 use crate::derivatives::Derivatives;
+use crate::kinematic_samples::{KinematicSample, KinematicSampler};
 use crate::model::Model;
 use crate::records::Segment;
 use crate::thinning::PropagationInterval;
@@ -115,6 +116,7 @@ pub(crate) struct CarriedState {
     pub(crate) run_from_chain: Pose,
     pub(crate) session_m: f64,
     pub(crate) previous: Option<WheelInterval>,
+    pub(crate) sampler: Option<KinematicSampler>,
 }
 
 /// The mean model along one segment, for the filter and for dead reckoning: its motion by counts and terms,
@@ -129,6 +131,8 @@ pub(crate) struct Propagator<'f, 'a> {
     wheel_rad: Wheels<f64>,
     previous: Option<WheelInterval>,
     continues: bool,
+    /// Motion since the last measurement, where samples are asked for; cached propagation leaves it alone.
+    sampler: Option<KinematicSampler>,
     /// The terms' latest gradients, by each of their parameters.
     pub(crate) gradients: Vec<Pose>,
     /// Where propagations come from.
@@ -149,6 +153,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             wheel_rad: segment.wheel_rad,
             previous: None,
             continues: false,
+            sampler: None,
             gradients: vec![Pose::IDENTITY; parameters],
             propagations: PropagationSource::Integrated,
             propagation_by_terms: Derivatives::zeros(parameters),
@@ -156,8 +161,10 @@ impl<'f, 'a> Propagator<'f, 'a> {
     }
 
     /// Goes on where the segment before ended.
-    pub(crate) fn carry_on(&mut self, CarriedState { run_from_chain, session_m, previous }: CarriedState) {
+    pub(crate) fn carry_on(&mut self, carried: CarriedState) {
+        let CarriedState { run_from_chain, session_m, previous, sampler } = carried;
         (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
+        self.sampler = sampler;
         self.continues = true;
     }
 
@@ -169,7 +176,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
     /// The state at the end of this segment, at a pose of the instrument in the segment's frame.
     pub(crate) fn carried(&self, chain_from_sensor: Pose) -> CarriedState {
         let run_from_chain = self.run_from_chain * chain_from_sensor;
-        CarriedState { run_from_chain, session_m: self.session_m, previous: self.previous }
+        CarriedState { run_from_chain, session_m: self.session_m, previous: self.previous, sampler: self.sampler }
     }
 
     /// Resets the state of the terms, unless the segment goes on from the one before.
@@ -179,6 +186,31 @@ impl<'f, 'a> Propagator<'f, 'a> {
             for term in self.terms.iter_mut() {
                 term.restart(self.segment.info);
             }
+        }
+    }
+
+    /// Samples are asked for.
+    pub(crate) fn take_samples(&mut self) {
+        self.sampler.get_or_insert_with(KinematicSampler::new);
+    }
+
+    /// What the counts say of the motion since the last measurement, where it is asked for, and forgets it.
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, pose: Pose, of: (usize, usize)) -> Option<KinematicSample> {
+        let world_from_body = self.run_from_chain * pose;
+        self.sampler.as_mut()?.sample(of, world_from_body)
+    }
+
+    #[inline(always)]
+    fn add_to_sampler(&mut self, propagation: &PropagationInterval) {
+        if let Some(sampler) = &mut self.sampler {
+            let intervals = &self.segment.intervals[propagation.intervals.clone()];
+            sampler.add(
+                self.segment.info.start_s.unwrap_or(0.0),
+                intervals,
+                self.model,
+                (self.wheel_rad, self.session_m),
+            );
         }
     }
 
@@ -215,6 +247,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
         if let PropagationSource::Cached(cached, change) = self.propagations {
             return self.reused(cached, change, number);
         }
+        self.add_to_sampler(propagation);
         let moved = self.driven(pose, propagation);
         if let PropagationSource::Recorded(cached) = &mut self.propagations {
             cached.moved.push(moved);

@@ -5,7 +5,9 @@ use kinematics::{Point, Pose, Rule};
 use scenario::{Budget, Instrument, Scenario};
 
 use crate::augmented_model::AugmentedModel;
-use crate::extended_scenario::{READ_STANDING_S, SamplingStatistics};
+use crate::extended_scenario::SamplingStatistics;
+use crate::settings::findings::STANDING_READING_INTERVAL_S;
+use crate::settings::plan::{CLEARANCE_SEPARATIONS, DEFAULT_ACCELERATION_M_S2, HANDLING_S, MINUTES};
 
 /// What the user allows; `None` is taken from the data or the scenario.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -17,15 +19,6 @@ pub struct Limits {
     /// Fastest wheel that may be commanded, m/s.
     pub top_speed_m_s: Option<f64>,
 }
-
-/// Acceleration of a wheel's contact where nothing is known of it, m/s²: that of the robot that stands in.
-const ACCELERATION_M_S2: f64 = 0.5;
-/// To place the robot for a run, where nothing is known of it, seconds.
-pub const HANDLING_S: f64 = 20.0;
-/// What a robot needs of each side of a room, in wheel separations: its own width and a hand's breadth.
-const CLEARANCE: f64 = 1.5;
-/// Time where nobody says how much, minutes.
-pub const MINUTES: f64 = 10.0;
 
 /// When the instrument looks at a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,10 +56,10 @@ impl Setting {
     /// That of the data, as far as the user does not say otherwise.
     pub(crate) fn of_data(datasets: &[Dataset], model: &AugmentedModel<'_>, limits: &Limits) -> Option<Self> {
         let first = datasets.first()?;
-        let pace = SamplingStatistics::of(datasets, model);
+        let sampling = SamplingStatistics::of(datasets, model);
         let separation_m = first.robot.wheel_separation_m;
         let (free_m, floor) = match limits.room_m {
-            Some(room_m) => (room_m.map(|side| side - CLEARANCE * separation_m), of_room(room_m)),
+            Some(room_m) => (room_m.map(|side| side - CLEARANCE_SEPARATIONS * separation_m), of_room(room_m)),
             None => {
                 let [x_m, y_m] = moved_over_m(datasets);
                 ([x_m, y_m], format!("the {x_m:.1} m by {y_m:.1} m over which the robot moved so far"))
@@ -75,8 +68,8 @@ impl Setting {
         let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
         let (minutes, time) = minutes(limits, MINUTES);
         let between = |run: &Run| run.truth.len() > 2 || run.displacements.len() > 1 || !run.point_readings.is_empty();
-        let reading = if pace.between_measurements_s <= READ_STANDING_S {
-            Reading::Even(pace.between_measurements_s)
+        let reading = if sampling.between_measurements_s <= STANDING_READING_INTERVAL_S {
+            Reading::Even(sampling.between_measurements_s)
         } else if runs().any(between) {
             Reading::Standing
         } else {
@@ -84,9 +77,9 @@ impl Setting {
         };
         Some(Self {
             robot: first.robot,
-            top_speed_m_s: limits.top_speed_m_s.unwrap_or(pace.speed_m_s),
-            acceleration_m_s2: ACCELERATION_M_S2,
-            between_rows_s: pace.between_rows_s,
+            top_speed_m_s: limits.top_speed_m_s.unwrap_or(sampling.speed_m_s),
+            acceleration_m_s2: DEFAULT_ACCELERATION_M_S2,
+            between_rows_s: sampling.between_rows_s,
             reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),
             relative: runs().all(|run| run.truth.is_empty() && run.point_readings.is_empty()),
@@ -101,7 +94,8 @@ impl Setting {
     /// That of a scenario; `None` when neither it nor the user says what floor there is.
     pub(crate) fn of_scenario(scenario: &Scenario, limits: &Limits) -> Option<Self> {
         let budget = scenario.budget.as_ref();
-        let clearance_m = budget.map_or(CLEARANCE * scenario.robot.wheel_separation_m, |budget| budget.clearance_m);
+        let clearance_m =
+            budget.map_or(CLEARANCE_SEPARATIONS * scenario.robot.wheel_separation_m, |budget| budget.clearance_m);
         let stated = |budget: &Budget| [budget.room_x_m, budget.room_y_m];
         let room_m = limits.room_m.or_else(|| budget.map(stated))?;
         let of = if limits.room_m.is_some() { of_room(room_m) } else { format!("{} of [budget]", of_room(room_m)) };
@@ -128,7 +122,7 @@ impl Setting {
         })
     }
 
-    pub(crate) fn pace(&self, speed_m_s: f64) -> motion_programs::DriveLimits {
+    pub(crate) fn drive_limits(&self, speed_m_s: f64) -> motion_programs::DriveLimits {
         motion_programs::DriveLimits {
             wheel_separation_m: self.robot.wheel_separation_m,
             cruise_speed_m_s: speed_m_s,
@@ -153,7 +147,8 @@ fn minutes(limits: &Limits, otherwise: f64) -> (f64, String) {
     (minutes, format!("{minutes:.0} min"))
 }
 
-/// Over how much of the floor a robot moved, metres: of the runs that reached farthest, by what was seen, or by dead reckoning where only displacements were.
+/// Over how much of the floor a robot moved, metres: of the runs that reached farthest, by what was seen,
+/// or by dead reckoning where only displacements were.
 #[must_use]
 pub fn moved_over_m(datasets: &[Dataset]) -> [f64; 2] {
     let mut sides = [0.0_f64; 2];

@@ -1,7 +1,10 @@
-//! What to drive to see what would not have shown: manoeuvres are added as long as they bring something into sight, by what they bring a minute.
+//! The next experiment where there is nothing to discriminate: manoeuvres are added as long as they make
+//! effects detectable, by their value per minute.
 //!
-//! An effect is in sight when a size that would be large for a real robot shows with nine chances in ten (√λ = 4.57). Before there is any data the three geometry parameters of
-//! the drive count too, by the logarithm of their standard deviations (Wald 1943, D-optimum designs); adding the best run again and again is Wynn's rule (1970).
+//! An effect is detectable when a plausible size of it is detected with probability 0.9 (√λ = 4.57). Before
+//! there are any data the three geometry parameters of the drive count too, by the logarithm of their
+//! standard deviations (Wald 1943, D-optimum designs). Adding the best run again and again is Wynn's rule
+//! (1970).
 
 use std::collections::BTreeMap;
 
@@ -18,20 +21,11 @@ use super::text::Predictions;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
-use crate::settings::DETECTION_SQRT_LAMBDA;
-
-/// Shapes of an effect that are looked at: fewer than diagnosis tries, as what shows one mostly shows its neighbours.
-const SHAPES: usize = 3;
-/// What a factor e in the precision of one length is worth, in effects brought into sight.
-const LENGTH_WORTH: f64 = 0.3;
-/// A new kind of run must bring this much more a minute than more of the same.
-const NEW_KIND: f64 = 1.3;
-/// Less than this, in effects brought into sight by a pair of runs, is not worth driving.
-const MIN_GAIN: f64 = 0.01;
-/// A length whose relative standard deviation is larger is little better known than before.
-const UNDETERMINED: f64 = 0.02;
-/// Kinds of run that a person keeps apart.
-const MAX_KINDS: usize = 6;
+use crate::settings::levels::DETECTION_SQRT_LAMBDA;
+use crate::settings::plan::{
+    GEOMETRY_PRECISION_VALUE, MAX_MANOEUVRES, MAX_PLANNED_VARIANTS, MIN_COVERAGE_GAIN, MIN_NOISE_SIGMA,
+    MIN_PLANNED_SIGMAS, NEW_MANOEUVRE_RATIO, UNDETERMINED_GEOMETRY_SIGMA,
+};
 
 /// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
 /// it.
@@ -81,15 +75,17 @@ fn some_shapes(candidates: &[Candidate]) -> Vec<Candidate> {
         .chunk_by(|a, b| a.id() == b.id())
         .flat_map(|variants| {
             let last = variants.len() - 1;
-            let mut indices: Vec<usize> = (0..SHAPES).map(|k| k * last / (SHAPES - 1)).collect();
+            let mut indices: Vec<usize> =
+                (0..MAX_PLANNED_VARIANTS).map(|k| k * last / (MAX_PLANNED_VARIANTS - 1)).collect();
             indices.dedup();
             indices.into_iter().map(|index| variants[index].clone())
         })
         .collect()
 }
 
-/// How well a target's most telling parameter shows at a size that would be large, in standard deviations, and the smallest size that would show.
-fn shown(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<(f64, Smallest)> {
+/// How well a target's most telling parameter shows at a size that would be large, in standard deviations,
+/// and the smallest size that would show.
+fn detectability_of(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<(f64, Smallest)> {
     let information = frame.information(equations, &target.columns, &frame.free)?;
     let parameters = target.candidate.parameters().into_iter().enumerate();
     parameters
@@ -102,11 +98,15 @@ fn shown(frame: &Frame, equations: &NormalEquations, target: &Target) -> Option<
 }
 
 /// For each effect its best variant.
-fn all_shown(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> Vec<(&'static str, f64, Smallest)> {
+fn detectability_of_all(
+    frame: &Frame,
+    equations: &NormalEquations,
+    targets: &[Target],
+) -> Vec<(&'static str, f64, Smallest)> {
     targets
         .chunk_by(|a, b| a.id == b.id)
         .filter_map(|variants| {
-            let best = variants.iter().filter_map(|target| shown(frame, equations, target));
+            let best = variants.iter().filter_map(|target| detectability_of(frame, equations, target));
             let (sigmas, smallest) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
             Some((variants[0].id, sigmas, smallest))
         })
@@ -115,7 +115,10 @@ fn all_shown(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> 
 
 /// How many effects are in sight, those half in sight in part.
 fn in_sight(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
-    all_shown(frame, equations, targets).iter().map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0)).sum()
+    detectability_of_all(frame, equations, targets)
+        .iter()
+        .map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0))
+        .sum()
 }
 
 /// Runs added one pair after the other, by what they bring a minute, as long as there is time.
@@ -133,13 +136,19 @@ fn mix(
             .filter_map(|(manoeuvre, of)| {
                 let cost = manoeuvre.cost(setting).minutes;
                 let known = parts.iter().any(|part| part.manoeuvre == *manoeuvre);
-                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_KINDS) {
+                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_MANOEUVRES) {
                     return None;
                 }
                 let after = with_runs(&equations, &[(of, 1.0)]);
                 let there = worth(&after);
-                let preferred = if known { NEW_KIND } else { 1.0 };
-                (there - here > MIN_GAIN).then_some((preferred * (there - here) / cost, manoeuvre, after, there, cost))
+                let preferred = if known { NEW_MANOEUVRE_RATIO } else { 1.0 };
+                (there - here > MIN_COVERAGE_GAIN).then_some((
+                    preferred * (there - here) / cost,
+                    manoeuvre,
+                    after,
+                    there,
+                    cost,
+                ))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, manoeuvre, after, there, cost)) = best else { break };
@@ -153,21 +162,21 @@ fn mix(
     (parts, equations, minutes)
 }
 
-/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into sight late makes earlier runs needless, and what never did
-/// made some in vain.
+/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into
+/// sight late makes earlier runs needless, and what never did made some in vain.
 fn pruned<'i>(
     parts: &mut Vec<Part>,
     options: &[(Manoeuvre, NormalEquations)],
     before: &NormalEquations,
     after: &NormalEquations,
-    shown: impl Fn(&NormalEquations) -> Vec<&'i str>,
+    detected: impl Fn(&NormalEquations) -> Vec<&'i str>,
 ) -> NormalEquations {
-    let all = shown(after);
+    let all = detected(after);
     let of = |parts: &[Part]| with_parts(before, parts, options);
     for index in (0..parts.len()).rev() {
         while parts[index].pairs > 0 {
             parts[index].pairs -= 1;
-            if shown(&of(parts)) != all {
+            if detected(&of(parts)) != all {
                 parts[index].pairs += 1;
                 break;
             }
@@ -200,11 +209,12 @@ pub(super) fn show(
     let frame = Frame::of(&model.fit, &all);
     let options = equations_of(&model.fit, &all, setting, manoeuvres);
     let (mut parts, after, _) = mix(&options, &before, setting, |equations| in_sight(&frame, equations, &targets));
-    let after =
-        pruned(&mut parts, &options, &before, &after, |equations| ids_shown(&all_shown(&frame, equations, &targets)));
+    let after = pruned(&mut parts, &options, &before, &after, |equations| {
+        detected_ids(&detectability_of_all(&frame, equations, &targets))
+    });
     let minutes: f64 = parts.iter().map(|part| f64::from(part.pairs) * part.manoeuvre.cost(setting).minutes).sum();
-    let was: Vec<&str> = ids_shown(&all_shown(&frame, &before, &targets));
-    let now: Vec<_> = all_shown(&frame, &after, &targets)
+    let was: Vec<&str> = detected_ids(&detectability_of_all(&frame, &before, &targets));
+    let now: Vec<_> = detectability_of_all(&frame, &after, &targets)
         .into_iter()
         .filter(|(id, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA && !was.contains(id))
         .collect();
@@ -230,7 +240,7 @@ pub(super) fn show(
         ids.join(", "),
         setting.within
     );
-    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::ParameterValues(predicts)))
+    Ok(text::next_experiment(&parts, setting, minutes, &why, Predictions::Sizes(predicts)))
 }
 
 fn from_size(smallest: &Smallest) -> String {
@@ -238,8 +248,8 @@ fn from_size(smallest: &Smallest) -> String {
     format!("shows from {} = {:.2e}{unit} on", smallest.parameter, smallest.value)
 }
 
-fn ids_shown<'s>(shown: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
-    shown.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
+fn detected_ids<'s>(all: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
+    all.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
 }
 
 /// What to drive before there is any data.
@@ -249,7 +259,8 @@ pub struct ScenarioPlan {
     pub scenario: String,
     /// What to drive.
     pub next_experiment: NextExperiment,
-    /// Standard deviations that the runs will leave of the geometry parameters that they determine, metres, by the names of `calibrate`.
+    /// Standard deviations that the runs will leave of the geometry parameters that they determine, metres,
+    /// by the names of `calibrate`.
     pub sigmas: BTreeMap<String, f64>,
     /// What will show, from which size on.
     pub shows: Vec<Blind>,
@@ -284,7 +295,8 @@ pub enum PlanError {
     },
 }
 
-/// What to drive with a scenario's robot before there is any data, so that its three geometry parameters are determined well and few effects stay out of sight.
+/// What to drive with a scenario's robot before there is any data, so that its three geometry parameters
+/// are determined well and few effects stay out of sight.
 ///
 /// # Errors
 /// [`PlanError`] when floor, time or instruments allow nothing.
@@ -304,8 +316,9 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let options = equations_of(&fit, &candidates, &setting, &library(&setting));
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
-    let worth =
-        |equations: &NormalEquations| in_sight(&frame, equations, &targets) - LENGTH_WORTH * spread(&frame, equations);
+    let worth = |equations: &NormalEquations| {
+        in_sight(&frame, equations, &targets) - GEOMETRY_PRECISION_VALUE * spread(&frame, equations)
+    };
     let (parts, after, minutes) = mix(&options, &before, &setting, worth);
     if parts.is_empty() {
         return Err(nothing_fits());
@@ -321,15 +334,15 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let sigmas: BTreeMap<String, f64> = lengths
         .iter()
         .zip(&relative)
-        .filter(|(_, relative)| **relative < UNDETERMINED)
+        .filter(|(_, relative)| **relative < UNDETERMINED_GEOMETRY_SIGMA)
         .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
-    let all = all_shown(&frame, &after, &targets);
+    let all = detectability_of_all(&frame, &after, &targets);
     let (shows, detectability): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA);
     let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
-        let why = if sigmas > 1e-3 { from_size(&smallest) } else { "no run excites it".to_owned() };
-        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > 1e-3).then_some(smallest) }
+        let why = if sigmas > MIN_PLANNED_SIGMAS { from_size(&smallest) } else { "no run excites it".to_owned() };
+        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > MIN_PLANNED_SIGMAS).then_some(smallest) }
     };
     let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
     let mut blind_to: Vec<Blind> = detectability.into_iter().map(entry).collect();
@@ -339,7 +352,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         why: format!("it does not go with what is driven: {how}"),
         smallest_detectable: None,
     }));
-    let predicts = shows.iter().map(|shown| (shown.id.clone(), shown.why.clone())).collect();
+    let predicts = shows.iter().map(|detected| (detected.id.clone(), detected.why.clone())).collect();
     let lengths = if sigmas.len() == relative.len() {
         format!(
             "determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %",
@@ -356,8 +369,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         shows.len() + blind_to.len(),
         setting.within
     );
-    let next_experiment =
-        text::next_experiment(&parts, &setting, minutes, &why, Predictions::ParameterValues(predicts));
+    let next_experiment = text::next_experiment(&parts, &setting, minutes, &why, Predictions::Sizes(predicts));
     Ok(ScenarioPlan { scenario: name, next_experiment, sigmas, shows, blind_to })
 }
 
@@ -368,9 +380,9 @@ fn spread(frame: &Frame, equations: &NormalEquations) -> f64 {
         .map_or(0.0, |(_, covariance)| (0..Column::GEOMETRY.len()).map(|k| 0.5 * covariance[(k, k)].ln()).sum())
 }
 
-/// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the least that anything errs.
+/// The noise that a scenario states; `None` when nothing sees poses. A micrometre and a microradian are the
+/// least that anything errs.
 fn noise(scenario: &Scenario) -> Option<Noise> {
-    const LEAST: f64 = 1e-6;
     let (xy_m, theta_rad) = scenario.instruments.iter().find_map(|instrument| match *instrument {
         Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => Some((sigma_xy_m, sigma_theta_rad)),
         Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
@@ -384,6 +396,6 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         }
         Instrument::Tachometer { .. } => None,
     })?;
-    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, LEAST, xy_m, theta_rad];
-    Some(Noise { variance: sigmas.map(|sigma| sigma.max(LEAST).powi(2)) })
+    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
+    Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)) })
 }

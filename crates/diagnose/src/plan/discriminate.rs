@@ -15,12 +15,8 @@ use crate::candidate::{Candidate, terms};
 use crate::document::NextExperiment;
 use crate::finding::is_of_low_significance;
 use crate::selection::SearchResult;
-use crate::settings::LOW_SIGNIFICANCE;
-
-/// Two kinds of run must save this share of the time against one to be worth the trouble.
-const WORTH_TWO_KINDS: f64 = 0.8;
-/// More pairs of runs of one kind nobody drives.
-const MAX_PAIRS: u32 = 50;
+use crate::settings::levels::LOW_SIGNIFICANCE_SIGMAS;
+use crate::settings::plan::{MAX_RUN_PAIRS, TWO_MANOEUVRES_TIME_RATIO};
 
 /// What to drive to tell apart the names of one finding; the error says why nothing does.
 pub(super) fn discriminate(
@@ -45,15 +41,16 @@ pub(super) fn discriminate(
     let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
     let options = equations_of(&without.fit, &all, setting, manoeuvres);
     // What hardly stands out is to stand out as well, where that can be.
-    let both = is_of_low_significance(found, index).then(|| rivals.clone().standing_out(LOW_SIGNIFICANCE));
+    let both = is_of_low_significance(found, index).then(|| rivals.clone().significant_by(LOW_SIGNIFICANCE_SIGMAS));
     let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
-    let asked = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
+    let search = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
     // What tells them as likely as not is worth driving where nothing tells them for certain.
-    let ways = both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Confidence::P95), (rivals, Confidence::P50)]);
-    let plan = ways.into_iter().find_map(|(rivals, confidence)| asked(rivals).plan(confidence));
+    let searches =
+        both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Confidence::P95), (rivals, Confidence::P50)]);
+    let plan = searches.into_iter().find_map(|(rivals, confidence)| search(rivals).plan(confidence));
     let Discrimination { confidence, discriminated, mut parts, mut minutes } =
-        plan.ok_or_else(|| asked(&rivals).why_nothing(&names))?;
+        plan.ok_or_else(|| search(&rivals).why_nothing(&names))?;
     let never: Vec<_> = rivals.pairs().into_iter().filter(|pair| !discriminated.contains(pair)).collect();
     if parts.iter().all(|part| part.pairs == 1) && 2.0 * minutes <= setting.minutes {
         // A single run each way leaves nothing to compare it with.
@@ -61,12 +58,13 @@ pub(super) fn discriminate(
         minutes *= 2.0;
     }
     let after = with_parts(&before, &parts, &options);
-    let sigmas = discriminated.iter().filter_map(|pair| rivals.apart(&after, *pair)).map(|apart| apart.sigmas);
+    let sigmas = discriminated
+        .iter()
+        .filter_map(|pair| rivals.discrimination(&after, *pair))
+        .map(|discrimination| discrimination.sigmas);
     let sigmas = sigmas.fold(f64::INFINITY, f64::min);
     let (what, predicts) = predictions(base, &without, &rivals, &before, &discriminated, &parts, setting)
-        .map_or((String::new(), Predictions::ParameterValues(BTreeMap::new())), |(what, of)| {
-            (what, Predictions::Of(of))
-        });
+        .map_or((String::new(), Predictions::Sizes(BTreeMap::new())), |(what, of)| (what, Predictions::Of(of)));
     let pairs = |pairs: &[(usize, usize)]| {
         let each: Vec<String> = pairs.iter().map(|(a, b)| format!("{} from {}", id(*a), id(*b))).collect();
         each.join(", ")
@@ -122,7 +120,8 @@ struct DiscriminationSearch<'a> {
 impl DiscriminationSearch<'_> {
     /// For certain, what takes the least time; else what tells them farthest apart within the time.
     fn plan(&self, confidence: Confidence) -> Option<Discrimination> {
-        // A pair that nothing tells apart, however long it is driven, must not hide what tells the others apart.
+        // A pair that nothing tells apart, however long it is driven, must not hide what tells the others
+        // apart.
         let tellable: Vec<Pair> = self
             .rivals
             .pairs()
@@ -150,7 +149,10 @@ impl DiscriminationSearch<'_> {
         let pairs = self.rivals.pairs();
         let best = self.options.iter().filter_map(|option| {
             let equations = self.after(&[option], self.most_pairs(&[option], self.setting.minutes));
-            let worst = pairs.iter().filter_map(|pair| self.rivals.apart(&equations, *pair)).map(|apart| apart.sigmas);
+            let worst = pairs
+                .iter()
+                .filter_map(|pair| self.rivals.discrimination(&equations, *pair))
+                .map(|discrimination| discrimination.sigmas);
             Some((option.0, worst.min_by(f64::total_cmp)?))
         });
         let what = format!("nothing that can be driven {} tells {} apart", self.setting.within, listed(names));
@@ -173,12 +175,15 @@ impl DiscriminationSearch<'_> {
     fn margin(&self, names: &[Pair], kinds: &[&Driven], pairs: u32, confidence: Confidence) -> f64 {
         let equations = self.after(kinds, pairs);
         let margin = |pair: &Pair| {
-            self.rivals.apart(&equations, *pair).map_or(f64::NEG_INFINITY, |apart| apart.margin(confidence))
+            self.rivals
+                .discrimination(&equations, *pair)
+                .map_or(f64::NEG_INFINITY, |discrimination| discrimination.margin(confidence))
         };
         names.iter().map(margin).fold(f64::INFINITY, f64::min)
     }
 
-    /// The pairs of names that the one kind of run, driven so many times, tells apart that tells most. Of names that some kind tells apart, at least one.
+    /// The pairs of names that the one kind of run, driven so many times, tells apart that tells most. Of
+    /// names that some kind tells apart, at least one.
     fn most_discriminated(&self, names: &[Pair], confidence: Confidence) -> Vec<Pair> {
         let discriminated = |(option, pairs): (&Driven, u32)| -> Vec<Pair> {
             names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, confidence) >= 0.0).copied().collect()
@@ -196,7 +201,7 @@ impl DiscriminationSearch<'_> {
     /// How many pairs of runs of each of some kinds the time allows.
     fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
         let pairs = (within_min / self.minutes(kinds)).floor() as u32;
-        pairs.min(MAX_PAIRS)
+        pairs.min(MAX_RUN_PAIRS)
     }
 
     /// What a pair of runs of each kind takes.
@@ -207,7 +212,8 @@ impl DiscriminationSearch<'_> {
     /// The least number of pairs of runs of each of some kinds that tells all given pairs of names apart.
     fn least_pairs(&self, names: &[Pair], kinds: &[&Driven], confidence: Confidence, within_min: f64) -> Option<u32> {
         let most = self.most_pairs(kinds, within_min);
-        // More runs can make a name whose form is not known well enough harder to drop: the margin is not monotonous, and all are tried.
+        // More runs can make a name whose form is not known well enough harder to drop: the margin is not
+        // monotonous, and all are tried.
         (1..=most).find(|pairs| self.margin(names, kinds, *pairs, confidence) >= 0.0)
     }
 
@@ -232,11 +238,12 @@ impl DiscriminationSearch<'_> {
             pairs.map(|pairs| self.parts(kinds, pairs)).filter(|(_, minutes)| *minutes < least).or(best)
         };
         let one = self.options.iter().fold(None, |best, option| quicker(best, &[option], self.setting.minutes));
-        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| WORTH_TWO_KINDS * minutes);
+        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| TWO_MANOEUVRES_TIME_RATIO * minutes);
         self.twos().fold(one, |best, two| quicker(best, &two, within_min))
     }
 
-    /// The kind of run, or two kinds at one speed, that tells names farthest apart within the time, with even chances at least.
+    /// The manoeuvre, or two at one speed, that discriminates causes best within the time, with probability
+    /// 0.5 at least.
     fn farthest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
         let singles = self.options.iter().map(|option| vec![option]);
         let kinds = singles.chain(self.twos().map(|two| two.to_vec()));
@@ -258,28 +265,30 @@ mod tests {
     use super::*;
     use crate::plan::manoeuvres::library;
     use crate::plan::manoeuvres::tests::setting;
-    use crate::plan::rival_odds::tests::{log_bayes_factor, rivals};
+    use crate::plan::rival_odds::tests::{normal_equations, rivals};
 
-    /// Where a kind of run says much of what both names have in common, each run raises what is asked of them by more than it tells them apart: few runs tell, many do not.
+    /// Where a kind of run says much of what both names have in common, each run raises what is asked of
+    /// them by more than it tells them apart: few runs tell, many do not.
     #[test]
-    fn what_few_runs_tell_and_many_do_not_is_told() {
+    fn what_few_runs_discriminate_and_many_do_not_is_discriminated() {
         // Both names say 10, and differ by λ/2 = 2.5.
-        let apart = 0.05_f64.sqrt();
-        let old = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, apart, 0.0]);
-        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 10.0, 10.0 * apart]));
+        let difference = 0.05_f64.sqrt();
+        let old = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, difference, 0.0]);
+        let before = normal_equations(&old, &DVector::from_column_slice(&[0.3, 10.0, 10.0 * difference]));
         let rivals = rivals(&before);
-        // A pair of runs adds 1 to that, of 3 at least that are asked, and 150 to what both explain, of which a hundredth is asked.
-        let (common, apart) = (3.0_f64.sqrt(), 0.02_f64.sqrt());
-        let new = log_bayes_factor(
-            &DMatrix::from_row_slice(2, 3, &[0.0, common, common, 0.0, apart, 0.0]),
+        // A pair of runs adds 1 to that, of 3 at least that are asked, and 150 to what both explain, of
+        // which a hundredth is asked.
+        let (common, difference) = (3.0_f64.sqrt(), 0.02_f64.sqrt());
+        let new = normal_equations(
+            &DMatrix::from_row_slice(2, 3, &[0.0, common, common, 0.0, difference, 0.0]),
             &DVector::zeros(2),
         );
         let setting = Setting { minutes: 1e4, ..setting() };
         let options = [(library(&setting)[0], new)];
-        let asked = DiscriminationSearch { rivals: &rivals, before: &before, options: &options, setting: &setting };
-        let margin = |pairs| asked.margin(&[(0, 1)], &[&options[0]], pairs, Confidence::P50);
-        assert!(margin(1) > 0.0 && margin(MAX_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_PAIRS));
-        assert_eq!(asked.most_discriminated(&[(0, 1)], Confidence::P50), [(0, 1)]);
-        assert_eq!(asked.plan(Confidence::P50).map(|plan| plan.discriminated), Some(vec![(0, 1)]));
+        let search = DiscriminationSearch { rivals: &rivals, before: &before, options: &options, setting: &setting };
+        let margin = |pairs| search.margin(&[(0, 1)], &[&options[0]], pairs, Confidence::P50);
+        assert!(margin(1) > 0.0 && margin(MAX_RUN_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_RUN_PAIRS));
+        assert_eq!(search.most_discriminated(&[(0, 1)], Confidence::P50), [(0, 1)]);
+        assert_eq!(search.plan(Confidence::P50).map(|plan| plan.discriminated), Some(vec![(0, 1)]));
     }
 }

@@ -1,4 +1,5 @@
-//! What can be driven: straights, spins, squares and circles that fit the floor, each at several speeds, as pairs of runs in both directions.
+//! What can be driven: straights, spins, squares and circles that fit the floor, each at several speeds, as
+//! pairs of runs in both directions.
 
 use std::f64::consts::TAU;
 
@@ -9,13 +10,7 @@ use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 
 use super::constraints::{Reading, Setting};
 use crate::candidate::{Candidate, terms};
-
-/// Shares of the largest size and of the top speed that are tried.
-const SIZES: [f64; 2] = [1.0, 0.5];
-const SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
-const TURNS: [f64; 2] = [1.0, 3.0];
-/// Shorter ways show nothing that a measurement does not blur, metres.
-const SHORTEST_M: f64 = 0.2;
+use crate::settings::plan::{MIN_MANOEUVRE_LENGTH_M, SIZE_FRACTIONS, SPEED_FRACTIONS, SPIN_REVOLUTIONS, STANDSTILL_S};
 
 /// A pair of runs, one in each direction, at one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,8 +21,8 @@ pub(crate) struct Manoeuvre {
 
 impl Manoeuvre {
     pub(crate) fn cost(&self, setting: &Setting) -> Cost {
-        let pace = setting.pace(self.speed_m_s);
-        self.schedule.with_pairs(1).programs().iter().map(|program| pace.cost(program)).sum()
+        let drive_limits = setting.drive_limits(self.speed_m_s);
+        self.schedule.with_pairs(1).programs().iter().map(|program| drive_limits.cost(program)).sum()
     }
 }
 
@@ -36,13 +31,13 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
     let (shorter_m, longer_m) = setting.sides_m();
     let separation_m = setting.robot.wheel_separation_m;
     let mut schedules: Vec<Schedule> = Vec::new();
-    for size in SIZES {
+    for size in SIZE_FRACTIONS {
         let length_m = rounded(size * longer_m);
-        if length_m >= SHORTEST_M {
+        if length_m >= MIN_MANOEUVRE_LENGTH_M {
             schedules.push(Schedule::Straights { length_m, runs: 2 });
         }
         let side_m = rounded(size * shorter_m);
-        if side_m >= SHORTEST_M {
+        if side_m >= MIN_MANOEUVRE_LENGTH_M {
             schedules.push(Schedule::Squares { side_m, runs_each_way: 1 });
         }
         let radius_m = rounded(0.5 * size * shorter_m);
@@ -51,8 +46,8 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
             schedules.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
         }
     }
-    schedules.extend(TURNS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
-    let speeds = SPEEDS.map(|share| significant(share * setting.top_speed_m_s));
+    schedules.extend(SPIN_REVOLUTIONS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
+    let speeds = SPEED_FRACTIONS.map(|share| significant(share * setting.top_speed_m_s));
     let all = speeds
         .into_iter()
         .flat_map(|speed_m_s| schedules.iter().map(move |schedule| Manoeuvre { schedule: *schedule, speed_m_s }));
@@ -77,10 +72,6 @@ struct Log {
     read_s: Vec<f64>,
 }
 
-/// How long a robot stands before and after a run that is logged at even intervals, seconds. A log that began with its motion would tell effects of starting apart
-/// that no real log does.
-const STANDS_S: f64 = 0.5;
-
 /// One motion of a program: when it begins, how it goes, and from where each wheel turns by how much.
 struct Stretch {
     from_s: f64,
@@ -89,14 +80,15 @@ struct Stretch {
     turn_rad: Wheels<f64>,
 }
 
-/// Drives a program by the nominal robot: the wheel that goes farther drives a trapezoid of speed, the other one in proportion. Rows come at even intervals, or,
-/// where a robot writes none on the way, between motions.
+/// Drives a program by the nominal robot: the wheel that goes farther drives a trapezoid of speed, the
+/// other one in proportion. Rows come at even intervals, or, where a robot writes none on the way, between
+/// motions.
 fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wheels<f64>) -> Option<Log> {
     let geometry = setting.robot.geometry().ok()?;
     let m_per_rad = geometry.m_per_rad();
     let even = matches!(setting.reading, Reading::Even(_));
-    let stands_s = if even { STANDS_S } else { 0.0 };
-    let (mut t_s, mut angle_rad) = (stands_s, phase_rad);
+    let standstill_s = if even { STANDSTILL_S } else { 0.0 };
+    let (mut t_s, mut angle_rad) = (standstill_s, phase_rad);
     let (mut stretches, mut read_s): (Vec<Stretch>, Vec<f64>) = (Vec::new(), vec![0.0]);
     for motion in &program.motions {
         let increment = match *motion {
@@ -121,7 +113,7 @@ fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wh
         t_s += duration_s;
         angle_rad = angle_rad.zip_with(turn_rad, |angle, turn| angle + turn);
     }
-    let end_s = t_s + stands_s;
+    let end_s = t_s + standstill_s;
     read_s.push(end_s);
     let mut times: Vec<f64> = if setting.between_rows_s < end_s {
         std::iter::successors(Some(0.0), |t_s| Some(t_s + setting.between_rows_s))
@@ -211,7 +203,7 @@ pub(crate) fn planned_run(
             times
         }
     };
-    let poses = seen(&log, &times, model);
+    let poses = measured_poses(&log, &times, model);
     let info = RunInfo {
         id: program.id.clone(),
         protocol: Some(program.protocol),
@@ -232,7 +224,7 @@ pub(crate) fn planned_run(
 }
 
 /// The instrument's poses at some instants.
-fn seen(log: &Log, times: &[f64], model: &Model) -> Vec<(f64, Pose)> {
+fn measured_poses(log: &Log, times: &[f64], model: &Model) -> Vec<(f64, Pose)> {
     let (mut pose, mut row) = (Pose::IDENTITY, 0);
     let step = |row: usize, share: f64| {
         let turned = |side: &Vec<f64>| share * (side[row + 1] - side[row]);
@@ -279,7 +271,8 @@ fn twist(log: &Log, setting: &Setting) -> Option<WheelLog> {
     Some(WheelLog::Twist { v_mps, omega_radps })
 }
 
-/// Where wheels stand at the start of run after run, radians: nobody sets them, so that they are spread evenly (multiples of two irrational shares of a turn).
+/// Where wheels stand at the start of run after run, radians: nobody sets them, so that they are spread
+/// evenly (multiples of two irrational shares of a turn).
 pub(crate) fn phase_rad(run: u32) -> Wheels<f64> {
     let at = |share: f64| TAU * (f64::from(run) * share).fract();
     Wheels { left: at(0.618_034), right: at(0.414_214) }
@@ -392,9 +385,10 @@ pub(super) mod tests {
         assert!(library(&Setting { minutes: 0.5, ..setting() }).is_empty());
     }
 
-    /// A log ends where the program ends and takes as long as the pace says, standing at both ends; its steps are no faster than the top speed.
+    /// A log ends where the program ends and takes as long as the pace says, standing at both ends; its
+    /// steps are no faster than the top speed.
     #[test]
-    fn a_foreseen_run_drives_its_program() {
+    fn a_planned_run_drives_its_program() {
         let setting = setting();
         for manoeuvre in library(&setting) {
             for program in manoeuvre.schedule.with_pairs(1).programs() {
@@ -419,8 +413,9 @@ pub(super) mod tests {
                 };
                 // Sums of some hundred arcs: roundings of 1e-16 each.
                 assert!((end.theta_rad().expect("a heading") - turned).abs() < 1e-9, "{program:?}: {end:?}");
-                let driving_s = 60.0 * setting.pace(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
-                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDS_S;
+                let driving_s =
+                    60.0 * setting.drive_limits(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
+                let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDSTILL_S;
                 assert!((-1e-9..=setting.between_rows_s + 1e-9).contains(&over_s), "{program:?}: {over_s} s more");
                 let WheelLog::Angles(angles) = &run.odometry.wheels else { panic!("angles are logged") };
                 for side in [&angles.left, &angles.right] {
@@ -433,15 +428,15 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_is_read_standing_is_read_where_the_program_says() {
+    fn standing_readings_are_where_the_program_says() {
         let setting = Setting { between_rows_s: f64::INFINITY, reading: Reading::Standing, ..setting() };
         let circle = &Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 }.programs()[1];
         let run =
             planned_run(circle, &setting, 0.25, &model(&setting), phase_rad(0), Measurements::AsSoFar).expect("a run");
-        let seen: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
-        assert_eq!(seen.len(), 3);
+        let measured_poses: Vec<(f64, f64)> = run.truth.iter().map(|sample| (sample.x_m, sample.y_m)).collect();
+        assert_eq!(measured_poses.len(), 3);
         // Counter-clockwise from the origin along x: half a turn later the robot is a diameter to the left.
-        assert!(seen[1].0.abs() < 1e-9 && (seen[1].1 - 1.0).abs() < 1e-9, "{seen:?}");
+        assert!(measured_poses[1].0.abs() < 1e-9 && (measured_poses[1].1 - 1.0).abs() < 1e-9, "{measured_poses:?}");
         // An instrument that saw no more than starts and ends so far sees no more of this run.
         let setting = Setting { reading: Reading::AtEnds, ..setting };
         let run =

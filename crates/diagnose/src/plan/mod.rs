@@ -1,7 +1,9 @@
-//! The next experiment: what to drive to tell names apart, or to see what the data could not have shown, and what each name predicts before it is driven.
+//! The next experiment: what to drive to tell names apart, or to see what the data could not have shown,
+//! and what each name predicts before it is driven.
 //!
-//! Runs along drivable programs are made up from the fitted model; their information, which needs no measured values, joins that of the data. The manoeuvre
-//! that needs the least time wins. Nothing here is simulated, and no hidden truth is read.
+//! Runs along drivable programs are made up from the fitted model; their information, which needs no
+//! measured values, joins that of the data. The manoeuvre that needs the least time wins. Nothing here is
+//! simulated, and no hidden truth is read.
 
 mod constraints;
 mod coverage;
@@ -19,12 +21,14 @@ use crate::candidate::Candidate;
 use crate::document::{Blind, NextExperiment};
 use crate::selection::SearchResult;
 
+pub use crate::settings::plan::{HANDLING_S, MINUTES};
 use constraints::Setting;
-pub use constraints::{HANDLING_S, Limits, MINUTES, moved_over_m};
+pub use constraints::{Limits, moved_over_m};
 pub use coverage::{PlanError, ScenarioPlan, plan_scenario};
 use manoeuvres::library;
 
-/// What to drive to tell apart the names of the first finding that has several, or else to see what would not have shown; or why there is nothing to drive.
+/// What to drive to tell apart the names of the first finding that has several, or else to see what would
+/// not have shown; or why there is nothing to drive.
 pub(crate) fn next_experiment(
     datasets: &[Dataset],
     (base, found): (&ModelFit<'_>, &SearchResult<'_>),

@@ -1,7 +1,9 @@
 //! What each name says that the planned runs will show, written down before they are driven.
 //!
-//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the plan; what is told is where the instrument then sees the
-//! robot against dead reckoning with the calibrated lengths alone, at the instant and in the component at which the names differ most for what is known.
+//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the
+//! plan; what is told is where the instrument then sees the robot against dead reckoning with the
+//! calibrated lengths alone, at the instant and in the component at which the names differ most for what is
+//! known.
 
 use estimation::{Column, EndError, Model, ModelFit, NormalEquations};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -14,15 +16,10 @@ use super::text;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
+use crate::settings::plan::{DERIVATIVE_STEP_SIGMAS, PREDICTION_INSTANTS, SINGLE_MEASUREMENT_SIGMAS, WHEEL_PHASES};
 
-/// Instants of a run at which a prediction is made: shares of its duration.
-const INSTANTS: usize = 12;
-/// How the wheels stand at the start is not known: so many ways are averaged.
-const PHASES: usize = 4;
-/// A difference of so many standard deviations shows in a single kind of measurement; with less, only all measurements together tell.
-const SINGLE_MEASUREMENT_SIGMAS: f64 = 2.0;
-
-/// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the name, and variance by the noise.
+/// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the
+/// name, and variance by the noise.
 #[derive(Debug, Clone)]
 struct Measured {
     mean: Vector3<f64>,
@@ -60,24 +57,28 @@ pub(super) fn predictions(
         let components = if setting.sees_heading { 3 } else { 2 };
         for index in 0..of_names[0].len() {
             for component in 0..components {
-                let seen: Vec<Measured> = of_names.iter().map(|name| name[index].clone()).collect();
-                let apart = |(a, b): &(usize, usize)| {
-                    let (a, b) = (&seen[*a], &seen[*b]);
+                let measured: Vec<Measured> = of_names.iter().map(|name| name[index].clone()).collect();
+                let difference = |(a, b): &(usize, usize)| {
+                    let (a, b) = (&measured[*a], &measured[*b]);
                     let var = a.known_var[component] + b.known_var[component] + a.noise_var[component];
                     (a.mean[component] - b.mean[component]).abs() / var.max(f64::MIN_POSITIVE).sqrt()
                 };
-                let sigmas = discriminated.iter().map(apart).fold(f64::INFINITY, f64::min);
+                let sigmas = discriminated.iter().map(difference).fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, ..)| sigmas > *most) {
-                    let at = Where { direction: index / INSTANTS, share: shares()[index % INSTANTS], component };
-                    best = Some((sigmas, *part, at, seen));
+                    let at = Where {
+                        direction: index / PREDICTION_INSTANTS,
+                        share: shares()[index % PREDICTION_INSTANTS],
+                        component,
+                    };
+                    best = Some((sigmas, *part, at, measured));
                 }
             }
         }
     }
-    let (sigmas, part, at, seen) = best?;
+    let (sigmas, part, at, measured) = best?;
     let unit = if at.component == 2 { "rad" } else { "m" };
-    let values = rivals.rival_columns.iter().zip(&seen).map(|(rival_columns, seen)| {
-        let (value, var) = (seen.mean[at.component], (seen.known_var + seen.noise_var)[at.component]);
+    let values = rivals.rival_columns.iter().zip(&measured).map(|(rival_columns, measured)| {
+        let (value, var) = (measured.mean[at.component], (measured.known_var + measured.noise_var)[at.component]);
         (rival_columns.candidate.id().to_owned(), Value { value, sigma: Some(var.sqrt()), unit: unit.to_owned() })
     });
     let predicted = Predicted {
@@ -86,7 +87,7 @@ pub(super) fn predictions(
         component: ["along", "across", "heading"][at.component].to_owned(),
         values: values.collect(),
     };
-    let mut sentence = text::where_to_look(&part, &at);
+    let mut sentence = text::where_to_measure(&part, &at);
     if sigmas < SINGLE_MEASUREMENT_SIGMAS {
         sentence.push_str(" No single measurement tells them apart: all measurements of the runs together do.");
     }
@@ -94,14 +95,15 @@ pub(super) fn predictions(
 }
 
 /// The instants, as shares of a run's duration.
-fn shares() -> [f64; INSTANTS] {
-    std::array::from_fn(|instant| (instant + 1) as f64 / INSTANTS as f64)
+fn shares() -> [f64; PREDICTION_INSTANTS] {
+    std::array::from_fn(|instant| (instant + 1) as f64 / PREDICTION_INSTANTS as f64)
 }
 
-/// Where the measurements of a direction and an instant stand among those of all runs, which are driven direction by direction and phase by phase.
-fn looks_at(index: usize) -> impl Iterator<Item = usize> {
-    let (direction, instant) = (index / INSTANTS, index % INSTANTS);
-    (0..PHASES).map(move |phase| (direction * PHASES + phase) * INSTANTS + instant)
+/// Where the measurements of a direction and an instant stand among those of all runs, which are driven
+/// direction by direction and phase by phase.
+fn phases_at(index: usize) -> impl Iterator<Item = usize> {
+    let (direction, instant) = (index / PREDICTION_INSTANTS, index % PREDICTION_INSTANTS);
+    (0..WHEEL_PHASES).map(move |phase| (direction * WHEEL_PHASES + phase) * PREDICTION_INSTANTS + instant)
 }
 
 /// Runs of a part, each seen at its start and at every instant, by direction and phase.
@@ -120,7 +122,7 @@ impl PlannedRun {
         let driven = |measurements: &[f64]| -> Option<dataset::Dataset> {
             let mut runs = Vec::new();
             for program in &programs {
-                for phase in (0..).take(PHASES).map(phase_rad) {
+                for phase in (0..).take(WHEEL_PHASES).map(phase_rad) {
                     let speed_m_s = part.manoeuvre.speed_m_s;
                     let mut run =
                         planned_run(program, setting, speed_m_s, model, phase, Measurements::At(measurements))?;
@@ -167,15 +169,16 @@ impl PlannedRun {
         };
         let here = measurements(&named)?;
         let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
-            let by = 0.1 * covariance[(k, k)].sqrt();
+            let by = DERIVATIVE_STEP_SIGMAS * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
             Some(measurements(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
-        let mean =
-            |index, of: &dyn Fn(usize) -> Vector3<f64>| looks_at(index).map(of).sum::<Vector3<f64>>() / PHASES as f64;
-        let seen = (0..here.len() / PHASES).map(|index| {
+        let mean = |index, of: &dyn Fn(usize) -> Vector3<f64>| {
+            phases_at(index).map(of).sum::<Vector3<f64>>() / WHEEL_PHASES as f64
+        };
+        let measured = (0..here.len() / WHEEL_PHASES).map(|index| {
             let own = mean(index, &|measurement| here[measurement]);
             let noise = mean(index, &|measurement| self.noise[measurement]);
             let spread =
@@ -188,7 +191,7 @@ impl PlannedRun {
             });
             Measured { mean: own, known_var, noise_var: (noise + spread) / self.runs }
         });
-        Some(seen.collect())
+        Some(measured.collect())
     }
 }
 

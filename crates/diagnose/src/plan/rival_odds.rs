@@ -1,7 +1,9 @@
-//! What evidence says of names: sizes under each, and how far off one name's prediction stays when another may do its best.
+//! What evidence says of names: sizes under each, and how far off one name's prediction stays when another
+//! may do its best.
 //!
-//! With Î the information of old and planned runs together, n what is free beside and b another name's sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s,
-//! the noncentrality of the test of b against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
+//! With Î the information of old and planned runs together, n what is free beside and b another name's
+//! sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s, the noncentrality of the test of b
+//! against a, ‖P⊥[n, b] a‖² (Atkinson & Fedorov 1975, T-optimum designs for discriminating between models).
 
 use estimation::{Column, ModelFit, NormalEquations, RIDGE, inverse};
 use nalgebra::{DMatrix, DVector};
@@ -9,36 +11,29 @@ use nalgebra::{DMatrix, DVector};
 use super::manoeuvres::{Manoeuvre, Part};
 use crate::candidate::Candidate;
 use crate::model_comparison::log_odds_margin;
-
-/// What is plausible of the nuisances before any data, so that directions that no run has shown yet have a size: lengths relative, metres and radians of the
-/// mounting, seconds.
-const LENGTH_SD: f64 = 0.05;
-const MOUNT_SD_M: f64 = 0.2;
-const MOUNT_SD_RAD: f64 = 0.3;
-const LATENCY_SD_S: f64 = 0.2;
+use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
+use crate::settings::plan::{DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M};
 
 /// How sure it must be that names are told apart. The log of the odds is normal with mean λ/2 and variance λ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Confidence {
-    /// With 19 chances in 20.
+    /// With probability 0.95.
     P95,
-    /// With even chances.
+    /// With probability 0.5.
     P50,
 }
 
-/// With 19 chances in 20 a normal variable is not lower than so many standard deviations below its mean.
-const CERTAIN_SIGMAS: f64 = 1.645;
-
-/// The log of the odds that holds with 19 chances in 20: λ/2 − e√λ at the likeliest of those errors e of the new measurements and of √λ, a size not being known
-/// better than by the old data, that are as unlikely as that (the design point of first-order reliability, Hasofer & Lind 1974).
+/// The log odds that are exceeded with probability 0.95: λ/2 − e√λ at the likeliest of those errors e of
+/// the new measurements and of √λ, a size not being known better than by the old data, that are as unlikely
+/// as that (the design point of first-order reliability, Hasofer & Lind 1974).
 fn certain_log_odds(root: f64, root_sigma: f64) -> f64 {
-    const STEPS: u32 = 32;
     let at = |step: u32| {
-        let (measurements, size) = (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(STEPS)).sin_cos();
-        let root = (root - CERTAIN_SIGMAS * size * root_sigma).max(0.0);
-        0.5 * root * root - CERTAIN_SIGMAS * measurements * root
+        let (measurements, size) =
+            (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(DESIGN_POINT_STEPS)).sin_cos();
+        let root = (root - NORMAL_QUANTILE_ONE_SIDED_95 * size * root_sigma).max(0.0);
+        0.5 * root * root - NORMAL_QUANTILE_ONE_SIDED_95 * measurements * root
     };
-    (0..=STEPS).map(at).fold(f64::INFINITY, f64::min)
+    (0..=DESIGN_POINT_STEPS).map(at).fold(f64::INFINITY, f64::min)
 }
 
 /// One of several names, with its columns of the normal equation.
@@ -59,14 +54,14 @@ impl Frame {
     /// Of a fit with further terms: first those of the fit, then those of the candidates.
     pub(crate) fn of(fit: &ModelFit<'_>, terms: &[Candidate]) -> Self {
         let base = Column::BASE.map(|column| match column {
-            Column::LeftWheel | Column::RightWheel | Column::Separation => LENGTH_SD,
-            Column::SensorX | Column::SensorY => MOUNT_SD_M,
-            Column::SensorTheta => MOUNT_SD_RAD,
-            Column::Latency | Column::Term(_) => LATENCY_SD_S,
+            Column::LeftWheel | Column::RightWheel | Column::Separation => GEOMETRY_PRIOR_SIGMA,
+            Column::SensorX | Column::SensorY => LEVER_PRIOR_SIGMA_M,
+            Column::SensorTheta => SENSOR_HEADING_PRIOR_SIGMA_RAD,
+            Column::Latency | Column::Term(_) => LATENCY_PRIOR_SIGMA_S,
         });
         let of_terms = terms.iter().flat_map(Candidate::parameters).map(|parameter| parameter.prior_sigma);
-        let weights: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();
-        Self { free: fit.columns.iter().map(|column| column.index()).collect(), prior: DVector::from_vec(weights) }
+        let precisions: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();
+        Self { free: fit.columns.iter().map(|column| column.index()).collect(), prior: DVector::from_vec(precisions) }
     }
 
     /// The normal equation of some columns with what is plausible of them.
@@ -106,18 +101,19 @@ impl Frame {
     }
 }
 
-/// How well two names are told apart, of the name that is harder to tell from the other.
+/// How well two causes are discriminated, whichever of them is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Grouping {
+pub(crate) struct PairDiscrimination {
     /// √λ: in standard deviations.
     pub(crate) sigmas: f64,
-    /// By how much the log of the odds exceeds what diagnosis asks before it drops a name, with even chances; where names must stand out, at most by how much they do.
+    /// By how much the log odds exceed the margin of the diagnosis with probability 0.5. Where causes must be
+    /// significant, at most by how much they are.
     even: f64,
-    /// The same with 19 chances in 20.
+    /// The same with probability 0.95.
     certain: f64,
 }
 
-impl Grouping {
+impl PairDiscrimination {
     pub(crate) fn margin(&self, confidence: Confidence) -> f64 {
         match confidence {
             Confidence::P95 => self.certain,
@@ -142,7 +138,7 @@ pub(crate) struct Rivals {
     pub(crate) estimates: Vec<DVector<f64>>,
     covariances: Vec<DMatrix<f64>>,
     /// By how much the log of the odds against nothing at all must speak for a name as well.
-    stands_out: f64,
+    min_log_odds: f64,
 }
 
 impl Rivals {
@@ -153,12 +149,12 @@ impl Rivals {
             Some((step.rows(first, own).into_owned(), covariance.view((first, first), (own, own)).into_owned()))
         };
         let (estimates, covariances) = rival_columns.iter().map(estimate).collect::<Option<_>>()?;
-        Some(Self { frame, rival_columns, estimates, covariances, stands_out: f64::NEG_INFINITY })
+        Some(Self { frame, rival_columns, estimates, covariances, min_log_odds: f64::NEG_INFINITY })
     }
 
     /// The same names, which must stand out from nothing by so many standard deviations too.
-    pub(crate) fn standing_out(self, sigmas: f64) -> Self {
-        Self { stands_out: 0.5 * sigmas * sigmas, ..self }
+    pub(crate) fn significant_by(self, sigmas: f64) -> Self {
+        Self { min_log_odds: 0.5 * sigmas * sigmas, ..self }
     }
 
     /// Every pair of names.
@@ -168,8 +164,12 @@ impl Rivals {
     }
 
     /// What evidence makes of a pair, whichever of the two is true.
-    pub(crate) fn apart(&self, equations: &NormalEquations, (a, b): (usize, usize)) -> Option<Grouping> {
-        let one_way = |a: usize, b: usize| {
+    pub(crate) fn discrimination(
+        &self,
+        equations: &NormalEquations,
+        (a, b): (usize, usize),
+    ) -> Option<PairDiscrimination> {
+        let if_first_is_true = |a: usize, b: usize| {
             let (own, size) = (&self.rival_columns[a].columns, &self.estimates[a]);
             let left = self.frame.information(equations, own, &self.frame.with(&self.rival_columns[b]))?;
             let alone = self.frame.information(equations, own, &self.frame.free)?;
@@ -182,14 +182,14 @@ impl Rivals {
                 (root, 0.5 * lambda, if root > 0.0 { certain_log_odds(root, sigma) } else { 0.0 })
             };
             let ((sigmas, even, certain), (_, even_alone, certain_alone)) = (odds(&left), odds(&alone));
-            let asked = log_odds_margin(even_alone);
-            Some(Grouping {
+            let margin_of_diagnosis = log_odds_margin(even_alone);
+            Some(PairDiscrimination {
                 sigmas,
-                even: (even - asked).min(even_alone - self.stands_out),
-                certain: (certain - asked).min(certain_alone - self.stands_out),
+                even: (even - margin_of_diagnosis).min(even_alone - self.min_log_odds),
+                certain: (certain - margin_of_diagnosis).min(certain_alone - self.min_log_odds),
             })
         };
-        Some(one_way(a, b)?.or_worse(one_way(b, a)?))
+        Some(if_first_is_true(a, b)?.or_worse(if_first_is_true(b, a)?))
     }
 }
 
@@ -221,8 +221,9 @@ pub(super) mod tests {
     use super::*;
     use crate::statistics::p_of_z;
 
-    /// Evidence of measurements whose derivatives by the columns are the rows of `slopes`, each with unit variance, and of measured values.
-    pub(in crate::plan) fn log_bayes_factor(slopes: &DMatrix<f64>, values: &DVector<f64>) -> NormalEquations {
+    /// Evidence of measurements whose derivatives by the columns are the rows of `slopes`, each with unit
+    /// variance, and of measured values.
+    pub(in crate::plan) fn normal_equations(slopes: &DMatrix<f64>, values: &DVector<f64>) -> NormalEquations {
         NormalEquations {
             run: (0, 0),
             information: slopes.transpose() * slopes,
@@ -247,41 +248,44 @@ pub(super) mod tests {
     #[test]
     fn what_another_name_can_say_as_well_tells_nothing() {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 10.0]));
+        let before = normal_equations(&old, &DVector::from_column_slice(&[0.3, 10.0]));
         let rivals = rivals(&before);
         // Both names say 10, and nothing tells them apart.
         assert!(rivals.estimates.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.estimates);
-        let apart = rivals.apart(&before, (0, 1)).expect("determined");
-        assert!(apart.sigmas < 1e-3 && apart.margin(Confidence::P50) < 0.0, "{apart:?}");
-        // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
-        let new = log_bayes_factor(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
+        let discrimination = rivals.discrimination(&before, (0, 1)).expect("determined");
+        assert!(discrimination.sigmas < 1e-3 && discrimination.margin(Confidence::P50) < 0.0, "{discrimination:?}");
+        // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its
+        // best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
+        let new = normal_equations(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
-        let apart = rivals.apart(&after, (0, 1)).expect("determined");
+        let discrimination = rivals.discrimination(&after, (0, 1)).expect("determined");
         // To the size of the priors. Without the other name at its best both would leave 100 or more.
-        assert!((apart.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{apart:?}");
-        assert!((apart.margin(Confidence::P50) - (25.0 - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((discrimination.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{discrimination:?}");
+        assert!((discrimination.margin(Confidence::P50) - (25.0 - 3.0)).abs() < 1e-3, "{discrimination:?}");
         // A size of 10 ± 1 makes √λ uncertain by a tenth.
         let certain = certain_log_odds(50_f64.sqrt(), 0.1 * 50_f64.sqrt());
-        assert!((apart.margin(Confidence::P95) - (certain - 3.0)).abs() < 1e-3, "{apart:?}");
+        assert!((discrimination.margin(Confidence::P95) - (certain - 3.0)).abs() < 1e-3, "{discrimination:?}");
     }
 
     #[test]
-    fn names_that_must_stand_out_are_told_only_where_they_do() {
+    fn causes_that_must_be_significant_are_discriminated_only_where_they_are() {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-        let before = log_bayes_factor(&old, &DVector::from_column_slice(&[0.3, 4.0]));
-        // Four measurements see name 1 alone, and tell it from name 2: to 4² · (5 − 1) and 4² · (1 − 1/5) of λ.
-        let new = log_bayes_factor(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
+        let before = normal_equations(&old, &DVector::from_column_slice(&[0.3, 4.0]));
+        // Four measurements see name 1 alone, and tell it from name 2: to 4² · (5 − 1) and 4² · (1 − 1/5)
+        // of λ.
+        let new = normal_equations(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
-        let margin = |rivals: &Rivals| rivals.apart(&after, (0, 1)).expect("determined").margin(Confidence::P50);
+        let margin =
+            |rivals: &Rivals| rivals.discrimination(&after, (0, 1)).expect("determined").margin(Confidence::P50);
         let plain = rivals(&before);
         assert!((margin(&plain) - (6.4 - 3.0)).abs() < 1e-3, "{}", margin(&plain));
         // Name 2 stands out as before, by 4 standard deviations.
-        let both = plain.clone().standing_out(4.5);
+        let both = plain.clone().significant_by(4.5);
         assert!((margin(&both) - 0.5 * (16.0 - 4.5 * 4.5)).abs() < 1e-3, "{}", margin(&both));
     }
 
-    /// The log of the odds, drawn with all that is not known of it, is lower than what holds for certain in one of twenty: integrated over the size. The bound is of first order:
-    /// a third of that either way.
+    /// The log of the odds, drawn with all that is not known of it, is lower than what holds for certain in
+    /// one of twenty: integrated over the size. The bound is of first order: a third of that either way.
     #[test]
     fn what_holds_for_certain_fails_once_in_twenty() {
         for (root, sigma) in [(4.6, 0.0), (6.0, 0.5), (7.0, 1.5), (12.0, 3.0)] {
@@ -289,12 +293,12 @@ pub(super) mod tests {
             let steps = (-400..=400).map(|k| f64::from(k) * 0.0125);
             let (mut below, mut all) = (0.0, 0.0);
             for z in steps {
-                let (weight, root) = ((-0.5 * z * z).exp(), root + sigma * z);
+                let (density, root) = ((-0.5 * z * z).exp(), root + sigma * z);
                 // ½ r² + r e is below the bound where e is below this.
                 let error = (bound - 0.5 * root * root) / root;
                 let relative_odds = if error > 0.0 { 1.0 - 0.5 * p_of_z(error) } else { 0.5 * p_of_z(error) };
-                below += weight * relative_odds;
-                all += weight;
+                below += density * relative_odds;
+                all += density;
             }
             let share = below / all;
             assert!((0.033..0.067).contains(&share), "{root} ± {sigma}: {share}");

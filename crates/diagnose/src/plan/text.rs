@@ -58,7 +58,7 @@ const fn noun(schedule: &Schedule) -> &'static str {
     }
 }
 
-pub(super) fn where_to_look(part: &Part, at: &Where) -> String {
+pub(super) fn where_to_measure(part: &Part, at: &Where) -> String {
     let schedule = &part.manoeuvre.schedule;
     let (direction, noun) = (direction(schedule, at.direction), noun(schedule));
     let when =
@@ -116,7 +116,7 @@ fn protocol(sessions: &[PlannedSession]) -> String {
 /// What is said of each name beforehand.
 pub(super) enum Predictions {
     /// From which size on it would show.
-    ParameterValues(BTreeMap<String, String>),
+    Sizes(BTreeMap<String, String>),
     /// What it will show.
     Of(Predicted),
 }
@@ -129,7 +129,7 @@ pub(super) fn next_experiment(
     predicts: Predictions,
 ) -> NextExperiment {
     let (predicts, predicted) = match predicts {
-        Predictions::ParameterValues(predicts) => (predicts, None),
+        Predictions::Sizes(predicts) => (predicts, None),
         Predictions::Of(predicted) => {
             let words = |(id, value): (&String, &Value)| (id.clone(), offset(value, &predicted.component));
             (predicted.values.iter().map(words).collect(), Some(predicted))

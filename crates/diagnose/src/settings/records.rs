@@ -1,0 +1,101 @@
+//! What makes records faulty: corrections of the records, rows and clocks of the log, fits that do not hold.
+
+/// Natural logarithm. A correction of the records is a fault if it raises the log likelihood by more; dozens
+/// of corrections are tried.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_FAULT_LOG_LIKELIHOOD_GAIN: f64 = 20.0;
+
+/// Relative. Prior standard deviation of the wheels' sizes.
+/// Convention: wheels are known to a few per cent.
+pub(crate) const WHEEL_PRIOR_SIGMA: f64 = 0.05;
+
+/// Relative. Prior standard deviation of the wheel separation, to which skid steering adds.
+/// Tuned: by hand; no record of what on.
+pub(crate) const SEPARATION_PRIOR_SIGMA: f64 = 0.3;
+
+/// Standard deviations of the prior. Largest deviation of a wheel's size from nominal of a plausible drive.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_WHEEL_DEVIATION_SIGMAS: f64 = 2.0;
+
+/// Standard deviations of the prior. Largest deviation of the wheel separation from nominal of a plausible
+/// drive.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_SEPARATION_DEVIATION_SIGMAS: f64 = 1.5;
+
+/// m/√m. Largest wheel noise of a plausible drive.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_WHEEL_SIGMA_M_PER_SQRT_M: f64 = 0.01;
+
+/// rad/√rad. Largest turn noise of a plausible drive.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_TURN_SIGMA_RAD_PER_SQRT_RAD: f64 = 0.05;
+
+/// Ratio. Odometry is uncorrelated with the measurements if its noise is larger than that of a plausible
+/// drive by this.
+/// Tuned: by hand; no record of what on.
+pub(crate) const UNCORRELATED_NOISE_FACTOR: f64 = 3.0;
+
+/// Fraction of the extent of the measured path, and radians. Measurements with a larger standard deviation
+/// are uncorrelated with the motion.
+/// Tuned: by hand; no record of what on.
+pub(crate) const UNCORRELATED_MEASUREMENT_SIGMA: f64 = 0.3;
+
+/// Fraction of the measurements. With more outliers, a fit is not sound and faults without a trace in the log
+/// are tried.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_SOUND_OUTLIER_FRACTION: f64 = 0.01;
+
+/// Ratio. Outliers after a correction of the records over those before it; tails may be heavy, and lost
+/// counts are restored roughly.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_REMAINING_OUTLIER_RATIO: f64 = 0.5;
+
+/// Fraction of the measurements. Outliers that are accepted after a correction of the records, however few
+/// there were before.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_CORRECTED_OUTLIER_FRACTION: f64 = 0.1;
+
+/// Radians. A correction of the records that turns the instrument farther on the robot is refused.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_SENSOR_HEADING_RAD: f64 = 1.0;
+
+/// Ratio. Wheels whose mean size differs from nominal by more are not those of the described robot.
+/// Tuned: by hand; no record of what on.
+pub(crate) const WRONG_WHEELS_FACTOR: f64 = 1.3;
+
+/// Relative. Corrections of two sessions undo the same fault if their factors differ by no more.
+/// Tuned: by hand; no record of what on.
+pub(crate) const FACTOR_TOLERANCE: f64 = 0.05;
+
+/// Fraction of the measurements. A base fit that rejects more as outliers is no model of the robot.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_REJECTED_FRACTION: f64 = 0.2;
+
+/// Measurements per run. With fewer, a fit that rejects too many may have diverged by itself: only faults
+/// visible in the log are then corrected.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
+
+/// Ranges of the four increments around it. An increment farther off is outlying.
+/// Tuned: by hand; no record of what on.
+pub(crate) const OUTLYING_ROW_RANGES: f64 = 20.0;
+
+/// Probability. An increment of a steady wheel is outlying.
+/// Derived: 0.13 r³ at r = 1/20, the distribution of the range of four normal variables.
+pub(crate) const OUTLYING_ROW_PROBABILITY: f64 = 1.6e-5;
+
+/// Counts. Least range of increments.
+/// Derived: two increments of a steady wheel each round by one count.
+pub(crate) const COUNT_ROUNDING: f64 = 2.0;
+
+/// Ratio. A wheel slower than this share of its mean rate around a row stands; a robot may stop for a row.
+/// Tuned: by hand; no record of what on.
+pub(crate) const STANDSTILL_RATE_RATIO: f64 = 0.1;
+
+/// Probability. Level of the test of the log's rows.
+/// Tuned: by hand; no record of what on.
+pub(crate) const LOG_ROWS_LEVEL: f64 = 1e-6;
+
+/// Ratio. A log whose span differs from that of the measurements by more is of another clock.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_CLOCK_RATIO: f64 = 30.0;

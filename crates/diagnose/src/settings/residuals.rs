@@ -1,0 +1,107 @@
+//! Tests of the residuals, noise effects, large errors, and binned residuals.
+
+/// Number. Lags of the whiteness test.
+/// Tuned: by hand; no record of what on.
+pub(crate) const WHITENESS_LAGS: usize = 5;
+
+/// Probability. A measurement of a right model is an outlier.
+/// Derived: tail of χ² with three degrees of freedom above the outlier gate at 25.9.
+pub(crate) const OUTLIER_PROBABILITY: f64 = 1e-5;
+
+/// Probability. An outlier is persistent if the measurement after it has a smaller p-value.
+/// Tuned: by hand; no record of what on.
+pub(crate) const AFTER_OUTLIER_LEVEL: f64 = 0.01;
+
+/// Standard deviations. Larger innovations are of the tail whose persistence is tested.
+/// Tuned: by hand; no record of what on.
+pub(crate) const TAIL_INNOVATION_SIGMAS: f64 = 3.0;
+
+/// Standard errors. Level at which the innovations after large ones are persistent or reverting.
+/// Convention: 1 %, two-sided, of a normal variable.
+pub(crate) const PERSISTENCE_SIGMAS: f64 = 2.6;
+
+/// Ratio of Mahalanobis distances. Two displacements cancel if together they are off by less than this share
+/// of the outlier.
+/// Derived: an outlier is off by 5 standard deviations at the least, the sum of two right ones by √2.
+pub(crate) const CANCELLATION_RATIO: f64 = 0.5;
+
+/// Number. Fewer innovations are not tested for whiteness.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_WHITENESS_INNOVATIONS: f64 = 20.0;
+
+/// Number. A lag with fewer pairs is not tested.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_WHITENESS_PAIRS: f64 = 10.0;
+
+/// Number. The tails of fewer innovations are not tested.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_KURTOSIS_INNOVATIONS: f64 = 50.0;
+
+/// Probability. Family-wise level at which outliers are a noise effect.
+/// Tuned: by hand; no record of what on.
+pub(crate) const NOISE_EFFECT_LEVEL: f64 = 1e-3;
+
+/// Probability. Level of dependence on something recorded where tails are heavy: a few large errors make the
+/// test of dependence fail.
+/// Tuned: by hand; no record of what on.
+pub(crate) const DEPENDENCE_BEYOND_TAILS_LEVEL: f64 = 1e-6;
+
+/// Fraction of the measurements. With more outliers the model errs, not the measurements.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_OUTLIER_FRACTION: f64 = 0.2;
+
+/// Ratio. Least number of isolated outliers for each persistent one where the instrument errs.
+/// Tuned: by hand; no record of what on.
+pub(crate) const ISOLATED_TO_PERSISTENT_RATIO: usize = 3;
+
+/// Standard deviations. A larger innovation is a large error.
+/// Tuned: by hand; no record of what on.
+pub(crate) const LARGE_INNOVATION_SIGMAS: f64 = 3.5;
+
+/// Measurements. Large innovations no farther apart are one error: a filter that followed it comes back.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_ERROR_GAP: usize = 3;
+
+/// Number. Large errors that are attributed, the largest first.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_LARGE_ERRORS: usize = 24;
+
+/// Number. Large errors in one pass.
+/// Tuned: by hand; no record of what on.
+pub(crate) const ERRORS_PER_PASS: usize = 4;
+
+/// Probability. A large error has another cause than the others.
+/// Tuned: by hand; no record of what on.
+pub(crate) const OTHER_CAUSE_PROBABILITY: f64 = 0.05;
+
+/// Fraction. Share of the errors of sticking or sliding wheels that are at starts and stops.
+/// Tuned: by hand; no record of what on.
+pub(crate) const RAMP_ERROR_FRACTION: f64 = 0.9;
+
+/// Seconds. A measurement this near to an instant is at it.
+/// Tuned: by hand; no record of what on.
+pub(crate) const INSTANT_TOLERANCE_S: f64 = 1e-6;
+
+/// Metres and radians. Scales of a measurement's error over which the likelihood is averaged.
+/// Convention: half decades from a millimetre to a metre.
+pub(crate) const MEASUREMENT_ERROR_SCALES: [f64; 7] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
+
+/// Fractions of the time between two measurements. Instants of a jump.
+/// Derived: the middles of three equal parts.
+pub(crate) const JUMP_TIME_FRACTIONS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
+
+/// Number. Bins of a continuous covariate.
+/// Tuned: by hand; no record of what on.
+pub(crate) const BINS: usize = 12;
+
+/// Number. A bin with fewer residuals has no standard error.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_RESIDUALS_PER_BIN: usize = 8;
+
+/// Fraction of the covariate's span. Bins are no narrower: closer ones overlap in a picture.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_BIN_WIDTH: f64 = 0.025;
+
+/// Relative. Values of a covariate that differ by less are one level.
+/// Tuned: by hand; no record of what on.
+pub(crate) const COVARIATE_TOLERANCE: f64 = 1e-6;

@@ -1,0 +1,124 @@
+//! The search of the mean model: scan, rivals, refits, profiles, sparse terms, held-out runs.
+
+/// Correlation coefficient at lag one. Smaller ones count as white, however significant.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_AUTOCORRELATION: f64 = 0.05;
+
+/// Standard errors. Less significant autocorrelation counts as white.
+/// Tuned: by hand; no record of what on.
+pub(crate) const AUTOCORRELATION_SIGMAS: f64 = 4.0;
+
+/// Probability. Family-wise false-positive rate of the scan where residuals depend on something recorded.
+/// Tuned: by hand; no record of what on.
+pub(crate) const SCAN_LEVEL_IF_DEPENDENT: f64 = 0.2;
+
+/// Standard deviations. A direction is tested if a plausible effect along it is at least so significant.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_DETECTABLE_SIGMAS: f64 = 1.0;
+
+/// Fraction of a column's information that is left beside the free columns. Smaller shares are rounding.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_COLUMN_SHARE: f64 = 1e-9;
+
+/// Number. Scales of the prior of sizes, each half of the one before: down to a thousandth of what is
+/// plausible.
+/// Derived: 2⁻¹⁰ is a thousandth.
+pub(crate) const PRIOR_SCALES: i32 = 11;
+
+/// Columns. Largest number of candidates' columns in one pass: a whole number of products on three channels.
+/// Tuned: by hand, on the time of a diagnosis.
+pub(crate) const MAX_COLUMNS_PER_PASS: usize = 126;
+
+/// Seconds. Rows of a faster log are taken together in scans.
+/// Tuned: by hand, on the time of a diagnosis.
+pub(crate) const DECIMATION_STEP_S: f64 = 0.05;
+
+/// Natural logarithm per component. Cost of a component of a rejected measurement beside its variance.
+/// Derived: half of the outlier gate's χ² of three degrees of freedom, over its three components.
+pub(crate) const OUTLIER_COST: f64 = 0.5 * 25.9 / 3.0;
+
+/// Fraction of the measurements that the fit before took. A refit that takes fewer has diverged.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_TAKEN_FRACTION: f64 = 0.5;
+
+/// Number. Candidates that are tried for the next effect where the best is not confirmed.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_CANDIDATES_TRIED: usize = 3;
+
+/// Half-widths of the 95 % interval. An effect is refused if odometry drifts more with it by more; at one
+/// half-width an effect that leaves the drift alone would be refused once in forty times.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_DRIFT_INCREASE_INTERVALS: f64 = 2.0;
+
+/// Ratio of score statistics. A candidate with less than this share of the best one's is no rival.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_RIVAL_STATISTIC_RATIO: f64 = 0.5;
+
+/// χ². A candidate whose score statistic is less than the best one's by no more is a close rival.
+/// Derived: half of it is log odds: the margin of 3, and as much again that the refit may find.
+pub(crate) const CLOSE_RIVAL_STATISTIC: f64 = 12.0;
+
+/// Fraction of the best score statistic. The same for strong effects.
+/// Tuned: by hand; no record of what on.
+pub(crate) const CLOSE_RIVAL_FRACTION: f64 = 0.1;
+
+/// Number. Rivals that are refitted.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_RIVALS: usize = 6;
+
+/// Number. Rivals that are refitted, close ones included.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_CLOSE_RIVALS: usize = 10;
+
+/// Number. Further variants that are tried of an effect whose best variant has unphysical estimates.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_FURTHER_VARIANTS: usize = 3;
+
+/// Ratio of variances. Contacts that scatter by more than this over a measurement's variance would show in
+/// the noise; sticking wheels reach 2.7, backlash that is taken for them 6.8.
+/// Tuned: on the blind benchmark.
+pub(crate) const MAX_CONTACT_VARIANCE_RATIO: f64 = 4.0;
+
+/// Standard deviations. A smaller estimate counts as zero when an effect is checked for being physical.
+/// Tuned: by hand; no record of what on.
+pub(crate) const INSIGNIFICANT_ESTIMATE_SIGMAS: f64 = 3.0;
+
+/// Number. Parabolas that are fitted to a profile likelihood, each on a smaller step.
+/// Tuned: by hand; no record of what on.
+pub(crate) const PROFILE_ITERATIONS: usize = 2;
+
+/// Ratio. Smallest step of a parabola over the one before.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_PROFILE_STEP_RATIO: f64 = 0.25;
+
+/// Standard deviations of the profiled parameter. Step of the next parabola.
+/// Tuned: by hand; no record of what on.
+pub(crate) const PROFILE_STEP_SIGMAS: f64 = 1.5;
+
+/// Number. Sparse terms that are refitted, best score first.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_SPARSE_REFITS: usize = 3;
+
+/// Number. Sparse terms of one cause.
+/// Derived: a cosine and a sine of the phase of each of two wheels.
+pub(crate) const MAX_SPARSE_TERMS: usize = 4;
+
+/// Cycles per revolution of a wheel: gear teeth, spokes, poles, turns of a motor.
+/// Tuned: by hand; no record of what on.
+pub(crate) const WHEEL_CYCLES: [u8; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24];
+
+/// Number. Folds of cross-validation.
+/// Tuned: by hand; no record of what on.
+pub(crate) const HOLD_OUT_FOLDS: usize = 6;
+
+/// Number. Fewer runs, or blocks of runs, have no standard error over units.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MIN_HELD_OUT_UNITS: usize = 3;
+
+/// Relative. A smaller increase of the drift does not speak against a term.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MATERIAL_DRIFT_INCREASE: f64 = 0.05;
+
+/// Prior standard deviations. A larger detection limit is rounding, not information.
+/// Tuned: by hand; no record of what on.
+pub(crate) const MAX_DETECTION_LIMIT_PRIOR_SIGMAS: f64 = 1e6;
