@@ -19,7 +19,8 @@ use serde_json::Value;
 
 const MOUNTED: Pose = Pose::new(0.12, -0.05, 1.4);
 
-/// Motion capture of a robot that differs from what it believes in its three geometry parameters and nothing else.
+/// Motion capture of a robot that differs from what it believes in its three geometry parameters and nothing
+/// else.
 fn motion_capture(protocols: Vec<Schedule>, mounted: Pose) -> Scenario {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/motion-capture.toml");
     let mut scenario = Scenario::read(&file).expect("a shipped scenario");

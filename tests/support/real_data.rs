@@ -1,4 +1,5 @@
-//! Where the logs of real robots are, for tests of this crate and of `dataset`: they are no part of the repository.
+//! Where the logs of real robots are, for tests of this crate and of `dataset`: they are no part of the
+//! repository.
 
 use std::path::{Path, PathBuf};
 

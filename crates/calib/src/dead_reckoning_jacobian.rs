@@ -86,7 +86,7 @@ pub(crate) fn unobservable(direction: &Vector3<f64>) -> (Parameter, &'static str
     if sizes.min() > MIN_COMMON_SCALE_COMPONENT {
         (
             Parameter::CommonScale,
-            "the runs only turn on the spot, or close: add straight runs, or measurements on the way",
+            "the runs only turn on the spot, or close: add straight runs, or measurements along the path",
         )
     } else {
         match sizes.imax() {

@@ -35,11 +35,11 @@ pub(crate) fn detectability(
                 let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
                 let why = if size > parameter.prior_sigma {
                     format!(
-                        "these runs hardly excite it: {} below {size:.2e}{unit} would not have shown, and {:.1e} is large already",
+                        "these runs hardly excite it: {} is detected from {size:.2e}{unit} on, and {:.1e} is large already",
                         parameter.name, parameter.prior_sigma
                     )
                 } else {
-                    format!("{} from {size:.2e}{unit} on would have shown", parameter.name)
+                    format!("{} is detected from {size:.2e}{unit} on", parameter.name)
                 };
                 let smallest =
                     Smallest { value: size, unit: parameter.unit.to_owned(), parameter: parameter.name.to_owned() };

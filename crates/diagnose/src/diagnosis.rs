@@ -42,7 +42,7 @@ pub enum DiagnoseError {
     },
     /// The base model does not follow the robot, and no gross fault explains it.
     #[error(
-        "the calibrated model leaves out {percent:.0} % of the measurements, and no gross fault explains it: there is nothing to build on; add runs with measurements on the way"
+        "{percent:.0} % of the pose measurements are rejected as outliers, and no gross fault explains it; record poses along the path, not only at its ends"
     )]
     OdometryUncorrelated {
         /// Share of measurements left out.

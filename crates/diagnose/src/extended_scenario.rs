@@ -70,8 +70,9 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
             Candidate::Effect { id, .. } => {
                 let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
                 let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
-                effect_from_estimates(id, &estimates)
-                    .ok_or_else(|| format!("{id}: the sizes found do not make an effect that can be simulated"))?
+                effect_from_estimates(id, &estimates).ok_or_else(|| {
+                    format!("{id}: the estimated parameters do not make an effect that can be simulated")
+                })?
             }
             Candidate::Sparse(sparse) => {
                 Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))

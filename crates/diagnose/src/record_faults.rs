@@ -54,7 +54,7 @@ pub(crate) fn fault(
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
         let Some(Hypothesis::Records(corrections)) = hypothesis(id) else { continue };
-        // What leaves no trace is possible in any records; it is tried where the base fit is hard to believe.
+        // What leaves no trace is possible in any records; it is tried where the base fit is implausible.
         if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }

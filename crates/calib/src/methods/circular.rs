@@ -133,9 +133,9 @@ fn arcs(run: &RunView<'_>, robot: &NominalRobot, geometry: &DriveGeometry) -> Re
     }
     match (arcs.is_empty(), bent) {
         (false, _) => Ok(arcs),
-        (true, true) => Err("its radius changes all the way: no quarter turn is an arc"),
+        (true, true) => Err("its radius changes throughout: no quarter turn is an arc"),
         (true, false) => Err(
-            "no two readings are 60 to 300 degrees of the circle apart: read the pose on the way, every half turn or sooner",
+            "no two readings are 60 to 300 degrees of the circle apart: measure the pose along the circle, every half turn or sooner",
         ),
     }
 }
@@ -146,7 +146,7 @@ impl Method for Circular {
     }
 
     fn about(&self) -> &'static str {
-        "circles driven both ways and read on the way: wheel ratio and wheelbase, blind to the common scale"
+        "circles driven in both directions and measured along the path: wheel ratio and wheelbase; the common scale is not observable"
     }
 
     /// Radius and numbers are ours.
@@ -170,7 +170,7 @@ impl Method for Circular {
         }
         if runs.is_empty() {
             let why = runs_rejected.first().map_or_else(
-                || "it needs circles in both directions (protocol = \"circle_cw\" and \"circle_ccw\") with poses measured on the way".to_owned(),
+                || "it needs circles in both directions (protocol = \"circle_cw\" and \"circle_ccw\") with poses measured along the path".to_owned(),
                 |rejected| format!("run {}: {}", rejected.run, rejected.why),
             );
             return Err(CalibError::NotApplicable { method: Self::NAME, why });
@@ -180,7 +180,7 @@ impl Method for Circular {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "one way round, unequal wheels and a wrong wheelbase bend a circle alike; drive the same circles the other way round too".to_owned(),
+                why: "in one direction, unequal wheels and a wrong wheelbase bend a circle alike; drive the same circles in the other direction too".to_owned(),
             });
         }
         let fit = Fit::of(&runs, geometry.wheel_separation_m());

@@ -263,7 +263,7 @@ impl Method for Direct {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees each way"
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of about 360 degrees in each direction"
                     .to_owned(),
             });
         };

@@ -218,7 +218,7 @@ impl Method for Ivanjko {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::WheelSeparation,
-                why: "no run with protocol = \"spin\" has its ends measured: add spins of 180 degrees or more each way"
+                why: "no run with protocol = \"spin\" has its ends measured: add spins of 180 degrees or more in each direction"
                     .to_owned(),
             });
         }
@@ -238,7 +238,7 @@ impl Method for Ivanjko {
             }
         }
         let Some(last) = last else {
-            return Err(Self::not_applicable("its straight runs do not tell the wheels apart: drive them longer"));
+            return Err(Self::not_applicable("its straight runs do not determine the wheels' difference: drive them longer"));
         };
         let of_radii = covariance(&last, &spins, &at);
         let twice = Covariance::from_diagonal(&DVector::from_vec(vec![2.0, 2.0, 1.0]));

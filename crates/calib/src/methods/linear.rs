@@ -288,7 +288,7 @@ impl Linear {
         let rolled: f64 = runs.iter().flat_map(|run| &run.equations).map(rolled).sum();
         let open = normal.trace() > CLOSED_PATH_RATIO * CLOSED_PATH_RATIO * rolled;
         let Some(solution) = solve(&normal, &right).filter(|_| open) else {
-            let why = "the paths close, or are of one shape for both wheels, so that no gain shows, or only their sum; drive open curves, or use the physical form";
+            let why = "the paths close, or are alike for both wheels, so that no gain is observable, or only their sum; drive open curves, or use the physical form";
             return Err(Self::unobservable(Parameter::LeftWheelDiameter, why));
         };
         let score = |run: &Driven, at: Wheels<f64>| -> Vector2<f64> {

@@ -197,7 +197,7 @@ impl Method for Segments {
     }
 
     fn about(&self) -> &'static str {
-        "any path with straights and turns, seen as poses: least errors of dead reckoning at the ends of its segments"
+        "any path with straights and turns, measured as poses: least errors of dead reckoning at the ends of its segments"
     }
 
     /// The authors drove what was at hand. Straights, spins and squares show all three geometry parameters by

@@ -364,7 +364,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         "does not determine the three geometry parameters".to_owned()
     };
     let why = format!(
-        "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would show at a large size, sought {}.",
+        "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would be detected at a large size, sought {}.",
         shows.len(),
         shows.len() + blind_to.len(),
         setting.within

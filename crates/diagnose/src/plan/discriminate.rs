@@ -38,7 +38,8 @@ pub(super) fn discriminate(
     let candidates: Vec<RivalColumns> = candidates.collect();
     let before = total(&without.fit.scan(&mut terms(&all)).runs).ok_or("no run has measurements")?;
     let frame = Frame::of(&without.fit, &all);
-    let rivals = Rivals::new(frame, candidates, &before).ok_or("the data do not determine the names' sizes")?;
+    let rivals =
+        Rivals::new(frame, candidates, &before).ok_or("the data do not determine the candidates' parameters")?;
     let options = equations_of(&without.fit, &all, setting, manoeuvres);
     // What hardly stands out is to stand out as well, where that can be.
     let both = is_of_low_significance(found, index).then(|| rivals.clone().significant_by(LOW_SIGNIFICANCE_SIGMAS));
@@ -74,7 +75,7 @@ pub(super) fn discriminate(
     } else {
         (pairs(&discriminated), format!(" It does not tell {}.", pairs(&never)))
     };
-    let tell = if confidence == Confidence::P95 { "tells" } else { "tells, with even chances," };
+    let tell = if confidence == Confidence::P95 { "discriminates" } else { "discriminates, at even odds," };
     let why = format!(
         "it takes {minutes:.1} min and {tell} {tells} by {sigmas:.1} standard deviations or more, sought {}. Diagnose the new runs together with the old ones.{still}{what}",
         setting.within

@@ -37,7 +37,7 @@ pub(crate) fn next_experiment(
 ) -> Result<NextExperiment, String> {
     let setting = Setting::of_data(datasets, model, limits).ok_or("there is no dataset")?;
     if setting.free_m.iter().any(|side_m| *side_m <= 0.0) && limits.room_m.is_some() {
-        return Err("the room leaves the robot no way to move".to_owned());
+        return Err("the room leaves the robot no space to move".to_owned());
     }
     let manoeuvres = library(&setting);
     if manoeuvres.is_empty() {

@@ -89,7 +89,7 @@ pub(super) fn predictions(
     };
     let mut sentence = text::where_to_measure(&part, &at);
     if sigmas < SINGLE_MEASUREMENT_SIGMAS {
-        sentence.push_str(" No single measurement tells them apart: all measurements of the runs together do.");
+        sentence.push_str(" No single measurement discriminates them: all measurements of the runs together do.");
     }
     Some((sentence, predicted))
 }

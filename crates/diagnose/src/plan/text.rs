@@ -64,7 +64,7 @@ pub(super) fn where_to_measure(part: &Part, at: &Where) -> String {
     let when =
         if at.share > 0.999 { "at the end".to_owned() } else { format!("after {:.0} % of the time", 100.0 * at.share) };
     format!(
-        " Predicted is, {when} of the {direction} {noun}, their mean, where the instrument sees the robot against dead reckoning with the calibrated lengths alone."
+        " Predicted is, {when} of the {direction} {noun}, their mean, where the instrument measures the robot relative to dead reckoning with the calibrated geometry alone."
     )
 }
 

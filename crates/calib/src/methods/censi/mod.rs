@@ -2,10 +2,10 @@
 //! of the instrument.
 //!
 //! Model: the instrument at ℓ on the robot moves by s = ⊖ℓ ⊕ o ⊕ ℓ where the robot moved by o. The turn of o
-//! is J₂₁ Φ_L + J₂₂ Φ_R in the wheels' turns Φ, with J₂₁ = −r_L/b and J₂₂ = r_R/b: linear least squares. Given
-//! them, with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ), the rest is Q x = 0: the minimum of |Q x|² on
-//! cos² + sin² = 1. It has two stationary solutions; the one of lower cost is taken. Then the worst 1 % in
-//! position or heading are dropped, and the fit is repeated, four times.
+//! is J₂₁ Φ_L + J₂₂ Φ_R in the wheels' turns Φ, with J₂₁ = −r_L/b and J₂₂ = r_R/b: linear least squares.
+//! Given them, with x = (b, ℓ_x, ℓ_y, cos ℓ_θ, sin ℓ_θ), the rest is Q x = 0: the minimum of |Q x|² on cos² +
+//! sin² = 1. It has two stationary solutions; the one of lower cost is taken. Then the worst 1 % in position
+//! or heading are dropped, and the fit is repeated, four times.
 //! Assumptions: the instrument's error is alike in all directions and the wheels' own is small beside it.
 //! Rows of the log are arcs (the print takes the whole interval for one). Positions alone and marks without
 //! poses are not enough.
@@ -142,7 +142,7 @@ impl Censi {
             return Err(CalibError::Unobservable {
                 method: Self::NAME,
                 parameter: Parameter::SensorTheta,
-                why: "the instrument sees no translation that stands out from its error; add straight runs".to_owned(),
+                why: "the instrument measures no translation that exceeds its error; add straight runs".to_owned(),
             });
         }
         let share = |count: usize| count as f64 / samples.len() as f64;
@@ -157,7 +157,8 @@ fn sample(
     measured: Pose,
 ) -> Option<DisplacementSample> {
     let mut sample = DisplacementSample { run: run.info().id.clone(), wheel_rad, sensor_from_later: measured };
-    // Standing still carries no information, and its small errors would make those of motion look like outliers.
+    // Standing still carries no information, and its small errors would make those of motion look like
+    // outliers.
     if sample.wheel_rad.iter().all(|rad| rad.left == 0.0 && rad.right == 0.0) {
         return None;
     }
