@@ -14,7 +14,7 @@ use crate::candidate::{Candidate, mean_terms};
 use crate::check::TestResult;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
-use crate::findings::{Evidence, findings};
+use crate::findings::{StageResults, findings};
 use crate::gain::gain;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
@@ -153,7 +153,7 @@ fn continued(
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
     let structure = mean_structure(datasets, base, &catalogue, restored);
     let (log, spans) = (check_rows(datasets), check_spans(datasets));
-    let findings = findings(&Evidence {
+    let findings = findings(&StageResults {
         structure: &structure,
         log: log.as_ref(),
         spans: spans.as_ref(),

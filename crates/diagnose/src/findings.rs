@@ -23,7 +23,7 @@ fn is_scatter(finding: &Finding) -> bool {
 }
 
 /// What the stages of the diagnosis before found out.
-pub(crate) struct Evidence<'e, 'a> {
+pub(crate) struct StageResults<'e, 'a> {
     pub(crate) structure: &'e MeanStructure<'a>,
     /// The tests of the log itself: its rows, and its time span.
     pub(crate) log: Option<&'e TestResult>,
@@ -35,7 +35,7 @@ pub(crate) struct Evidence<'e, 'a> {
     pub(crate) without: &'e [String],
 }
 
-impl Evidence<'_, '_> {
+impl StageResults<'_, '_> {
     /// Lost counts were restored roughly: they explain outliers and autocorrelated errors that are left.
     fn restored(&self) -> bool {
         self.faults.iter().any(|fault| fault.is_restored_roughly())
@@ -43,10 +43,10 @@ impl Evidence<'_, '_> {
 }
 
 /// A stage: the findings so far, record faults first, to those after it.
-type Stage = fn(&Evidence<'_, '_>, Vec<Finding>) -> Vec<Finding>;
+type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
-pub(crate) fn findings(evidence: &Evidence<'_, '_>) -> Vec<Finding> {
+pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
     let stages: [Stage; 10] = [
         record_faults,
         mean_effects,
@@ -59,25 +59,25 @@ pub(crate) fn findings(evidence: &Evidence<'_, '_>) -> Vec<Finding> {
         doubt_low_significance,
         by_significance,
     ];
-    stages.iter().fold(Vec::new(), |findings, stage| stage(evidence, findings))
+    stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
 }
 
-fn record_faults(evidence: &Evidence<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
-    evidence.faults.iter().map(|fault| finding::of_fault(fault)).collect()
+fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
+    results.faults.iter().map(|fault| finding::of_fault(fault)).collect()
 }
 
 /// Effects of the mean; where one uncatalogued term explains nearly as much, with that doubt.
-fn mean_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    findings.extend(finding::of_search(&evidence.structure.found));
-    if let Some(relative_odds) = evidence.structure.competing {
+fn mean_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.extend(finding::of_search(&results.structure.found));
+    if let Some(relative_odds) = results.structure.competing {
         finding::beside_unlisted(&mut findings, relative_odds);
     }
     findings
 }
 
-fn sparse_terms(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let model = evidence.structure.model();
-    for (index, p_value, trials) in evidence.structure.unlisted.iter().flat_map(UncataloguedTerms::terms) {
+fn sparse_terms(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let model = results.structure.model();
+    for (index, p_value, trials) in results.structure.unlisted.iter().flat_map(UncataloguedTerms::terms) {
         let test = wald_test(model, index).map(|(test, _)| test);
         findings.extend(test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials)));
     }
@@ -86,11 +86,11 @@ fn sparse_terms(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<
 
 /// Noise effects, or that odometry is uncorrelated with the measurements. A mean effect of the same cause
 /// excludes a noise effect.
-fn noise_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    if evidence.uncorrelated {
-        findings.push(finding::of_uncorrelated(&evidence.structure.base));
-    } else if !evidence.restored() {
-        let mut signs = scatter(evidence.structure, evidence.without);
+fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if results.uncorrelated {
+        findings.push(finding::of_uncorrelated(&results.structure.base));
+    } else if !results.restored() {
+        let mut signs = scatter(results.structure, results.without);
         signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
         findings.extend(signs);
     }
@@ -98,9 +98,9 @@ fn noise_effects(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec
 }
 
 /// What the log or the wheels' sizes show. Faults without a name cast doubt on all findings before them.
-fn faults_of_the_log(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let Evidence { structure, log, spans, faults, without, .. } = *evidence;
-    let wheels = if evidence.uncorrelated { None } else { wrong_wheels(&structure.base) };
+fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let StageResults { structure, log, spans, faults, without, .. } = *results;
+    let wheels = if results.uncorrelated { None } else { wrong_wheels(&structure.base) };
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
@@ -118,40 +118,40 @@ fn faults_of_the_log(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) ->
 
 /// Failed checks that no finding explains. A noise effect explains failed checks, unless residuals depend
 /// on something too plainly.
-fn failed_checks(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let Evidence { structure, .. } = evidence;
+fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let StageResults { structure, .. } = results;
     let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < DEPENDENCE_BEYOND_NOISE_LEVEL;
     let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
     let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
-    if !(evidence.restored() || scatters || is_reported) {
+    if !(results.restored() || scatters || is_reported) {
         findings.extend(finding::of_failed_checks(&structure.checked));
     }
     findings
 }
 
-fn doubt_parts_of_stronger_findings(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let full = evidence.structure.found.model.candidates.len() >= MAX_EFFECTS;
-    finding::doubt(&mut findings[evidence.faults.len()..], full);
+fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let full = results.structure.found.model.candidates.len() >= MAX_EFFECTS;
+    finding::doubt(&mut findings[results.faults.len()..], full);
     findings
 }
 
 /// An uncatalogued term that is significant beside all that was found, though not by enough to be a finding.
-fn doubt_incomplete_models(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if findings.iter().any(Finding::is_sure)
-        && let Some(left) = lack_of_fit(&evidence.structure.base, evidence.structure.model())
+        && let Some(left) = lack_of_fit(&results.structure.base, results.structure.model())
     {
         finding::or_incomplete(&mut findings, left);
     }
     findings
 }
 
-fn doubt_low_significance(_: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     finding::or_of_low_significance(&mut findings);
     findings
 }
 
 /// Record faults stay first: everything else is found in the records without them.
-fn by_significance(evidence: &Evidence<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    findings[evidence.faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
+fn by_significance(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings[results.faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     findings
 }
