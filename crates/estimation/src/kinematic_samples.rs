@@ -185,7 +185,7 @@ mod tests {
         // Session's clock and distance at the start of the last interval; 2 rad and the 0.1 rad of the
         // first one.
         assert_eq!((first.session_s, first.session_m, first.phase_rad.left), (11.0, 5.1, 2.1));
-        // Seen to fail where sums are not reset: a second sample without motion.
+        // Sums start anew: a second sample without motion.
         assert_eq!(sampler.sample((0, 2), Pose::IDENTITY), None);
         sampler.add(10.0, &intervals[2..], &model, (Wheels::both(2.1), 5.1));
         let second = sampler.sample((0, 3), Pose::IDENTITY).expect("one second went by");
@@ -193,7 +193,7 @@ mod tests {
             (second.motion.distance_m, second.turned_rad.right, second.since_reversal_m),
             (-0.2, -0.2, Some(0.2))
         );
-        // Seen to fail where the speed before is forgotten with the sums: from rest to −0.2 m/s.
+        // The speed before is remembered beyond the sums: from rest to −0.2 m/s.
         assert_eq!(second.speed_change_m_s, -0.2);
     }
 }
