@@ -1,8 +1,8 @@
 //! YAIR: a differential-drive robot simulated, calibrated and benched; the front door of the library.
 //!
-//! The rooms are crates of their own, named here as a user meets them:
-//! [`kinematics`] (poses, drive, dead reckoning), [`dataset`] (measured runs, their files and importers, protocols), [`effects`] (what makes odometry
-//! deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods)
+//! The rooms are crates of their own, named here as a user meets them: [`kinematics`] (poses, drive, dead
+//! reckoning), [`dataset`] (measured runs, their files and importers, protocols), [`effects`] (what makes
+//! odometry deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods)
 //! [`bench`](mod@bench) (Monte Carlo) and [`report`] (pictures).
 //!
 //! ```

@@ -15,12 +15,12 @@ use crate::{files, root, text};
 
 /// The sources of the crates whose settings are listed. Each has a file `settings.rs` or a folder
 /// `settings/`.
-const SOURCES: [&str; 1] = ["crates/diagnose/src"];
+const SOURCES: [&str; 3] = ["crates/estimation/src", "crates/calib/src", "crates/diagnose/src"];
 
 const NUMERIC: [&str; 11] = ["f32", "f64", "u8", "u16", "u32", "u64", "usize", "i32", "i64", "isize", "Duration"];
 
 /// How the last sentence of a setting's comment begins.
-const ORIGINS: [&str; 4] = ["Derived: ", "Budgeted: ", "Tuned: ", "Convention: "];
+const ORIGINS: [&str; 5] = ["Derived: ", "Budgeted: ", "Tuned: ", "Convention: ", "Published: "];
 
 const DOCUMENT: &str = "docs/settings.md";
 

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
 use crate::estimate::Parameter;
 use crate::settings::MIN_COMMON_SCALE_COMPONENT;
 
-/// The three lengths of the drive by which wheel turns make a motion.
+/// The three geometry parameters of the drive by which wheel turns make a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GeometryParameters {
     /// Travel of each wheel for a radian, metres: its radius.

@@ -34,9 +34,9 @@ pub struct Document {
     pub checks: Vec<Check>,
     /// What was found.
     pub findings: Vec<Finding>,
-    /// What this data could not have shown.
+    /// Effects that are not detectable in this data, with their detection limits.
     pub blind_to: Vec<Blind>,
-    /// The smallest size of every candidate that would have shown, found or not.
+    /// The detection limit of every candidate, found or not.
     pub sensitivity: Vec<Blind>,
     /// The calibration with what was found in the model.
     pub calibration: CalibrationReport,
@@ -75,7 +75,7 @@ pub struct Check {
 pub struct Finding {
     /// The most probable name, or `unlisted`.
     pub id: String,
-    /// Names that this data cannot tell apart, most probable first.
+    /// Ambiguity set: causes that this data does not discriminate, most probable first.
     pub names: Vec<String>,
     /// Probability of the first cause among all that were tried.
     pub probability: f64,
@@ -117,7 +117,7 @@ pub struct UnlistedTerm {
     pub sigma: f64,
 }
 
-/// What would have shown from which size on.
+/// Detection limits by effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Blind {
     /// The effect.
@@ -221,7 +221,7 @@ pub struct PlannedSession {
 }
 
 /// What each name says that one kind of run will show: where the instrument sees the robot against dead
-/// reckoning with the calibrated lengths alone.
+/// reckoning with the calibrated geometry alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Predicted {
     /// `forward`, `backward`, `clockwise` or `counter-clockwise`.

@@ -112,7 +112,7 @@ fn values_of_runs(sparse: &Sparse, model: &AugmentedModel<'_>) -> BTreeMap<Strin
     own.map(|key| (key.clone(), crate::covariates::values_of_runs(&model.fit, key))).collect()
 }
 
-/// The calibrated lengths as effects on the nominal ones.
+/// The calibrated geometry as effects on the nominal ones.
 fn geometry(model: &AugmentedModel<'_>) -> Result<[Effect; 3], String> {
     let (found, nominal) = (&model.fit.solution.model, &model.fit.nominal);
     let mean = |wheels: kinematics::Wheels<f64>| 0.5 * (wheels.left + wheels.right);

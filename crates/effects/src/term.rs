@@ -3,10 +3,10 @@
 //!
 //! Model: along, across and yaw gain coefficient · Π covariates per second, and so does the travel of wheels,
 //! each by covariates of its own; seen_along, seen_across and seen_heading are off by coefficient · Π
-//! covariates, and seen_late is so long ago.
-//! [`Sparse`] is the estimation model, which sees recorded quantities and which diagnosis seeks over a library; [`SparseTerm`] is the simulation model, as
-//! scenarios have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only
-//! what it goes with.
+//! covariates, and seen_late is so long ago. [`Sparse`] is the estimation model, which sees recorded
+//! quantities and which diagnosis seeks over a library; [`SparseTerm`] is the simulation model, as scenarios
+//! have it and diagnosis writes it. It is no id of the catalogue: nothing says what it is, only what it goes
+//! with.
 //!
 //! Reference: Brunton, Proctor & Kutz 2016 (sparse terms over a library of functions); columns are normalised
 //! because a threshold on raw coefficients depends on units.
@@ -87,7 +87,8 @@ impl SparseTerm {
     /// The product that its names mean.
     ///
     /// # Errors
-    /// [`EffectError`]: too many or no covariates, unknown ones, ones that the channel cannot have, or values of runs that make no covariate.
+    /// [`EffectError`]: too many or no covariates, unknown ones, ones that the channel cannot have, or values
+    /// of runs that make no covariate.
     pub fn sparse(&self) -> Result<Sparse, EffectError> {
         let no_term = |problem: String| Err(EffectError::NoTerm { problem });
         let channel = self.channel.name();

@@ -29,7 +29,8 @@ pub trait Count: Copy + Send + Sync {
     /// nothing.
     fn since(self, earlier: Self) -> f64;
 
-    /// [`Self::since`] of a whole column, and whether the differences of these numbers are the steps between the readings, exactly.
+    /// [`Self::since`] of a whole column, and whether the differences of these numbers are the steps between
+    /// the readings, exactly.
     #[inline(always)]
     fn column_since(column: &[Self], earlier: impl Fn(usize) -> Self, since: &mut [f64]) -> bool {
         for (k, (since, count)) in since.iter_mut().zip(column).enumerate() {

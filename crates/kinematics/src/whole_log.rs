@@ -4,8 +4,8 @@
 //! Headings follow from the counts since the start, chords from headings; neither waits for the step before
 //! it. What is left of the chain are the sums of displacements, and these start from nothing in every group
 //! of 64 steps, four groups at a time. The bits are those of
-//! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers of 51 bits, headings of 10⁶ rad, half a radian
-//! turned in a step) goes through it instead.
+//! [`DeadReckoning::update`](crate::DeadReckoning::update); a block that is beyond the loops' range (integers
+//! of 51 bits, headings of 10⁶ rad, half a radian turned in a step) goes through it instead.
 
 use crate::dead_reckoning::{CompensatedSum, GROUP, heading_rad};
 use crate::instruction_set::Kernel;

@@ -1,4 +1,5 @@
-//! Extensions of the paper's model: what each says, which sizes are plausible, and how it acts in the simulator.
+//! Extensions of the paper's model: what each says, which sizes are plausible, and how it acts in the
+//! simulator.
 
 use effects::{Command, Forward, Step};
 use serde::Serialize;

@@ -21,10 +21,12 @@ impl Figure {
     /// shows them in DejaVu Sans or a font that is no wider.
     ///
     /// # Errors
-    /// [`ReportError::NoPanels`], [`ReportError::Columns`] and [`ReportError::NoGlyph`] of the figure; [`ReportError::NoSeries`],
-    /// [`ReportError::AxisRange`] and [`ReportError::EqualAspectOnLog`] of a panel; of a series [`ReportError::TooFew`], [`ReportError::Lengths`],
-    /// [`ReportError::NotDrawable`] (NaN, infinite), [`ReportError::NotPositive`] (on a logarithmic axis), [`ReportError::NegativeError`],
-    /// [`ReportError::NotAscending`], [`ReportError::BandUpsideDown`], [`ReportError::BarsWithoutZero`] and [`ReportError::ReferenceOutside`].
+    /// [`ReportError::NoPanels`], [`ReportError::Columns`] and [`ReportError::NoGlyph`] of the figure;
+    /// [`ReportError::NoSeries`], [`ReportError::AxisRange`] and [`ReportError::EqualAspectOnLog`] of a
+    /// panel; of a series [`ReportError::TooFew`], [`ReportError::Lengths`], [`ReportError::NotDrawable`]
+    /// (NaN, infinite), [`ReportError::NotPositive`] (on a logarithmic axis), [`ReportError::NegativeError`],
+    /// [`ReportError::NotAscending`], [`ReportError::BandUpsideDown`], [`ReportError::BarsWithoutZero`] and
+    /// [`ReportError::ReferenceOutside`].
     pub fn to_svg(&self) -> Result<String, ReportError> {
         let font = Font::embedded();
         self.check(&font)?;

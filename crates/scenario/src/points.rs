@@ -29,7 +29,8 @@ impl Sweep {
     /// axis varying fastest, or Sobol points in their ranges. One point where nothing is varied.
     ///
     /// # Errors
-    /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's scenario invalid.
+    /// [`ScenarioError::Axis`] when a key is not in the scenario or no number, and whatever makes a point's
+    /// scenario invalid.
     pub fn points(&self, scenario: &Scenario, location: &str) -> Result<Vec<Point>, ScenarioError> {
         let text_error = |message: String| ScenarioError::Toml { location: location.to_owned(), message };
         self.check().map_err(text_error)?;

@@ -113,7 +113,8 @@ impl Observer {
     }
 }
 
-/// [`f64::round`] of each, the same bits without the calls that they are where the processor is not known to round by an instruction (SSE 4.1).
+/// [`f64::round`] of each, the same bits without the calls that they are where the processor is not known to
+/// round by an instruction (SSE 4.1).
 #[inline]
 fn round(numbers: [f64; 2]) -> [f64; 2] {
     /// 1.5·2⁵²: added and taken away again it rounds to whole numbers, halves to even ones.

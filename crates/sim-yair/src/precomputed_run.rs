@@ -1,5 +1,5 @@
-//! The closed form where all of a run but its draws is known beforehand: when it moves, rests and is read follows
-//! from the plan, so that no clock has to be asked.
+//! The closed form where all of a run but its draws is known beforehand: when it moves, rests and is read
+//! follows from the plan, so that no clock has to be asked.
 //!
 //! That is so where no effect has a say in commands and counters, nothing is logged between motions and no
 //! instrument measures by itself: the paper's experiments. What the body and its counters do is the same code

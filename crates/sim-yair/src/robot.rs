@@ -76,7 +76,8 @@ impl SimulatedRobot {
     /// Prepares a scenario for driving.
     ///
     /// # Errors
-    /// [`SimulationError`] when the closed form is asked for and not exact, or the controllers cannot reach the commanded speed.
+    /// [`SimulationError`] when the closed form is asked for and not exact, or the controllers cannot reach
+    /// the commanded speed.
     pub fn new(scenario: &Scenario, seed: u64, trial: u64) -> Result<Self, SimulationError> {
         Self::with_more_effects(scenario, seed, trial, Vec::new())
     }

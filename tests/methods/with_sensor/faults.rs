@@ -216,8 +216,8 @@ const UMBMARK: [[(f64, f64); 3]; 4] = [
     [(1.0, 1.7), (1.0, 0.8879), (0.9122, 1.0)],
 ];
 
-/// Errors of four corners do not add up when each turns what comes after it: α and β are of first order. The heading-based `jung_chung` is exact on the same
-/// squares.
+/// Errors of four corners do not add up when each turns what comes after it: α and β are of first order. The
+/// heading-based `jung_chung` is exact on the same squares.
 #[test]
 fn umbmark_is_of_first_order_and_its_axes_may_not_be_exchanged() {
     for [robot, umbmark, exchanged] in UMBMARK {

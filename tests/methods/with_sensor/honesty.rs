@@ -12,7 +12,8 @@ use kinematics::{DriveGeometry, Pose, wrap_to_pi};
 
 use super::{DRIVE, MOUNTED, lengths, motion_capture, with_instrument_sigma};
 
-/// Errors over sigmas of the drive's three geometry parameters, and of the mounting's three where there is one.
+/// Errors over sigmas of the drive's three geometry parameters, and of the mounting's three where there is
+/// one.
 fn normalised(found: &Calibration, truth: &DriveGeometry, body_from_sensor: Pose) -> Vec<f64> {
     let [left, right, separation] = lengths(truth);
     let Pose { x_m, y_m, theta_rad } = body_from_sensor;

@@ -2,8 +2,8 @@
 
 use nalgebra::Matrix3;
 
-/// The innovation of one measurement, linear in the geometry, in the frame of the run's true start pose. Poses
-/// are ordered x, y, θ (m, m, rad).
+/// The innovation of one measurement, linear in the geometry, in the frame of the run's true start pose.
+/// Poses are ordered x, y, θ (m, m, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearizedInnovation {
     /// When, seconds from the run's start.

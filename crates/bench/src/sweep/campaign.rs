@@ -68,7 +68,8 @@ impl SweepPlan {
     /// Runs the whole sweep in memory on `jobs` threads (0 = one a core).
     ///
     /// # Errors
-    /// [`BenchError`] when a point cannot be simulated. A method that fails on a trial is counted and is no error.
+    /// [`BenchError`] when a point cannot be simulated. A method that fails on a trial is counted and is no
+    /// error.
     pub fn run(&self, jobs: usize, progress: &dyn Fn(Progress)) -> Result<SweepResult, BenchError> {
         let stop = AtomicBool::new(false);
         let campaign =

@@ -24,7 +24,8 @@ pub struct Merged {
 /// Puts the shards in these folders together, in whatever order they are given.
 ///
 /// # Errors
-/// [`BenchError`] that names the folder: no state in it, not finished, of another sweep, given twice, or missing between two others.
+/// [`BenchError`] that names the folder: no state in it, not finished, of another sweep, given twice, or
+/// missing between two others.
 pub fn merge(folders: &[PathBuf]) -> Result<Merged, BenchError> {
     let mut shards = Vec::with_capacity(folders.len());
     for folder in folders {

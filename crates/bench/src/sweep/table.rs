@@ -18,7 +18,8 @@ fn failed(path: &Path, why: &impl ToString) -> BenchError {
 /// once they stand.
 ///
 /// # Errors
-/// [`BenchError::Write`] with the file and the reason; a file that was there before is then unharmed, and the campaign can be gone on with.
+/// [`BenchError::Write`] with the file and the reason; a file that was there before is then unharmed, and the
+/// campaign can be gone on with.
 pub fn write_results(plan: &SweepPlan, result: &SweepResult, rows: bool, dir: &Path) -> Result<(), BenchError> {
     let spool = spool_in(dir);
     write_all(plan, result, if rows { std::slice::from_ref(&spool) } else { &[] }, dir)?;

@@ -29,7 +29,8 @@ impl Blocks {
     /// only be read as a whole.
     ///
     /// # Errors
-    /// [`DatasetError`] of a fault in the manifest, a header, a run's id, or the time at the start of a block.
+    /// [`DatasetError`] of a fault in the manifest, a header, a run's id, or the time at the start of a
+    /// block.
     pub fn open(dir: &Path) -> Result<Option<Self>, DatasetError> {
         let (header, warnings, grouped) = Grouped::survey(Opened::open(dir)?, true)?;
         Ok(grouped.map(|grouped| Self { header, warnings, grouped }))

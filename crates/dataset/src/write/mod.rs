@@ -39,9 +39,9 @@ pub enum Existing {
 /// [`Run::truth_sigma`].
 ///
 /// # Errors
-/// [`DatasetError::AlreadyExists`] as `existing` says; [`DatasetError::RunNotWritable`] and [`DatasetError::NotWritable`] when the
-/// dataset could not be read back (a NaN, unequal columns, a run without truth …); [`DatasetError::Io`]. In
-/// each case `dir` is as it was.
+/// [`DatasetError::AlreadyExists`] as `existing` says; [`DatasetError::RunNotWritable`] and
+/// [`DatasetError::NotWritable`] when the dataset could not be read back (a NaN, unequal columns, a run
+/// without truth …); [`DatasetError::Io`]. In each case `dir` is as it was.
 pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), DatasetError> {
     // Before anything is made.
     check::check(dataset)?;

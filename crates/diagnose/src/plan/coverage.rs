@@ -40,7 +40,7 @@ fn is_driven(candidate: &Candidate) -> bool {
     conditions(candidate.id()).is_none()
 }
 
-/// What stays out of sight, and what would show it.
+/// Effects that stay undetectable, and what would reveal them.
 fn out_of_sight(ids: &[&str]) -> String {
     if ids.is_empty() {
         return String::new();
@@ -49,7 +49,7 @@ fn out_of_sight(ids: &[&str]) -> String {
         Some(how) => format!("{id} ({how})"),
         None => (*id).to_owned(),
     });
-    format!(" Still out of sight: {}.", each.collect::<Vec<_>>().join(", "))
+    format!(" Still not detectable: {}.", each.collect::<Vec<_>>().join(", "))
 }
 
 /// An effect at one of its variants.
@@ -296,7 +296,7 @@ pub enum PlanError {
 }
 
 /// What to drive with a scenario's robot before there is any data, so that its three geometry parameters
-/// are determined well and few effects stay out of sight.
+/// are determined well and few effects stay undetectable.
 ///
 /// # Errors
 /// [`PlanError`] when floor, time or instruments allow nothing.

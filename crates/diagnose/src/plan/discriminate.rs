@@ -1,4 +1,4 @@
-//! The manoeuvre that tells names apart in the least time.
+//! The manoeuvre that discriminates causes in the least time.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::selection::SearchResult;
 use crate::settings::levels::LOW_SIGNIFICANCE_SIGMAS;
 use crate::settings::plan::{MAX_RUN_PAIRS, TWO_MANOEUVRES_TIME_RATIO};
 
-/// What to drive to tell apart the names of one finding; the error says why nothing does.
+/// What to drive to discriminate the causes of one finding; the error says why nothing does.
 pub(super) fn discriminate(
     base: &ModelFit<'_>,
     found: &SearchResult<'_>,
@@ -41,7 +41,7 @@ pub(super) fn discriminate(
     let rivals =
         Rivals::new(frame, candidates, &before).ok_or("the data do not determine the candidates' parameters")?;
     let options = equations_of(&without.fit, &all, setting, manoeuvres);
-    // What hardly stands out is to stand out as well, where that can be.
+    // Causes of low significance must become significant as well, where that can be.
     let both = is_of_low_significance(found, index).then(|| rivals.clone().significant_by(LOW_SIGNIFICANCE_SIGMAS));
     let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
@@ -102,7 +102,7 @@ type Pair = (usize, usize);
 /// Kinds of run, each with the evidence of a pair of them.
 type Driven = (Manoeuvre, NormalEquations);
 
-/// What pairs of names are told apart, how surely, and by what.
+/// Which pairs of causes are discriminated, at what confidence, and by what.
 struct Discrimination {
     confidence: Confidence,
     discriminated: Vec<Pair>,
@@ -119,9 +119,9 @@ struct DiscriminationSearch<'a> {
 }
 
 impl DiscriminationSearch<'_> {
-    /// For certain, what takes the least time; else what tells them farthest apart within the time.
+    /// For certain, what takes the least time; else what discriminates them best within the time.
     fn plan(&self, confidence: Confidence) -> Option<Discrimination> {
-        // A pair that nothing tells apart, however long it is driven, must not hide what tells the others
+        // A pair that nothing discriminates, however long it is driven, must not hide what tells the others
         // apart.
         let tellable: Vec<Pair> = self
             .rivals
@@ -145,7 +145,7 @@ impl DiscriminationSearch<'_> {
         of(tellable.clone()).or_else(|| of(self.most_discriminated(&tellable, confidence)))
     }
 
-    /// Says that nothing tells names apart, and how far apart the best leaves them.
+    /// Says that nothing discriminates the causes, and how far the best manoeuvre gets.
     fn why_nothing(&self, names: &[Candidate]) -> String {
         let pairs = self.rivals.pairs();
         let best = self.options.iter().filter_map(|option| {
@@ -183,8 +183,8 @@ impl DiscriminationSearch<'_> {
         names.iter().map(margin).fold(f64::INFINITY, f64::min)
     }
 
-    /// The pairs of names that the one kind of run, driven so many times, tells apart that tells most. Of
-    /// names that some kind tells apart, at least one.
+    /// The pairs of names that the one kind of run, driven so many times, discriminates that discriminates
+    /// most. Of causes that some kind discriminates, at least one.
     fn most_discriminated(&self, names: &[Pair], confidence: Confidence) -> Vec<Pair> {
         let discriminated = |(option, pairs): (&Driven, u32)| -> Vec<Pair> {
             names.iter().filter(|pair| self.margin(&[**pair], &[option], pairs, confidence) >= 0.0).copied().collect()
@@ -269,7 +269,7 @@ mod tests {
     use crate::plan::rival_odds::tests::{normal_equations, rivals};
 
     /// Where a kind of run says much of what both names have in common, each run raises what is asked of
-    /// them by more than it tells them apart: few runs tell, many do not.
+    /// them by more than it discriminates them: few runs tell, many do not.
     #[test]
     fn what_few_runs_discriminate_and_many_do_not_is_discriminated() {
         // Both names say 10, and differ by λ/2 = 2.5.

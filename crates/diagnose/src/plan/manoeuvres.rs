@@ -157,7 +157,7 @@ impl Trapezoid {
         Self { distance_m, top_m_s, acceleration_m_s2, duration_s: distance_m / top_m_s + top_m_s / acceleration_m_s2 }
     }
 
-    /// What share of the way is behind after a time.
+    /// Fraction of the distance driven after a time.
     fn share(&self, t_s: f64) -> f64 {
         let ramp_s = self.top_m_s / self.acceleration_m_s2;
         let gone_m = if t_s < ramp_s {

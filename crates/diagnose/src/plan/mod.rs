@@ -1,4 +1,4 @@
-//! The next experiment: what to drive to tell names apart, or to see what the data could not have shown,
+//! The next experiment: what to drive to discriminate causes, or to reveal what is not detectable yet,
 //! and what each name predicts before it is driven.
 //!
 //! Runs along drivable programs are made up from the fitted model; their information, which needs no
@@ -27,7 +27,7 @@ pub use constraints::{Limits, moved_over_m};
 pub use coverage::{PlanError, ScenarioPlan, plan_scenario};
 use manoeuvres::library;
 
-/// What to drive to tell apart the names of the first finding that has several, or else to see what would
+/// What to drive to discriminate the causes of the first finding that has several, or else to see what would
 /// not have shown; or why there is nothing to drive.
 pub(crate) fn next_experiment(
     datasets: &[Dataset],
@@ -53,7 +53,7 @@ pub(crate) fn next_experiment(
     match (why, detectability) {
         (Some(why), _) => Err(why),
         (None, []) => {
-            Err("no name is left to be told from another, and nothing of the catalogue is out of sight".to_owned())
+            Err("no cause is left to be discriminated, and every effect of the catalogue is detectable".to_owned())
         }
         (None, detectability) => coverage::show(model, catalogue, detectability, &setting, &manoeuvres),
     }

@@ -2,7 +2,7 @@
 //!
 //! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the
 //! plan; what is told is where the instrument then sees the robot against dead reckoning with the
-//! calibrated lengths alone, at the instant and in the component at which the names differ most for what is
+//! calibrated geometry alone, at the instant and in the component at which the names differ most for what is
 //! known.
 
 use estimation::{Column, EndError, Model, ModelFit, NormalEquations};

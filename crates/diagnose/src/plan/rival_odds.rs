@@ -14,7 +14,8 @@ use crate::model_comparison::log_odds_margin;
 use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
 use crate::settings::plan::{DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M};
 
-/// How sure it must be that names are told apart. The log of the odds is normal with mean λ/2 and variance λ.
+/// How sure it must be that causes are discriminated. The log of the odds is normal with mean λ/2 and
+/// variance λ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Confidence {
     /// With probability 0.95.
@@ -250,7 +251,7 @@ pub(super) mod tests {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
         let before = normal_equations(&old, &DVector::from_column_slice(&[0.3, 10.0]));
         let rivals = rivals(&before);
-        // Both names say 10, and nothing tells them apart.
+        // Both names say 10, and nothing discriminates them.
         assert!(rivals.estimates.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.estimates);
         let discrimination = rivals.discrimination(&before, (0, 1)).expect("determined");
         assert!(discrimination.sigmas < 1e-3 && discrimination.margin(Confidence::P50) < 0.0, "{discrimination:?}");
