@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let Diagnosis { mut document, extended, residuals, alternatives, .. } =
-        ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone() })?;
+        ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone(), ..Options::default() })?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
         if let Ok(scenario) = &extended {

@@ -79,8 +79,8 @@ fn of_data(
     terminal: &Terminal,
 ) -> Result<ExitCode, Failure> {
     let datasets = read_datasets(sources, terminal)?;
-    let options = Options { without: arguments.without.clone() };
-    let Diagnosis { document, extended, .. } = ::diagnose::diagnose_within(&datasets, &options, limits)?;
+    let options = Options { without: arguments.without.clone(), limits: *limits };
+    let Diagnosis { document, extended, .. } = ::diagnose::diagnose(&datasets, &options)?;
     terminal.say(&document.sentence)?;
     let mut scenarios = Vec::new();
     match &document.next_experiment {

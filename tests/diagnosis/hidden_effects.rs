@@ -39,7 +39,7 @@ fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
 }
 
 fn diagnosed(dataset: &Dataset, without: &[&str]) -> Document {
-    let options = Options { without: without.iter().map(ToString::to_string).collect() };
+    let options = Options { without: without.iter().map(ToString::to_string).collect(), ..Options::default() };
     diagnose(std::slice::from_ref(dataset), &options).expect("a diagnosis").document
 }
 

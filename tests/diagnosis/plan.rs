@@ -9,7 +9,7 @@
 
 use crate::support::{document, refusal, succeed};
 use dataset::{Dataset, Protocol, Run};
-use diagnose::{Document, Limits, NextExperiment, Options, Predicted, diagnose, diagnose_within, plan_scenario};
+use diagnose::{Document, Limits, NextExperiment, Options, Predicted, diagnose, plan_scenario};
 use effects::{Address, Effect, StreamName};
 use estimation::FitSettings;
 use motion_programs::Schedule;
@@ -41,7 +41,7 @@ fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
 }
 
 fn planned(datasets: &[Dataset], limits: Limits) -> Document {
-    diagnose_within(datasets, &Options::default(), &limits).expect("a diagnosis").document
+    diagnose(datasets, &Options { limits, ..Options::default() }).expect("a diagnosis").document
 }
 
 fn names(document: &Document) -> Vec<String> {
@@ -143,7 +143,9 @@ fn plans_for_random_robots_name_nothing_wrong() {
     for case in 0..cases {
         let (id, hidden) = drawn(case);
         let first = simulated(&hidden, 61_000 + case);
-        let Ok(found) = diagnose_within(std::slice::from_ref(&first), &Options::default(), &ROOM) else { continue };
+        let Ok(found) = diagnose(std::slice::from_ref(&first), &Options { limits: ROOM, ..Options::default() }) else {
+            continue;
+        };
         let found = found.document;
         if found.findings.iter().all(|finding| finding.names.len() < 2) {
             continue;

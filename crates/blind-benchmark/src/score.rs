@@ -19,7 +19,7 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
         CaseKind::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
         _ => Vec::new(),
     };
-    let diagnosed = diagnose(&case.datasets, &Options { without });
+    let diagnosed = diagnose(&case.datasets, &Options { without, ..Options::default() });
     let counts = [
         case.datasets.len(),
         case.datasets.iter().map(|dataset| dataset.runs.len()).sum(),

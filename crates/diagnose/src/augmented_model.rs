@@ -74,12 +74,13 @@ pub(crate) fn refit<'a>(
         fit.solution.model.term_values.iter().all(|size| size.is_finite())
             && count(fit) > MIN_TAKEN_FRACTION * count(&from.fit)
     };
-    let from_here = from.fit.extended_from(estimates, &mut terms(&candidates)).ok().filter(takes_enough);
+    let from_here = from.fit.extended_from(estimates.clone(), &mut terms(&candidates)).ok().filter(takes_enough);
     let from_here = match from_here {
         Some(fit) if !fit.solution.left_basin => return Some(AugmentedModel { fit, candidates }),
         from_here => from_here,
     };
-    let from_base = base.extended(&mut terms(&candidates)).ok().filter(takes_enough);
+    let zeros = vec![0.0; estimates.len()];
+    let from_base = base.extended_from(zeros, &mut terms(&candidates)).ok().filter(takes_enough);
     let most = [&from_here, &from_base].into_iter().flatten().map(count).fold(0.0, f64::max);
     let fit = from_here.into_iter().chain(from_base).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
     Some(AugmentedModel { fit, candidates })

@@ -23,11 +23,13 @@ use crate::residuals::{Residuals, residuals};
 use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
 use crate::text;
 
-/// What to leave out.
+/// What to leave out of the catalogue, and the limits of the next experiment.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Effects that are not to be named, by id.
     pub without: Vec<String>,
+    /// Floor, time and speed within which the next experiment is sought.
+    pub limits: Limits,
 }
 
 /// Why there is no diagnosis.
@@ -94,83 +96,68 @@ fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
 }
 
 const EVERY_MEASUREMENT: FitSettings = FitSettings::GEOMETRY_ONLY;
-/// Diagnoses one robot's sessions.
+
+/// Diagnoses one robot's sessions: the stages in order, each a function of the results before it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
 pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
-    diagnose_within(datasets, options, &Limits::default())
-}
-
-/// The same, with the next experiment sought within given limits.
-///
-/// # Errors
-/// As [`diagnose`].
-pub fn diagnose_within(datasets: &[Dataset], options: &Options, limits: &Limits) -> Result<Diagnosis, DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
-    let measured = sessions(datasets);
-    let first = EVERY_MEASUREMENT.fit(&measured);
-    let outlying = first.as_ref().is_ok_and(|first| {
-        rejected_share(first) > MAX_REJECTED_FRACTION && measurements_per_run(first) < MIN_MEASUREMENTS_PER_RUN
+    // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
+    let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
+    let outlying = as_recorded.as_ref().is_ok_and(|base| {
+        rejected_share(base) > MAX_REJECTED_FRACTION && measurements_per_run(base) < MIN_MEASUREMENTS_PER_RUN
     });
-    match fault(datasets, first.as_ref().ok(), &options.without, outlying) {
-        Some(found) => {
-            let rewritten = sessions(&found.records);
-            let base = EVERY_MEASUREMENT.fit(&rewritten)?;
-            // One may hide another.
-            let without = [&options.without[..], &[found.id.to_owned()]].concat();
-            let Some(hidden) = fault(&found.records, Some(&base), &without, false) else {
-                return Ok(continued(&found.records, base, &[&found], options, limits));
-            };
-            let rewritten = sessions(&hidden.records);
-            let base = EVERY_MEASUREMENT.fit(&rewritten)?;
-            Ok(continued(&hidden.records, base, &[&found, &hidden], options, limits))
-        }
+    let first = fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying);
+    let second;
+    let (records, base, faults): (&[Dataset], ModelFit<'_>, Vec<&Fault>) = match &first {
         None => {
-            let first = first?;
-            let share = rejected_share(&first);
+            let base = as_recorded?;
+            let share = rejected_share(&base);
             if share > MAX_REJECTED_FRACTION {
                 return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
             }
-            Ok(continued(datasets, first, &[], options, limits))
+            (datasets, base, Vec::new())
         }
-    }
-}
-
-fn continued(
-    datasets: &[Dataset],
-    base: ModelFit<'_>,
-    faults: &[&Fault],
-    options: &Options,
-    limits: &Limits,
-) -> Diagnosis {
+        Some(first) => {
+            let base = EVERY_MEASUREMENT.fit(&sessions(&first.records))?;
+            let without = [&options.without[..], &[first.id.to_owned()]].concat();
+            second = fault(&first.records, Some(&base), &without, false);
+            match &second {
+                None => (&first.records, base, vec![first]),
+                Some(second) => {
+                    let base = EVERY_MEASUREMENT.fit(&sessions(&second.records))?;
+                    (&second.records, base, vec![first, second])
+                }
+            }
+        }
+    };
     // Where the counts do not follow the robot at all, no small effect has a meaning.
     let uncorrelated = !is_correlated(&base);
     let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let structure = mean_structure(datasets, base, &catalogue, restored);
-    let (log, spans) = (check_rows(datasets), check_spans(datasets));
+    let structure = mean_structure(records, base, &catalogue, restored);
+    let (log, spans) = (check_rows(records), check_spans(records));
     let findings = findings(&StageResults {
         structure: &structure,
         log: log.as_ref(),
         spans: spans.as_ref(),
-        faults,
+        faults: &faults,
         uncorrelated,
         without: &options.without,
     });
     let model = structure.model();
     let (gain, gain_why_null) = gain_of(&structure.base, model);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
-    let next = next_experiment(datasets, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits);
-    let extended = crate::extended_scenario::scenario_of(datasets, model);
+    let next =
+        next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
+    let extended = crate::extended_scenario::scenario_of(records, model);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, &findings);
-    let names: Vec<String> = datasets
-        .iter()
-        .map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned()))
-        .collect();
+    let names: Vec<String> =
+        records.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
     let document = Document {
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
@@ -181,7 +168,7 @@ fn continued(
         sensitivity,
         calibration: CalibrationReport {
             dataset: Names::of(names),
-            methods: vec![MethodReport::new("joint", &calibration(datasets, model), &datasets[0].robot)],
+            methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
         },
         gain,
         gain_why_null,
@@ -191,7 +178,7 @@ fn continued(
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
     let found = FittedModel::of(model);
-    Diagnosis { document, extended, residuals, alternatives, found }
+    Ok(Diagnosis { document, extended, residuals, alternatives, found })
 }
 
 fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Option<String>) {

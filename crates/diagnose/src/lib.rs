@@ -45,7 +45,7 @@ mod text;
 mod wald;
 
 pub use alternatives::{Alternative, Status};
-pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_within};
+pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
     Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
     Value, Verdict,

@@ -79,11 +79,6 @@ impl<'a> MeanModel<'a> {
     fn shows_dependence(&self) -> bool {
         self.checked.checks.iter().any(TestResult::shows_dependence)
     }
-
-    /// Uncatalogued terms beside the effects that were found.
-    fn terms_beside(&self, base: &ModelFit<'a>) -> Option<UncataloguedTerms<'a>> {
-        sparse(base, &self.found.model, SPARSE_TERM_LEVEL).map(|sparse| UncataloguedTerms::from(base, sparse))
-    }
 }
 
 /// Searches the mean model of a base fit. `restored`: lost counts were restored roughly.
@@ -94,33 +89,23 @@ pub(crate) fn mean_structure<'a>(
     restored: bool,
 ) -> MeanStructure<'a> {
     let model = MeanModel::of_effects(search(&base, catalogue, SCAN_LEVEL, FitCache::default()));
-    let model = search_ungated_if_outliers(&base, model, catalogue);
-    let model = ungated_terms_if_outliers(&base, model);
+    // A large effect in few measurements looks like outliers: what a search among all measurements finds.
+    let ungated = if model.has_outliers() { search_ungated(&base, &model.found, catalogue) } else { None };
+    let model = ungated.map_or(model, MeanModel::of_effects);
+    // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
+    let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
+    let model = match if unexplained { UncataloguedTerms::ungated_terms(&base) } else { None } {
+        Some(unlisted) => model.with_terms(unlisted),
+        None => model,
+    };
     let model = compare_with_sparse(&base, model);
     let Decorrelated { base, model, correlated, spurious } =
         thin_if_autocorrelated(datasets, base, model, catalogue, restored);
+    let model = if correlated.is_some() { compare_with_sparse(&base, model) } else { model };
     let model = search_if_dependent(&base, model, catalogue);
     let model = terms_if_dependent(&base, model);
     let MeanModel { found, unlisted, checked, competing } = model;
     MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
-}
-
-/// Where outliers are in excess: what a search among all measurements finds, if it explains the outliers.
-fn search_ungated_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
-    let ungated = if model.has_outliers() { search_ungated(base, &model.found, catalogue) } else { None };
-    ungated.map_or(model, MeanModel::of_effects)
-}
-
-/// Where outliers are in excess and residuals depend on something, but no effect is found: sparse terms
-/// among all measurements.
-fn ungated_terms_if_outliers<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
-    if !(model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence()) {
-        return model;
-    }
-    match UncataloguedTerms::ungated_terms(base) {
-        Some(unlisted) => model.with_terms(unlisted),
-        None => model,
-    }
 }
 
 /// Compares the effects with one sparse term. Where that explains more than all effects together, sparse
@@ -130,21 +115,21 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
         return model;
     }
     let without = AugmentedModel::base(base);
-    let Some(sparse_search) = SparseSearch::beside(base, &without) else { return model };
+    let Some(sparse_search) = SparseSearch::beside(1.0, base, &without) else { return model };
     let named = log_bayes_factor(&without.fit, &model.found.model);
     let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
     let unnamed = finding
         .as_ref()
         .map_or_else(|| sparse_search.log_bayes_factor(), |sparse| sparse_search.log_bayes_factor_of(&sparse.model));
-    let Some(sparse) = finding.filter(|_| unnamed > named + log_odds_margin(named)) else {
+    let Some(term) = finding.filter(|_| unnamed > named + log_odds_margin(named)) else {
         // The prior of an uncatalogued cause is lower.
         let unnamed = unnamed + finding::uncatalogued_log_odds();
         let competing = Some(relative_odds(unnamed, named)).filter(|_| unnamed > named - MIN_LOG_ODDS_MARGIN);
         return MeanModel { competing, ..model };
     };
-    let instead = UncataloguedTerms::from(base, sparse);
+    let instead = UncataloguedTerms::from(base, term);
     let log_bayes_factor_instead = instead.log_bayes_factor(&without.fit);
-    let beside = model.terms_beside(base);
+    let beside = sparse(base, &model.found.model, SPARSE_TERM_LEVEL).map(|term| UncataloguedTerms::from(base, term));
     match beside.filter(|beside| beside.log_bayes_factor(&without.fit) >= log_bayes_factor_instead) {
         Some(beside) => model.with_terms(beside),
         None => MeanModel { found: model.found.without_effects(without), ..model }.with_terms(instead),
@@ -160,9 +145,8 @@ struct Decorrelated<'a> {
     spurious: bool,
 }
 
-/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, a new
-/// search on them, and its comparison with one sparse term. Autocorrelated measurements taken as
-/// independent make any effect too significant.
+/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, and a
+/// new search on them. Autocorrelated measurements taken as independent make any effect too significant.
 fn thin_if_autocorrelated<'a>(
     datasets: &'a [Dataset],
     base: ModelFit<'a>,
@@ -187,7 +171,6 @@ fn thin_if_autocorrelated<'a>(
     };
     let correlated = Some(model.checked.correlation);
     let model = MeanModel::of_effects(search(&thinned, catalogue, SCAN_LEVEL, FitCache::default()));
-    let model = compare_with_sparse(&thinned, model);
     Decorrelated { base: thinned, model, correlated, spurious }
 }
 
@@ -210,8 +193,8 @@ fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMode
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    match model.terms_beside(base) {
-        Some(unlisted) => model.with_terms(unlisted),
+    match sparse(base, &model.found.model, SPARSE_TERM_LEVEL) {
+        Some(term) => model.with_terms(UncataloguedTerms::from(base, term)),
         None => model,
     }
 }

@@ -80,57 +80,65 @@ pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
 /// Evaluates parts of a scan. The candidates of a part are tested as a whole beside those that the fit has.
 /// `answer` gets them, what the fit leaves of their columns, and the normal equations. Nothing where the
 /// fit's own columns are not determined.
+///
+/// Rows of a fast log are taken together where the fit stays the same on them; parts that depend on single
+/// rows are evaluated row by row.
 pub(crate) fn scan_parts_of<T: Send>(
     fit: &ModelFit<'_>,
     chosen: &[Candidate],
     parts: &[&[Candidate]],
     answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
-    let Some(coarse) = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S) else {
-        return scan_parts_row_by_row(fit, chosen, parts, &answer);
+    let coarse = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S);
+    let is_by_rows = |part: &[Candidate]| coarse.is_none() || part.iter().any(Candidate::goes_by_rows);
+    let numbered = || parts.iter().copied().enumerate();
+    let by_rows = passes(numbered().filter(|(_, part)| is_by_rows(part))).into_iter().map(|parts| (fit, parts));
+    let decimated = coarse.iter().flat_map(|coarse| {
+        passes(numbered().filter(|(_, part)| !is_by_rows(part))).into_iter().map(move |parts| (coarse, parts))
+    });
+    let of_pass = |(fit, parts): &(&ModelFit<'_>, Vec<NumberedPart<'_>>)| {
+        let mut all = terms(chosen);
+        let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
+        all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
+        let columns_of: Vec<usize> = parts.iter().map(|(_, part)| columns_of(part)).collect();
+        let Some(equations) = total(&fit.scan_parts(&mut all, &columns_of)) else { return Vec::new() };
+        let Some(projection) = fit.eliminated(&equations, &[]) else { return Vec::new() };
+        let of_part = |((number, part), own): (&NumberedPart<'_>, &usize)| {
+            let columns: Vec<usize> = (at..at + own).collect();
+            at += own;
+            (*number, answer(part, &projection.of_columns(&equations, &columns), &equations))
+        };
+        parts.iter().zip(&columns_of).map(of_part).collect::<Vec<(usize, T)>>()
     };
-    let goes_by_rows = |part: &&[Candidate]| part.iter().any(Candidate::goes_by_rows);
-    let (by_rows, others): (Vec<&[Candidate]>, Vec<&[Candidate]>) = parts.iter().partition(|part| goes_by_rows(part));
-    let mut by_rows = scan_parts_row_by_row(fit, chosen, &by_rows, &answer).into_iter();
-    let mut others = scan_parts_row_by_row(&coarse, chosen, &others, &answer).into_iter();
-    parts.iter().filter_map(|part| if goes_by_rows(part) { by_rows.next() } else { others.next() }).collect()
+    let all: Vec<_> = by_rows.chain(decimated).collect();
+    let mut answers: Vec<(usize, T)> = all.par_iter().flat_map_iter(of_pass).collect();
+    answers.sort_by_key(|(number, _)| *number);
+    answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
-/// The same, all of it by what the fit takes for the log's rows.
-fn scan_parts_row_by_row<T: Send>(
-    fit: &ModelFit<'_>,
-    chosen: &[Candidate],
-    parts: &[&[Candidate]],
-    answer: &(impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync),
-) -> Vec<T> {
-    let mut passes: Vec<Vec<(usize, &[Candidate])>> = Vec::new();
+/// A part of a scan, with its index among all parts.
+type NumberedPart<'c> = (usize, &'c [Candidate]);
+
+fn columns_of(part: &[Candidate]) -> usize {
+    part.iter().map(|candidate| candidate.parameters().len()).sum()
+}
+
+/// The parts in the groups of one pass each: as many columns as a pass carries well.
+fn passes<'c>(parts: impl Iterator<Item = NumberedPart<'c>>) -> Vec<Vec<NumberedPart<'c>>> {
+    let mut passes: Vec<Vec<NumberedPart<'c>>> = Vec::new();
     let mut columns = 0;
     for part in parts {
-        let own = part.iter().map(|candidate| candidate.parameters().len()).sum::<usize>();
+        let own = columns_of(part.1);
         columns += own;
         match passes.last_mut() {
-            Some(last) if columns <= MAX_COLUMNS_PER_PASS => last.push((own, part)),
+            Some(last) if columns <= MAX_COLUMNS_PER_PASS => last.push(part),
             _ => {
-                passes.push(vec![(own, part)]);
+                passes.push(vec![part]);
                 columns = own;
             }
         }
     }
-    let of_pass = |parts: &Vec<(usize, &[Candidate])>| {
-        let mut all = terms(chosen);
-        let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-        all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
-        let estimates: Vec<usize> = parts.iter().map(|(own, _)| *own).collect();
-        let Some(equations) = total(&fit.scan_parts(&mut all, &estimates)) else { return Vec::new() };
-        let Some(projection) = fit.eliminated(&equations, &[]) else { return Vec::new() };
-        let of_part = |(own, part): &(usize, &[Candidate])| {
-            let columns: Vec<usize> = (at..at + own).collect();
-            at += own;
-            answer(part, &projection.of_columns(&equations, &columns), &equations)
-        };
-        parts.iter().map(of_part).collect::<Vec<T>>()
-    };
-    passes.par_iter().flat_map_iter(of_pass).collect()
+    passes
 }
 
 /// Tests every candidate beside the candidates that the fit already has.

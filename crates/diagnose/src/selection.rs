@@ -40,49 +40,38 @@ impl<'a> SearchResult<'a> {
     }
 }
 
-/// The best of a scan, refitted, if that confirms it; else its name.
-fn confirmed<'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
-    model: &AugmentedModel<'a>,
-    entries: &[Entry],
-    (best, tests): (&Entry, f64),
-    level: f64,
-) -> Result<AugmentedModel<'a>, &'static str> {
-    let index = model.candidates.len();
-    let mut found = rivals((base, known), model, index, entries, best.scored.statistic);
-    if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
-        return Err(best.scored.candidate.id());
-    }
-    let (name, extended) = found.swap_remove(0);
-    // A size that the refit does not confirm was an accident of the score.
-    let is_an_accident = wald_test(&extended, index).is_none_or(|(test, _)| test.p_value * tests > level);
-    // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
-    // seems significant: it must be significant over the runs alone.
-    let scattered = differs_from_run_to_run(&extended) < TURN_SCATTER_LEVEL;
-    let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
-    if is_an_accident || !cluster_robust_test(&extended, index, over_runs) {
-        return Err(name.candidate.id());
-    }
-    Ok(extended)
-}
-
-/// The model with one effect more, if the scan finds one.
+/// The model with one effect more: the best of a scan, refitted, if that confirms it, else the next.
 fn grown<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     model: &AugmentedModel<'a>,
     mut entries: Vec<Entry>,
     level: f64,
 ) -> Option<AugmentedModel<'a>> {
-    let tests = tests_in(&entries);
+    let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..MAX_CANDIDATES_TRIED {
         let best = most_significant(&entries, tests, level)?;
-        match confirmed((base, &mut *known), model, &entries, (best, tests), level) {
-            Ok(grown) => return Some(grown),
-            // What comes next may be what is there.
-            Err(id) => entries.retain(|entry| entry.scored.candidate.id() != id),
-        }
+        let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
+        let first = rivals((base, &mut *known), model, index, &entries, statistic).into_iter().next();
+        let refuted = match first.filter(|(name, _)| name.log_odds > 0.0) {
+            Some((_, extended)) if is_confirmed(&extended, index, tests, level) => return Some(extended),
+            Some((name, _)) => name.candidate.id(),
+            None => id,
+        };
+        // What comes next may be what is there.
+        entries.retain(|entry| entry.scored.candidate.id() != refuted);
     }
     None
+}
+
+/// Whether a refit confirms what a score says of a candidate.
+fn is_confirmed(extended: &AugmentedModel<'_>, index: usize, tests: f64, level: f64) -> bool {
+    // A size that the refit does not confirm was an accident of the score.
+    let is_an_accident = wald_test(extended, index).is_none_or(|(test, _)| test.p_value * tests > level);
+    // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
+    // seems significant: it must be significant over the runs alone.
+    let scattered = differs_from_run_to_run(extended) < TURN_SCATTER_LEVEL;
+    let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
+    !is_an_accident && cluster_robust_test(extended, index, over_runs)
 }
 
 /// The most significant effect of a scan, if it is significant at a family-wise level over so many tests

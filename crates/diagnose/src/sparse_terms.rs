@@ -180,13 +180,9 @@ pub(crate) struct SparseSearch<'m, 'a> {
 }
 
 impl<'m, 'a> SparseSearch<'m, 'a> {
-    /// `None` where no term can be seen.
-    pub(crate) fn beside(base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
-        Self::up_to(1.0, base, model)
-    }
-
-    /// The same if the best is significant by its score.
-    fn up_to(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
+    /// The search beside a model; `None` where no term is detectable, or the best is not significant by its
+    /// score at a level.
+    pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         let (scored, p_value) = best_first(base, model)?;
         let trials = scored.len();
         if p_value > level {
@@ -256,5 +252,5 @@ fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Sc
 
 /// The best sparse term beside a model.
 pub(crate) fn sparse<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, level: f64) -> Option<FoundTerm<'a>> {
-    SparseSearch::up_to(level, base, model)?.finding(level)
+    SparseSearch::beside(level, base, model)?.finding(level)
 }

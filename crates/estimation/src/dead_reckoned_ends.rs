@@ -113,7 +113,7 @@ impl ModelFit<'_> {
             noise.variance[component as usize] = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
             noise
         });
-        without.refit_with(Some(from), terms)?;
+        without.refit(Some(from), terms)?;
         Ok(without)
     }
 

@@ -113,21 +113,21 @@ impl ModelFit<'_> {
         }
     }
 
-    pub(crate) fn refit(&mut self, from: Option<InitialValues>) -> Result<(), EstimationError> {
-        self.refit_with(from, &mut [])
-    }
-
-    pub(crate) fn refit_with(
+    /// Fits the free columns from given values, or from where the fit began. `terms` are those of the fit.
+    pub(crate) fn refit(
         &mut self,
         from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
         let from =
             from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        let Self { ends, ungated, .. } = *self;
-        let options = FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) };
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &self.fit_options())?;
         Ok(())
+    }
+
+    fn fit_options(&self) -> FitOptions {
+        let Self { ends, ungated, .. } = *self;
+        FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) }
     }
 
     /// The directions of the free columns that stay nominal.
@@ -156,7 +156,7 @@ impl ModelFit<'_> {
             every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit(Some(self.current_values()))?;
+            self.refit(Some(self.current_values()), &mut [])?;
         }
         Ok(())
     }
@@ -239,7 +239,7 @@ impl ModelFit<'_> {
         self.unobservable = unobservable(&information.matrix);
         if self.unobservable.is_empty() {
             // A direction that has become observable is free again.
-            return if was_fixed { self.refit(Some(self.current_values())) } else { Ok(()) };
+            return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };
         }
         // The model goes back to nominal along unobservable directions only.
         let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
@@ -253,7 +253,7 @@ impl ModelFit<'_> {
             }
         }
         let from = InitialValues { model, noise: None, free_headings: None };
-        self.refit(Some(from))
+        self.refit(Some(from), &mut [])
     }
 
     /// One pass at the values found, with the sensitivities of further terms at zero: what score tests are
@@ -270,13 +270,16 @@ impl ModelFit<'_> {
     }
 
     fn scan_with(&self, terms: &mut [Box<dyn ModelTerm>], options: PassOptions<'_>) -> Pass {
-        let parameters = terms.iter().map(|term| term.parameters().len()).sum();
-        // Terms of the fit come first and keep their values.
-        let mut model = self.solution.model.clone();
-        model.term_values.resize(parameters, 0.0);
+        let (model, gate) = (self.with_zero_terms(terms), self.gate());
         let Solution { noise, free_headings, .. } = &self.solution;
-        let pass_options = PassOptions { gate: self.gate(), ..options };
-        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options)
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, PassOptions { gate, ..options })
+    }
+
+    /// The model found with further terms at zero; those of the fit come first and keep their values.
+    fn with_zero_terms(&self, terms: &[Box<dyn ModelTerm>]) -> Model {
+        let mut model = self.solution.model.clone();
+        model.term_values.resize(terms.iter().map(|term| term.parameters().len()).sum(), 0.0);
+        model
     }
 
     pub(crate) fn gate(&self) -> OutlierGate {
@@ -291,7 +294,7 @@ impl ModelFit<'_> {
     /// [`EstimationError`] when it diverges.
     pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
         let mut ungated_fit = Self { ungated: true, ..self.clone() };
-        ungated_fit.refit(None)?;
+        ungated_fit.refit(None, &mut [])?;
         Ok(ungated_fit)
     }
 
@@ -309,7 +312,7 @@ impl ModelFit<'_> {
     /// [`EstimationError`] when it diverges.
     pub fn refit_gated(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
         let mut gated = Self { ungated: false, ..self.clone() };
-        gated.refit_with(Some(self.current_values()), terms)?;
+        gated.refit(Some(self.current_values()), terms)?;
         Ok(gated)
     }
 
@@ -317,7 +320,10 @@ impl ModelFit<'_> {
     /// in parts of these sizes, and columns of two parts have no products.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
-        self.scan_with(terms, PassOptions { parts, ..PassOptions::default() }).runs
+        let (model, gate) = (self.with_zero_terms(terms), self.gate());
+        let Solution { noise, free_headings, .. } = &self.solution;
+        let pass_options = PassOptions { parts, gate, ..PassOptions::default() };
+        pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
 
     /// The fit with further terms, whose values are free beside the columns that are free already, on the
@@ -346,7 +352,8 @@ impl ModelFit<'_> {
         from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
-        extended.refit_with(Some(from), terms)?;
+        let options = extended.fit_options();
+        extended.solution = fit_from(&extended.records, &extended.selections, from, &extended.prior, terms, &options)?;
         Ok(extended)
     }
 

@@ -125,7 +125,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
                 .for_each(|response| from.model.advance_own(response.group, &response.step(&columns, &step)));
         }
         fit.columns = columns;
-        fit.refit(Some(from))?;
+        fit.refit(Some(from), &mut [])?;
     }
     Ok(())
 }

@@ -115,7 +115,7 @@ pub fn fit_large(
     let sessions: Vec<Session<'_>> = subsamples.iter().map(Dataset::session).collect();
     let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(PRELIMINARY_NOISE_TOLERANCE), &sessions)?;
     first.ends = ConvergenceCriterion::NoiseShare(SUBSAMPLE_NOISE_TOLERANCE);
-    first.refit(Some(first.current_values()))?;
+    first.refit(Some(first.current_values()), &mut [])?;
     let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
