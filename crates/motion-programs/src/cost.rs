@@ -1,9 +1,9 @@
 //! What driving costs: time and travel of motion programs, by the robot's nominal values.
 //!
-//! The wheel that goes farther drives a trapezoid of speed, at most v at an acceleration a: s metres take s/v
-//! + v/a, or 2 √(s/a) where s < v²/a leaves no room for the top. Travel is the mean of both wheels' absolute
-//! travels, b|θ|/2 for a spin of the base b by θ: turning on the spot wears tyres and empties batteries too,
-//! although the centre does not move.
+//! The wheel that goes farther drives a trapezoid of speed, at most v at an acceleration a: s metres take
+//! s/v + v/a, or 2 √(s/a) where s < v²/a leaves no room for the top. Travel is the mean of both wheels'
+//! absolute travels, b|θ|/2 for a spin of the base b by θ: turning on the spot wears tyres and empties
+//! batteries too, although the centre does not move.
 
 use crate::program::{Motion, MotionProgram};
 

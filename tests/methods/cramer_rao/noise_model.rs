@@ -88,7 +88,7 @@ fn misses(scenario: &Scenario, motions: &[Motion]) -> Vec<Vector3<f64>> {
                 let mut dead_reckoned = Pose::IDENTITY;
                 let geometry = robot.true_geometry();
                 view.dead_reckon(&dataset.robot, &geometry, Rule::ExactArc, Pose::IDENTITY, |_, pose| {
-                    dead_reckoned = pose
+                    dead_reckoned = pose;
                 });
                 let seen = start.to(end);
                 let turn_rad = wrap_to_pi(seen.theta_rad - dead_reckoned.theta_rad);
