@@ -3,6 +3,9 @@
 
 mod blind_benchmark;
 mod hidden_effects;
+mod ordinary_logs;
+#[path = "../support/plain_robot.rs"]
+mod plain_robot;
 mod plan;
 mod report;
 #[path = "../support/mod.rs"]

@@ -26,6 +26,7 @@ mod log_rows;
 mod mean_structure;
 mod model_comparison;
 mod noise_effects;
+mod null_distribution;
 mod outlier_attribution;
 mod physical;
 mod plan;

@@ -79,9 +79,9 @@ impl ModelTerm for Jump {
                 }
             }
         }
-        let (speed_m_s, before_m_s) = (interval.speed_m_s(), interval.previous_speed_m_s());
+        let gained_m_s = interval.speed_change_m_s();
         for (k, side) in Side::BOTH.into_iter().enumerate() {
-            gradient[SLIDES + k] = lost(side, speed_m_s[side] - before_m_s[side]);
+            gradient[SLIDES + k] = lost(side, gained_m_s[side]);
         }
         if end_s > self.at_s - INSTANT_TOLERANCE_S {
             gradient[ANY..].copy_from_slice(&POSE_AXES);

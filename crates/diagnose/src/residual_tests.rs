@@ -6,20 +6,20 @@
 //! Reference: Ljung & Box 1978; Bar-Shalom, Li & Kirubarajan 2001 (NIS).
 
 use effects::{Channel, Covariate, Sparse};
-use estimation::{InnovationComponent, ModelFit, Projected, Segment, WHITENESS_Z};
+use estimation::{InnovationComponent, ModelFit, Segment, WHITENESS_Z};
 use kinematics::Side;
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariates::{of_cycles, of_runs};
-use crate::scan::{freedom, principal, scan_parts_of};
+use crate::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
+use crate::scan::{detectable_statistic, freedom, scan_parts_of};
 use crate::settings::levels::CHECKS_LEVEL;
 use crate::settings::residuals::{
     AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS, MIN_WHITENESS_PAIRS,
-    OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
+    OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, RESIMULATED_LEVEL, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
 };
-use crate::settings::search::MIN_DETECTABLE_SIGMAS;
 use crate::statistics::{holm, p_of_chi_square, p_of_score, p_of_z, sidak};
 
 /// What the checks of a model say.
@@ -108,6 +108,40 @@ fn questions(fit: &ModelFit<'_>) -> Vec<Question> {
 /// Asks the residuals of a model.
 pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let fit = &model.fit;
+    let null = NullDistribution::of(model);
+    let NoiseTests { mut checks, mut correlation, mut outliers } = noise_tests(fit);
+    if let Some(null) = &null {
+        let simulated = null.resimulated(|fit| {
+            let tests = noise_tests(fit);
+            (tests.checks.iter().map(|test| test.p_value).collect::<Vec<f64>>(), tests.correlation)
+        });
+        let (p_values, correlations): (Vec<_>, Vec<_>) = simulated.into_iter().unzip();
+        for (number, test) in checks.iter_mut().enumerate() {
+            test.p_value = among_simulated(test.p_value, p_values.iter().filter_map(|of| of.get(number)));
+        }
+        correlation = beyond_simulated(correlation, &correlations);
+        outliers.p_value = checks.last().map_or(1.0, |test| test.p_value);
+    }
+    covariates(model, null.as_ref(), &mut |check, statistic, p_value| {
+        checks.push(TestResult { check, statistic, p_value, passes: true });
+    });
+    let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
+    checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
+    let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
+    let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
+    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
+    Checked { autocorrelated, checks, correlation, outliers }
+}
+
+/// The tests of the innovations alone, by formula.
+struct NoiseTests {
+    checks: Vec<TestResult>,
+    /// As in [`Checked`].
+    correlation: (f64, f64),
+    outliers: Outliers,
+}
+
+fn noise_tests(fit: &ModelFit<'_>) -> NoiseTests {
     let mut checks = Vec::new();
     let mut add = |check: Check, statistic: f64, p_value: f64| {
         checks.push(TestResult { check, statistic, p_value, passes: true });
@@ -117,13 +151,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     tails(fit, &mut add);
     let outliers = outliers(fit);
     add(Check::Outliers, (outliers.isolated + outliers.persistent) as f64, outliers.p_value);
-    covariates(model, &mut add);
-    let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
-    checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
-    let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
-    let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
-    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
-    Checked { autocorrelated, checks, correlation, outliers }
+    NoiseTests { checks, correlation, outliers }
 }
 
 /// The innovations of the first phase: phases share their measurements' errors.
@@ -310,32 +338,66 @@ pub(crate) fn residual_persistence(fit: &ModelFit<'_>, component: usize) -> Resi
 }
 
 /// Score tests of every question.
-fn covariates(model: &AugmentedModel<'_>, add: &mut impl FnMut(Check, f64, f64)) {
+fn covariates(
+    model: &AugmentedModel<'_>,
+    null: Option<&NullDistribution<'_, '_>>,
+    add: &mut impl FnMut(Check, f64, f64),
+) {
     let questions = questions(&model.fit);
     let parts: Vec<&[Candidate]> = questions.iter().flat_map(|question| &question.groups).map(Vec::as_slice).collect();
     // Statistic and p-value of each detectable group.
-    let answers = scan_parts_of(
-        &model.fit,
-        &model.candidates,
-        &parts,
-        |own, Projected { information, gradient, .. }, equations| {
-            let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
-            let directions = principal(information, gradient, &parameters)
-                .into_iter()
-                .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
-            let (statistic, dimensions) =
-                directions.fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1));
-            let freedom = freedom(&model.fit, equations);
-            (dimensions > 0).then(|| (statistic, p_of_score(statistic, dimensions, equations.count, freedom)))
-        },
-    );
+    let answers = scan_parts_of(&model.fit, &model.candidates, &parts, |own, projected, equations| {
+        let (statistic, dimensions) = detectable_statistic(own, projected);
+        let freedom = freedom(&model.fit, equations);
+        let p_value = |statistic| p_of_score(statistic, dimensions, equations.count, freedom);
+        (dimensions > 0).then(|| Answer {
+            statistic,
+            p_value: p_value(statistic),
+            dimensions,
+            count: equations.count,
+            freedom,
+        })
+    });
+    let answers = match null {
+        Some(null) => deflated(null, &parts, answers),
+        None => answers,
+    };
     let mut answers = answers.into_iter();
     for Question { name, groups } in &questions {
-        let own: Vec<(f64, f64)> = answers.by_ref().take(groups.len()).flatten().collect();
-        if let Some((statistic, p_value)) = own.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            add(Check::Covariate(name.clone()), *statistic, sidak(*p_value, own.len()));
+        let own: Vec<Answer> = answers.by_ref().take(groups.len()).flatten().collect();
+        if let Some(answer) = own.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)) {
+            add(Check::Covariate(name.clone()), answer.statistic, sidak(answer.p_value, own.len()));
         }
     }
+}
+
+/// The score test of a group of terms.
+#[derive(Clone, Copy)]
+struct Answer {
+    statistic: f64,
+    p_value: f64,
+    dimensions: usize,
+    count: f64,
+    freedom: f64,
+}
+
+/// The answers with their statistics over what coarse encoders inflate them by, where they would matter.
+fn deflated(
+    null: &NullDistribution<'_, '_>,
+    parts: &[&[Candidate]],
+    mut answers: Vec<Option<Answer>>,
+) -> Vec<Option<Answer>> {
+    let matter: Vec<usize> = (0..answers.len())
+        .filter(|part| answers[*part].is_some_and(|answer| answer.p_value < RESIMULATED_LEVEL))
+        .collect();
+    let asked: Vec<&[Candidate]> = matter.iter().map(|part| parts[*part]).collect();
+    for (part, inflation) in matter.into_iter().zip(null.inflation(&asked)) {
+        if let Some(answer) = &mut answers[part] {
+            answer.statistic /= inflation;
+            answer.p_value = p_of_score(answer.statistic, answer.dimensions, answer.count, answer.freedom);
+        }
+    }
+    answers
 }
 
 #[cfg(test)]

@@ -71,6 +71,17 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     most + (sum / f64::from(PRIOR_SCALES)).ln()
 }
 
+/// The statistic of candidates that are tested as a whole, over the directions that are detectable, and how many
+/// these are.
+pub(crate) fn detectable_statistic(own: &[Candidate], projected: &Projected) -> (f64, usize) {
+    let Projected { information, gradient, .. } = projected;
+    let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
+    principal(information, gradient, &parameters)
+        .into_iter()
+        .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
+        .fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1))
+}
+
 /// How many values the noise was estimated from, after the free columns.
 pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
     let columns = fit.columns.len() as f64;

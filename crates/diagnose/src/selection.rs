@@ -14,7 +14,7 @@ use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
 use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
-use crate::wald::{Test, cluster_robust_test, tests_of, wald_test};
+use crate::wald::{Test, cluster_robust_test, deflated_p_value, tests_of, wald_test};
 
 /// What the search found.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ fn grown<'a>(
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
         let first = rivals((base, &mut *known), model, index, &entries, statistic).into_iter().next();
         let refuted = match first.filter(|(name, _)| name.log_odds > 0.0) {
-            Some((_, extended)) if is_confirmed(&extended, index, tests, level) => return Some(extended),
+            Some((_, extended)) if is_confirmed(model, &extended, index, tests, level) => return Some(extended),
             Some((name, _)) => name.candidate.id(),
             None => id,
         };
@@ -64,9 +64,15 @@ fn grown<'a>(
 }
 
 /// Whether a refit confirms what a score says of a candidate.
-fn is_confirmed(extended: &AugmentedModel<'_>, index: usize, tests: f64, level: f64) -> bool {
+fn is_confirmed(
+    without: &AugmentedModel<'_>,
+    extended: &AugmentedModel<'_>,
+    index: usize,
+    tests: f64,
+    level: f64,
+) -> bool {
     // A size that the refit does not confirm was an accident of the score.
-    let is_an_accident = wald_test(extended, index).is_none_or(|(test, _)| test.p_value * tests > level);
+    let is_an_accident = deflated_p_value(without, extended, index).is_none_or(|p_value| p_value * tests > level);
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
     // seems significant: it must be significant over the runs alone.
     let scattered = differs_from_run_to_run(extended) < TURN_SCATTER_LEVEL;
@@ -132,8 +138,8 @@ pub(crate) fn search<'a>(
         };
         let tests = tests_in(&entries);
         let is_significant = |(name, extended): &(Name, AugmentedModel<'_>)| {
-            wald_test(extended, index)
-                .is_some_and(|(test, _)| sidak(test.p_value, variants(name.candidate.id())) * tests <= level)
+            deflated_p_value(&without, extended, index)
+                .is_some_and(|p_value| sidak(p_value, variants(name.candidate.id())) * tests <= level)
         };
         // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is
         // refused. It is tested beside the others: alone, a part of a larger effect may predict worse.

@@ -10,10 +10,11 @@ use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
 use crate::model_comparison::{log_bayes_factor, regated};
+use crate::null_distribution::NullDistribution;
 use crate::scan::{Scored, scan};
 use crate::settings::levels::SPARSE_TERM_LEVEL;
 use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
-use crate::statistics::sidak;
+use crate::statistics::{p_of_chi_square, sidak};
 
 /// A sparse term with its model.
 pub(crate) struct FoundTerm<'a> {
@@ -246,8 +247,23 @@ fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Sc
     let mut scored: Vec<Scored> =
         scan(&model.fit, &model.candidates, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    if let Some(null) = NullDistribution::of(model) {
+        deflate_best(&null, &mut scored);
+    }
     let p_value = sidak(scored.first()?.p_value, scored.len());
     Some((scored, p_value))
+}
+
+/// Takes the statistics of the best over what coarse encoders inflate them by, and puts them in order again.
+fn deflate_best(null: &NullDistribution<'_, '_>, scored: &mut [Scored]) {
+    let best = MAX_SPARSE_REFITS.min(scored.len());
+    let parts: Vec<&[Candidate]> = scored[..best].iter().map(|of| std::slice::from_ref(&of.candidate)).collect();
+    let inflation = null.inflation(&parts);
+    for (scored, inflation) in scored.iter_mut().zip(inflation) {
+        scored.statistic /= inflation;
+        scored.p_value = p_of_chi_square(scored.statistic, scored.dimensions as f64).max(scored.p_value);
+    }
+    scored[..best].sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
 }
 
 /// The best sparse term beside a model.

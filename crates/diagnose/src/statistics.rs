@@ -42,6 +42,17 @@ pub(crate) fn p_of_student(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| 2.0 * student.sf(t.abs()))
 }
 
+/// Upper tail of a Student variable.
+pub(crate) fn p_of_upper_student(t: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| student.sf(t))
+}
+
+/// Standard normal quantile of an upper tail of this probability.
+pub(crate) fn z_of_upper(p: f64) -> f64 {
+    let p = p.clamp(1e-300, 1.0 - 1e-12);
+    if p <= 0.5 { z_of_p(2.0 * p) } else { -z_of_p(2.0 * (1.0 - p)) }
+}
+
 /// Standard normal quantile of a two-sided p-value.
 pub(crate) fn z_of_p(p: f64) -> f64 {
     std::f64::consts::SQRT_2 * erfc_inv(p.clamp(1e-300, 1.0))

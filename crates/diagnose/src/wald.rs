@@ -6,6 +6,7 @@ use model_term::TermParameter;
 use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::AugmentedModel;
+use crate::null_distribution::NullDistribution;
 use crate::scan::{freedom, principal};
 use crate::settings::levels::{MIN_RUNS, NORMAL_QUANTILE_95};
 use crate::settings::search::MIN_DETECTABLE_SIGMAS;
@@ -55,6 +56,19 @@ fn wald_test_of(
         estimates: estimates.iter().enumerate().map(|(k, size)| (*size, sigma(k))).collect(),
     };
     (test, directions)
+}
+
+/// The p-value of a candidate where coarse encoders inflate its statistic, beside the model without it.
+pub(crate) fn deflated_p_value(
+    without: &AugmentedModel<'_>,
+    extended: &AugmentedModel<'_>,
+    candidate: usize,
+) -> Option<f64> {
+    let (test, directions) = wald_test(extended, candidate)?;
+    let Some(null) = NullDistribution::of(without) else { return Some(test.p_value) };
+    let equations = total(&extended.fit.solution.pass.runs)?;
+    let statistic = test.statistic / null.inflation_of(&extended.candidates[candidate]);
+    Some(p_of_statistic(statistic, directions.len(), freedom(&extended.fit, &equations)))
 }
 
 /// Cluster-robust test of a candidate along its own size. Errors are alike within runs (a wheelbase that

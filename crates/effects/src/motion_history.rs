@@ -18,6 +18,11 @@ impl Hysteresis {
         Self { half_width, within: 0.0, sense: 0.0 }
     }
 
+    /// The band is at least so wide to either side.
+    pub(crate) const fn widen(&mut self, half_width: f64) {
+        self.half_width = self.half_width.max(half_width);
+    }
+
     /// 1 or −1, once the value has gone this far on, or back where that is negative; 0 before it has first
     /// left the band's middle.
     pub(crate) fn after(&mut self, by: f64) -> f64 {
@@ -45,6 +50,11 @@ pub(crate) struct Reversals {
 impl Reversals {
     /// None yet.
     pub(crate) const NONE: Self = Self { went: Hysteresis::beyond(0.5 * REVERSAL_M), since_m: f64::INFINITY };
+
+    /// Counts of this size do not count: a wheel that stands between two of them reverses nothing.
+    pub(crate) const fn debounce(&mut self, count_m: f64) {
+        self.went.widen(count_m);
+    }
 
     /// The distance since the last one, after going this far on, or back where that is negative.
     pub(crate) fn after(&mut self, distance_m: f64) -> f64 {
@@ -79,6 +89,13 @@ impl MotionHistoryTracker {
         wheels: Wheels { left: Reversals::NONE, right: Reversals::NONE },
         turned: Hysteresis::beyond(TURN_RAD),
     };
+
+    /// Counts of these sizes are no reversals.
+    pub(crate) const fn debounce(&mut self, count_m: Wheels<f64>) {
+        self.wheels.left.debounce(count_m.left);
+        self.wheels.right.debounce(count_m.right);
+        self.centre.debounce(0.5 * (count_m.left + count_m.right));
+    }
 
     /// What is remembered once the wheels and the robot have gone on.
     pub(crate) fn after(&mut self, travel_m: Wheels<f64>, distance_m: f64, turn_rad: f64) -> MotionHistory {

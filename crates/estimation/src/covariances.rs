@@ -14,14 +14,14 @@ pub(crate) struct Covariances<const N: usize> {
     tt: [f64; N],
 }
 
-pub(super) type Covariance = Covariances<1>;
+pub(crate) type Covariance = Covariances<1>;
 
 impl<const N: usize> Covariances<N> {
     pub(crate) const ZERO: Self =
         Self { xx: [0.0; N], xy: [0.0; N], yy: [0.0; N], xt: [0.0; N], yt: [0.0; N], tt: [0.0; N] };
 
     #[inline(always)]
-    pub(super) fn of(matrices: [&Matrix3<f64>; N]) -> Self {
+    pub(crate) fn of(matrices: [&Matrix3<f64>; N]) -> Self {
         let at = |row: usize, column: usize| matrices.map(|matrix| matrix[(row, column)]);
         Self { xx: at(0, 0), xy: at(0, 1), yy: at(1, 1), xt: at(0, 2), yt: at(1, 2), tt: at(2, 2) }
     }
@@ -101,7 +101,7 @@ impl<const N: usize> Covariances<N> {
     /// P h: the three coordinates of each.
     #[allow(clippy::needless_range_loop)] // nine arrays side by side
     #[inline(always)]
-    pub(super) fn along(&self, h: &Vector3<f64>) -> [[f64; N]; 3] {
+    pub(crate) fn along(&self, h: &Vector3<f64>) -> [[f64; N]; 3] {
         let mut along = [[0.0; N]; 3];
         for k in 0..N {
             along[0][k] = self.xx[k] * h.x + self.xy[k] * h.y + self.xt[k] * h.z;
@@ -130,7 +130,7 @@ impl<const N: usize> Covariances<N> {
 impl Covariance {
     /// P − k (P h)ᵀ.
     #[inline(always)]
-    pub(super) fn lower(&mut self, gain: &Vector3<f64>, ph: &Vector3<f64>) {
+    pub(crate) fn lower(&mut self, gain: &Vector3<f64>, ph: &Vector3<f64>) {
         self.xx[0] -= gain.x * ph.x;
         self.xy[0] -= gain.x * ph.y;
         self.yy[0] -= gain.y * ph.y;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use kinematics::{Pose, Twist, wrap_to_pi};
+use kinematics::{Pose, wrap_to_pi};
 use model_term::ModelTerm;
 
 use crate::decimation::Decimated;
@@ -164,26 +164,17 @@ impl ModelFit<'_> {
                 propagator.carry_on(carried);
             }
             propagator.restart();
-            // What the terms and the latency add to a measurement, in the frame of the body.
-            let expected_offset =
-                |propagator: &mut Propagator<'_, '_>, t_s: f64, body: Pose, interval: Option<&WheelInterval>| {
-                    let Twist { v_m_s, omega_rad_s } =
-                        interval.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |interval| propagator.twist(interval));
-                    propagator.measurement(body, 0, t_s, Twist { v_m_s, omega_rad_s });
-                    let late = Pose::new(-v_m_s * latency_s, 0.0, -omega_rad_s * latency_s);
-                    add(propagator.sum_of_terms(), late)
-                };
             // Where the drive's centre stands at the first measurement, to first order in what the terms add
             // to it.
             let mounted = start * body_from_sensor.inverse();
-            let off = expected_offset(&mut propagator, first.0, mounted, segment.intervals.get(first.1));
+            let off = propagator.measurement_offset(mounted, first.0, first.1, latency_s);
             let mut pose = mounted * off.inverse();
             let (start_m, mut at) = (propagator.session_m(), first.1);
             for measurement in measurements(segment) {
                 pose = propagator.dead_reckon(pose, at..measurement.after);
                 at = measurement.after;
                 let Some(theta_rad) = measurement.theta_rad else { continue };
-                let off = expected_offset(&mut propagator, measurement.t_s, pose, segment.intervals[..at].last());
+                let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
                 let measured = pose * off * body_from_sensor;
                 let there = Pose::new(measurement.x_m, measurement.y_m, theta_rad);
                 let off_rad = wrap_to_pi(measured.theta_rad - theta_rad);
@@ -199,8 +190,4 @@ impl ModelFit<'_> {
         }
         found
     }
-}
-
-fn add(a: Pose, b: Pose) -> Pose {
-    Pose::new(a.x_m + b.x_m, a.y_m + b.y_m, a.theta_rad + b.theta_rad)
 }

@@ -59,7 +59,13 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                     && last.dt_s + interval.dt_s <= longest_s * (1.0 + STEP_LENGTH_TOLERANCE)
                     && keeps_turning(last.wheel_rad, interval.wheel_rad) =>
             {
-                last.dt_s += interval.dt_s;
+                let (before_s, all_s) = (last.dt_s, last.dt_s + interval.dt_s);
+                last.rate_rad_s = last.rate_rad_s.zip_with(interval.rate_rad_s, |last, next| {
+                    if all_s > 0.0 { (last * before_s + next * interval.dt_s) / all_s } else { last }
+                });
+                last.rate_at_ends_rad_s[1] = interval.rate_at_ends_rad_s[1];
+                last.stands &= interval.stands;
+                last.dt_s = all_s;
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.row_s[1] = interval.row_s[1];
             }

@@ -1,6 +1,6 @@
 //! Derivatives of poses by the columns of the normal equation, laid out for vector instructions.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Derivatives of a pose or a motion by columns, coordinate by coordinate, so that loops over columns
 /// vectorise.
@@ -57,6 +57,23 @@ impl Derivatives {
     pub(super) fn along(&self, direction: Vector3<f64>) -> impl Iterator<Item = f64> {
         let all = self.x.iter().zip(&self.y).zip(&self.theta);
         all.map(move |((x, y), theta)| direction.x * x + direction.y * y + direction.z * theta)
+    }
+
+    #[inline(always)]
+    pub(super) fn copy_from(&mut self, others: &Self) {
+        self.x.copy_from_slice(&others.x);
+        self.y.copy_from_slice(&others.y);
+        self.theta.copy_from_slice(&others.theta);
+    }
+
+    /// Others, and a matrix times what these are more than the others.
+    #[inline(always)]
+    pub(super) fn mix(&mut self, others: &Self, gain: &Matrix3<f64>) {
+        let own = self.x.iter_mut().zip(&mut self.y).zip(&mut self.theta);
+        for (((x, y), theta), ((of_x, of_y), of_theta)) in own.zip(others.x.iter().zip(&others.y).zip(&others.theta)) {
+            let more = gain * Vector3::new(*x - of_x, *y - of_y, *theta - of_theta);
+            (*x, *y, *theta) = (of_x + more.x, of_y + more.y, of_theta + more.z);
+        }
     }
 
     /// Adds a vector times a number of each column.

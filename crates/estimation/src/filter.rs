@@ -17,11 +17,11 @@ use crate::noise::{Noise, NoiseComponent};
 use crate::products::{Products, Sums};
 use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
 use crate::records::{MeasuredPose, Segment, Start};
+use crate::rounding::{FilterState, Rounding};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
-use crate::wheel_angles::WheelInterval;
 
-const NOISES: usize = 4;
+pub(crate) const NOISES: usize = 4;
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,6 +106,7 @@ pub(super) struct Filter<'f, 'a> {
     /// Derivatives of the covariance and of the pose by the logarithm of each variance.
     covariance_by: Covariances<NOISES>,
     pose_by_noise: [[f64; NOISES]; 3],
+    rounding: Rounding,
     /// Derivatives of the measurement by the terms' parameters, in the room.
     by_measurement: Derivatives,
     pub(super) sums: Sums<'f>,
@@ -164,6 +165,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             by: Derivatives::zeros(all),
             covariance_by: Covariances::ZERO,
             pose_by_noise: [[0.0; NOISES]; 3],
+            rounding: Rounding::new(segment.quantum_rad, model, all),
             by_measurement: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
             innovations: Vec::new(),
@@ -208,7 +210,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.propagator.restart();
         let Some(first) = propagations.first() else {
             let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-            self.start(Pose::IDENTITY, (0.0, 0.0), self.segment.intervals.first().copied(), (0, start_s));
+            self.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
             let intervals = 0..self.segment.intervals.len();
             self.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
             return;
@@ -217,7 +219,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             Start::MeasuredPose => self.start_at((0, first.from), first.intervals.start, free_heading_rad),
             Start::Origin => {
                 let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-                self.start(Pose::IDENTITY, (0.0, 0.0), self.segment.intervals.first().copied(), (0, start_s));
+                self.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
             }
         }
         let mut rejected_in_a_row = 0;
@@ -255,8 +257,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let [xy, theta] = self.variance_of(&measured);
         let pose = Pose::new(measured.x_m, measured.y_m, measured.theta_rad.unwrap_or(free_heading_rad));
         let free = measured.theta_rad.is_none();
-        let interval = self.segment.intervals.get(next_piece).or(self.segment.intervals.last()).copied();
-        self.start(pose, (xy, if free { 0.0 } else { theta }), interval, (propagations, measured.t_s));
+        self.start(pose, (xy, if free { 0.0 } else { theta }), next_piece, (propagations, measured.t_s));
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
@@ -270,16 +271,18 @@ impl<'f, 'a> Filter<'f, 'a> {
         &mut self,
         measured: Pose,
         (var_xy, var_theta): (f64, f64),
-        next: Option<WheelInterval>,
+        after: usize,
         (propagations, t_s): (usize, f64),
     ) {
-        let twist = next.map_or(Twist { v_m_s: 0.0, omega_rad_s: 0.0 }, |interval| self.propagator.twist(&interval));
+        let twist = self.propagator.twist(self.segment.rate_at(after, t_s));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let theta_rad = measured.theta_rad - ltheta;
         let (sin, cos) = sin_cos(theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
-        let moved = Vector3::new(cos * twist.v_m_s, sin * twist.v_m_s, twist.omega_rad_s);
+        let [moved, by_latency] = self
+            .twists_before(after, t_s, twist)
+            .map(|Twist { v_m_s, omega_rad_s }| Vector3::new(cos * v_m_s, sin * v_m_s, omega_rad_s));
         self.pose = Pose::new(
             measured.x_m - mounted.x + late * moved.x,
             measured.y_m - mounted.y + late * moved.y,
@@ -289,7 +292,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.by.set(Column::SensorX.index(), Vector3::new(-cos, -sin, 0.0));
         self.by.set(Column::SensorY.index(), Vector3::new(sin, -cos, 0.0));
         self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
-        self.by.set(Column::Latency.index(), moved);
+        self.by.set(Column::Latency.index(), by_latency);
         self.measurement(propagations, t_s, twist);
         // What went before the start is not since the measurement before the next one.
         let _ = self.propagator.sample(self.pose, (self.number, 0));
@@ -309,6 +312,26 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.covariance = Covariance::of([&(position + heading)]);
         self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
         self.pose_by_noise = [[0.0; NOISES]; 3];
+        let [_, _, xy, theta] = self.noise.variance;
+        self.rounding.start([xy, theta]);
+    }
+
+    /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion in
+    /// between is that of the middle.
+    #[inline(always)]
+    fn twists_before(&self, after: usize, t_s: f64, twist: Twist) -> [Twist; 2] {
+        let late_s = self.instrument.latency_s;
+        if late_s == 0.0 {
+            return [twist; 2];
+        }
+        [0.5 * late_s, late_s].map(|ago_s| self.propagator.twist(self.segment.rate_at(after, t_s - ago_s)))
+    }
+
+    /// The state, with what rounding does to it.
+    #[inline(always)]
+    fn rounded(&mut self) -> (&mut Rounding, FilterState<'_>) {
+        let Self { pose, covariance, by, covariance_by, pose_by_noise, rounding, .. } = self;
+        (rounding, FilterState { pose, covariance, by, covariance_by, pose_by_noise })
     }
 
     /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force,
@@ -328,6 +351,11 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     #[inline(always)]
     fn predict(&mut self, number: usize, propagation: &PropagationInterval) {
+        if !self.segment.intervals[propagation.intervals.clone()].iter().all(|interval| interval.stands) {
+            let noise_score = self.pass_options.noise_score;
+            let (rounding, mut state) = self.rounded();
+            rounding.leave(&mut state, noise_score);
+        }
         let Moved { motion, by_geometry } = self.propagator.moved(self.pose, number, propagation);
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
@@ -362,7 +390,10 @@ impl<'f, 'a> Filter<'f, 'a> {
     fn update(&mut self, number: usize, propagation: &PropagationInterval) -> bool {
         let measured = self.segment.measurements[propagation.measurement];
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
-        let twist = self.propagator.twist(&interval);
+        let variance = self.variance_of(&measured);
+        let (rounding, mut state) = self.rounded();
+        rounding.enter(&mut state, variance);
+        let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
         self.measurement(number + 1, measured.t_s, twist);
         let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
@@ -370,11 +401,10 @@ impl<'f, 'a> Filter<'f, 'a> {
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A measurement is late by the distance that the instrument moved in the meantime.
-        let moved = Vector3::new(
-            cos * twist.v_m_s - twist.omega_rad_s * mounted.y,
-            sin * twist.v_m_s + twist.omega_rad_s * mounted.x,
-            twist.omega_rad_s,
-        );
+        let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);
+        let [moved, by_latency] = twists.map(|Twist { v_m_s, omega_rad_s }| {
+            Vector3::new(cos * v_m_s - omega_rad_s * mounted.y, sin * v_m_s + omega_rad_s * mounted.x, omega_rad_s)
+        });
         let mut sum_of_terms = Vector3::zeros();
         for (number, size) in self.model.term_values.iter().enumerate().filter(|(_, size)| **size != 0.0) {
             sum_of_terms += *size * self.by_measurement.get(number);
@@ -390,7 +420,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };
-        let [xy, theta] = self.variance_of(&measured);
+        let [xy, theta] = variance;
         let r = [xy, xy, theta];
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
         let measured = [0, 1, 2].map(|component| {
@@ -413,7 +443,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.covariance = covariance;
         self.samples.extend(sample);
         // The geometry, and a free heading, which is the last column, act through the pose alone.
-        let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -moved];
+        let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -by_latency];
         for (component, update) in measured.iter().enumerate().take(components) {
             let axis = axes[component];
             let Update { row, gain, v, s } = *update;

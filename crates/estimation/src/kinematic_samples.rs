@@ -52,7 +52,6 @@ pub(crate) struct KinematicSampler {
     turned_rad: Wheels<f64>,
     session_s: f64,
     session_m: f64,
-    previous_speed_m_s: Wheels<f64>,
     /// Motion since the last reversal of direction, limited to half of what makes one to either side.
     swing_m: f64,
     forward: Option<bool>,
@@ -70,7 +69,6 @@ impl KinematicSampler {
             turned_rad: Wheels::both(0.0),
             session_s: 0.0,
             session_m: 0.0,
-            previous_speed_m_s: Wheels::both(0.0),
             swing_m: 0.0,
             forward: None,
             since_reversal_m: None,
@@ -89,25 +87,21 @@ impl KinematicSampler {
         for interval in intervals {
             let travel_m = model.m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let increment = Increment::from_travel(travel_m, model.separation_m);
-            let speed_m_s = travel_m.map(|travel_m| if interval.dt_s > 0.0 { travel_m / interval.dt_s } else { 0.0 });
             if interval.dt_s > 0.0 {
-                self.add_interval(interval, increment, speed_m_s);
+                let gained = |of: Wheels<f64>| model.increment(of).distance_m;
+                let [start, end] = interval.rate_at_ends_rad_s.map(gained);
+                self.add_interval(interval, increment, end - start);
                 self.phase_rad = wheel_rad.zip_with(interval.wheel_rad, |start, turned| start + 0.5 * turned);
                 self.session_s = start_s + interval.t_s;
                 self.session_m = session_m;
             }
-            self.previous_speed_m_s = speed_m_s;
             session_m += increment.distance_m.abs();
             wheel_rad = wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
         }
     }
 
-    fn add_interval(&mut self, interval: &WheelInterval, increment: Increment, now: Wheels<f64>) {
-        let before = self.previous_speed_m_s;
-        // The first interval of a session has none before it.
-        if self.session_s > 0.0 || interval.t_s > 0.0 {
-            self.speed_change_m_s += 0.5 * (now.left + now.right - before.left - before.right);
-        }
+    fn add_interval(&mut self, interval: &WheelInterval, increment: Increment, speed_change_m_s: f64) {
+        self.speed_change_m_s += speed_change_m_s;
         self.motion.distance_m += increment.distance_m;
         self.motion.turn_rad += increment.turn_rad;
         self.duration_s += interval.dt_s;
@@ -174,6 +168,9 @@ mod tests {
                 t_s: f64::from(row),
                 dt_s: *dt_s,
                 row_s: [f64::from(row), f64::from(row) + dt_s],
+                rate_rad_s: *wheel_rad,
+                rate_at_ends_rad_s: [[0.0, 0.05], [0.05, -0.1], [-0.1, -0.2]][usize::from(row)].map(Wheels::both),
+                stands: false,
             })
             .collect();
         let geometry = DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive");
@@ -193,7 +190,7 @@ mod tests {
             (second.motion.distance_m, second.turned_rad.right, second.since_reversal_m),
             (-0.2, -0.2, Some(0.2))
         );
-        // The speed before is remembered beyond the sums: from rest to −0.2 m/s.
-        assert_eq!(second.speed_change_m_s, -0.2);
+        // From −0.1 m/s at its start to −0.2 m/s at its end.
+        assert_eq!(second.speed_change_m_s, -0.1);
     }
 }

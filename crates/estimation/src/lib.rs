@@ -37,11 +37,14 @@ mod products;
 mod profile;
 mod propagation;
 mod records;
+mod resimulation;
+mod rounding;
 mod settings;
 #[cfg(test)]
 mod tests;
 mod thinning;
 mod wheel_angles;
+mod wheel_rates;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};

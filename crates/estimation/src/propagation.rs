@@ -115,7 +115,6 @@ pub(crate) struct CarriedState {
     /// The next segment's frame in that of the first.
     pub(crate) run_from_chain: Pose,
     pub(crate) session_m: f64,
-    pub(crate) previous: Option<WheelInterval>,
     pub(crate) sampler: Option<KinematicSampler>,
 }
 
@@ -129,7 +128,6 @@ pub(crate) struct Propagator<'f, 'a> {
     run_from_chain: Pose,
     session_m: f64,
     wheel_rad: Wheels<f64>,
-    previous: Option<WheelInterval>,
     continues: bool,
     /// Motion since the last measurement, where samples are asked for; cached propagation leaves it alone.
     sampler: Option<KinematicSampler>,
@@ -144,6 +142,12 @@ pub(crate) struct Propagator<'f, 'a> {
 impl<'f, 'a> Propagator<'f, 'a> {
     pub(crate) fn new(segment: &'f Segment<'a>, model: &'f Model, terms: &'f mut [Box<dyn ModelTerm>]) -> Self {
         let parameters = terms.iter().map(|term| term.parameters().len()).sum();
+        let mut values = &model.term_values[..];
+        for term in terms.iter_mut() {
+            let (own, others) = values.split_at(term.parameters().len().min(values.len()));
+            term.linearize_at(own);
+            values = others;
+        }
         Self {
             segment,
             model,
@@ -151,7 +155,6 @@ impl<'f, 'a> Propagator<'f, 'a> {
             run_from_chain: Pose::IDENTITY,
             session_m: segment.session_m,
             wheel_rad: segment.wheel_rad,
-            previous: None,
             continues: false,
             sampler: None,
             gradients: vec![Pose::IDENTITY; parameters],
@@ -162,8 +165,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
 
     /// Goes on where the segment before ended.
     pub(crate) fn carry_on(&mut self, carried: CarriedState) {
-        let CarriedState { run_from_chain, session_m, previous, sampler } = carried;
-        (self.run_from_chain, self.session_m, self.previous) = (run_from_chain, session_m, previous);
+        let CarriedState { run_from_chain, session_m, sampler } = carried;
+        (self.run_from_chain, self.session_m) = (run_from_chain, session_m);
         self.sampler = sampler;
         self.continues = true;
     }
@@ -176,7 +179,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
     /// The state at the end of this segment, at a pose of the instrument in the segment's frame.
     pub(crate) fn carried(&self, chain_from_sensor: Pose) -> CarriedState {
         let run_from_chain = self.run_from_chain * chain_from_sensor;
-        CarriedState { run_from_chain, session_m: self.session_m, previous: self.previous, sampler: self.sampler }
+        CarriedState { run_from_chain, session_m: self.session_m, sampler: self.sampler }
     }
 
     /// Resets the state of the terms, unless the segment goes on from the one before.
@@ -214,11 +217,11 @@ impl<'f, 'a> Propagator<'f, 'a> {
         }
     }
 
-    /// Velocity of the drive's centre in an interval.
+    /// Velocity of the drive's centre at rates of the wheels.
     #[inline(always)]
-    pub(crate) fn twist(&self, interval: &WheelInterval) -> Twist {
-        let Increment { distance_m, turn_rad } = self.model.increment(interval.wheel_rad);
-        Twist { v_m_s: distance_m / interval.dt_s, omega_rad_s: turn_rad / interval.dt_s }
+    pub(crate) fn twist(&self, rate_rad_s: Wheels<f64>) -> Twist {
+        let Increment { distance_m, turn_rad } = self.model.increment(rate_rad_s);
+        Twist { v_m_s: distance_m, omega_rad_s: turn_rad }
     }
 
     /// What the terms add to the measurement after a number of propagations, at a pose of the drive's centre,
@@ -345,7 +348,6 @@ impl<'f, 'a> Propagator<'f, 'a> {
             }
             self.session_m += distance_m.abs();
             self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
-            self.previous = Some(*interval);
         }
         let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);
         self.propagation_by_terms.turn(end);
@@ -365,9 +367,17 @@ impl<'f, 'a> Propagator<'f, 'a> {
             pose = pose * arc * Pose::new(0.0, y_m, 0.0);
             self.session_m += distance_m.abs();
             self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
-            self.previous = Some(*interval);
         }
         pose
+    }
+
+    /// What terms and latency add to a measurement after so many intervals, in the frame of the body.
+    pub(crate) fn measurement_offset(&mut self, pose: Pose, t_s: f64, after: usize, latency_s: f64) -> Pose {
+        let twist = self.twist(self.segment.rate_at(after, t_s));
+        self.measurement(pose, 0, t_s, twist);
+        let Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
+        let late = self.twist(self.segment.rate_at(after, t_s - 0.5 * latency_s));
+        Pose::new(x_m - late.v_m_s * latency_s, y_m, theta_rad - late.omega_rad_s * latency_s)
     }
 
     /// The sum of the terms' latest gradients, times their values.
@@ -384,14 +394,16 @@ impl<'f, 'a> Propagator<'f, 'a> {
     #[inline(always)]
     fn term_gradients(&mut self, interval: &WheelInterval, travel_m: Wheels<f64>, world_from_body: Pose) {
         let m_per_rad = self.model.m_per_rad;
-        let previous = self.previous.unwrap_or(WheelInterval { wheel_rad: Wheels::both(0.0), ..*interval });
         let interval = Interval {
             t_s: interval.t_s,
             dt_s: interval.dt_s,
             row_s: interval.row_s,
             travel_m,
-            previous_m: m_per_rad.zip_with(previous.wheel_rad, |m_per_rad, rad| m_per_rad * rad),
-            previous_dt_s: previous.dt_s,
+            speed_m_s: m_per_rad.zip_with(interval.rate_rad_s, |m_per_rad, rate| m_per_rad * rate),
+            speed_at_ends_m_s: interval
+                .rate_at_ends_rad_s
+                .map(|rate_rad_s| m_per_rad.zip_with(rate_rad_s, |m_per_rad, rate| m_per_rad * rate)),
+            count_m: m_per_rad.zip_with(self.segment.quantum_rad, |m_per_rad, rad| m_per_rad * rad),
             wheel_separation_m: self.model.separation_m,
             wheel_rad: self.wheel_rad,
             turned_rad: interval.wheel_rad,

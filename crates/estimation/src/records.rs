@@ -51,6 +51,8 @@ pub struct Segment<'a> {
     pub(crate) measurements: Vec<MeasuredPose>,
     /// Angle of each wheel at the first interval, by its counter, radians.
     pub(crate) wheel_rad: Wheels<f64>,
+    /// What a count of each wheel stands for, radians; 0 where angles are not rounded.
+    pub(crate) quantum_rad: Wheels<f64>,
     /// Distance driven in the session before, metres, by nominal values.
     pub(crate) session_m: f64,
 }
@@ -111,6 +113,28 @@ impl Segment<'_> {
             change.left.max(change.right) > SPEED_CHANGE_RATIO * fastest
         };
         self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
+    }
+
+    /// Rates of the wheels at an instant near the end of some intervals, rad/s; beyond the first and the last,
+    /// those there.
+    pub(crate) fn rate_at(&self, after: usize, t_s: f64) -> Wheels<f64> {
+        let mut at = after.min(self.intervals.len());
+        while at > 0 && self.intervals[at - 1].t_s > t_s {
+            at -= 1;
+        }
+        while at < self.intervals.len() && self.intervals[at].t_s + TIME_TOLERANCE_S < t_s {
+            at += 1;
+        }
+        let interval = match at {
+            0 => match self.intervals.first() {
+                Some(first) => return first.rate_at_ends_rad_s[0],
+                None => return Wheels::both(0.0),
+            },
+            _ => &self.intervals[at - 1],
+        };
+        let [start, end] = interval.rate_at_ends_rad_s;
+        let share = if interval.dt_s > 0.0 { ((t_s - interval.t_s) / interval.dt_s).clamp(0.0, 1.0) } else { 1.0 };
+        start.zip_with(end, |start, end| start + share * (end - start))
     }
 
     /// The first measured pose with its time and the number of intervals before it, and the time and pose of
@@ -184,6 +208,7 @@ impl<'a> Records<'a> {
                         intervals: Vec::new(),
                         measurements: Vec::new(),
                         wheel_rad: track.first_rad(),
+                        quantum_rad: track.quantum_rad(),
                         session_m,
                     };
                     add_poses(&mut records.segments, &base, &track, measured_poses(run, reference));

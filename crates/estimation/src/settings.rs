@@ -95,6 +95,54 @@ pub(crate) const MIN_CHORD_RATIO: f64 = 0.3;
 /// Derived: a centimetre of error over half a metre is a degree.
 pub(crate) const START_HEADING_BASELINE_M: f64 = 0.5;
 
+// Rates of the wheels.
+
+/// Widths of the windows of rows by which rates are found, in turn: rows before, and as many after.
+/// Budgeted: steps of a factor of about 1.4; with 48 rows of 100 Hz a second is blurred.
+pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 40, 48];
+
+/// Variance of a rate's noise, over that of the rate itself, at which a window is wide enough.
+/// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
+pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
+
+/// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is taken
+/// from its own counts.
+/// Budgeted: 3 % of the speed; the square of it biases terms by a thousandth.
+pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
+
+/// Length of a row, over the median, from which on it is a gap: no rate is taken across it.
+/// Budgeted: one lost row is bridged.
+pub(crate) const GAP_RATIO: f64 = 2.5;
+
+/// Steps of an angle below this, radians, are rounding of the file's numbers and no counts.
+/// Budgeted: files with six decimals round by half of 1e-6, and a step twice.
+pub(crate) const QUANTUM_TOLERANCE: f64 = 3e-6;
+
+/// Counts of angles below this, radians, are as good as exact.
+/// Budgeted: 200 000 counts a turn; on a wheel of 80 mm, 2.5 µm.
+pub(crate) const MIN_QUANTUM_RAD: f64 = 3e-5;
+
+/// Steps that must be there before angles are taken for counts.
+/// Budgeted: chance does not put 98 of 100 on a grid.
+pub(crate) const MIN_GRID_STEPS: usize = 100;
+
+/// Share of steps that are multiples of the smallest one, from which on angles are counts.
+/// Budgeted: chance has a tenth of them within a twentieth.
+pub(crate) const MIN_GRID_FRACTION: f64 = 0.98;
+
+/// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of tests are
+/// found by simulation.
+/// Budgeted: below it, a statistic's variance is off by a twentieth of its excess at the most.
+pub(crate) const MIN_RESIMULATED_VARIANCE_RATIO: f64 = 0.05;
+
+/// Acceleration, m/s², by which a robot that stands between two counts may set off or stop.
+/// Budgeted: gentle for a robot; a count of 4 mm then takes 0.2 s, one of 0.01 mm 10 ms.
+pub(crate) const GENTLE_ACCELERATION_M_S2: f64 = 0.2;
+
+/// Variance that rounding adds to a pose, over that of a measurement, below which it is left out.
+/// Budgeted: it changes a standard deviation by 0.05 %.
+pub(crate) const MIN_ROUNDING_VARIANCE_RATIO: f64 = 1e-3;
+
 /// Farthest extrapolation beyond a log's first or last row, as a share of the interval there.
 /// Derived: beyond half an interval another row would have been written.
 pub(crate) const MAX_EXTRAPOLATION: f64 = 0.5;

@@ -1,16 +1,18 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
-//! An outside instrument has a clock of its own. Between two rows of the log the wheels are taken to turn at
-//! constant speeds, so that every method that compares the wheels with such measurements integrates the same
-//! motion. A log whose rows jitter begins a little after its run does: half of an interval before the first
-//! row and after the last, the speeds of the interval there go on.
+//! An outside instrument has a clock of its own. Between two rows of the log the wheels' angles follow a cubic
+//! of the angles and rates at both (Hermite), as wheels speed up within a row; every method that compares the
+//! wheels with such measurements integrates the same motion. A log whose rows jitter begins a little after its
+//! run does: half of an interval before the first row and after the last, the speeds of the interval there go
+//! on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, TIME_TOLERANCE_S};
+use crate::wheel_rates::{WheelRates, quantum_of_angles};
 
-/// A stretch of constant wheel speeds.
+/// A stretch of the log within one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WheelInterval {
     pub(crate) t_s: f64,
@@ -19,6 +21,12 @@ pub(crate) struct WheelInterval {
     pub(crate) wheel_rad: Wheels<f64>,
     /// Start and end of the logged interval of which it is a part, or the whole.
     pub(crate) row_s: [f64; 2],
+    /// Mean rate of each wheel, rad/s, for covariates ([`WheelRates`]).
+    pub(crate) rate_rad_s: Wheels<f64>,
+    /// Rates at the start and at the end.
+    pub(crate) rate_at_ends_rad_s: [Wheels<f64>; 2],
+    /// No count comes in it, nor near it.
+    pub(crate) stands: bool,
 }
 
 /// Turns of both wheels since a run's first row.
@@ -29,6 +37,7 @@ pub struct WheelAngleInterpolator<'a> {
     /// The counters' angles at the first row: where each wheel's mark stands.
     first_rad: Wheels<f64>,
     continuous: bool,
+    rates: WheelRates,
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
@@ -46,15 +55,18 @@ impl<'a> WheelAngleInterpolator<'a> {
             return None;
         }
         let mut first_rad = Wheels::both(0.0);
+        let mut quantum_rad = Wheels::both(0.0);
         let turn_rad = match &odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
                 let mark = |column: &[i64]| (column[0] as f64 * rad).rem_euclid(std::f64::consts::TAU);
                 first_rad = ticks.as_ref().map(|column| mark(column));
+                quantum_rad = Wheels::both(rad.abs());
                 ticks.as_ref().map(|column| since_first(column, rad))
             }
             WheelLog::Angles(angles) => {
                 first_rad = angles.as_ref().map(|column| column[0]);
+                quantum_rad = angles.as_ref().map(|column| quantum_of_angles(column));
                 angles.as_ref().map(|column| since_first(column, 1.0))
             }
             WheelLog::Twist { v_mps, omega_radps } => {
@@ -72,7 +84,10 @@ impl<'a> WheelAngleInterpolator<'a> {
                 turns
             }
         };
-        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous: run.info().continuous })
+        let continuous = run.info().continuous;
+        let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
+        let rates = WheelRates::of(&odometry.t_s, &turn_rad, quantum_rad, drive, continuous);
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates })
     }
 
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
@@ -116,6 +131,11 @@ impl<'a> WheelAngleInterpolator<'a> {
         self.first_rad
     }
 
+    /// Radians that a count of each wheel stands for; 0 where angles are not rounded.
+    pub(crate) const fn quantum_rad(&self) -> Wheels<f64> {
+        self.rates.quantum_rad
+    }
+
     /// A reader that goes through the log once.
     pub(crate) fn cursor(&self) -> Cursor<'_, 'a> {
         Cursor { track: self, row: 0 }
@@ -150,9 +170,44 @@ impl<'a> WheelAngleInterpolator<'a> {
         if since_s.abs() <= TIME_TOLERANCE_S {
             return Some(self.row_rad(row));
         }
-        let next_s = *self.t_s.get(row + 1)?;
-        let share = since_s / (next_s - self.t_s[row]);
-        Some(self.row_rad(row).zip_with(self.row_rad(row + 1), |a, b| a + share * (b - a)))
+        let length_s = self.t_s.get(row + 1)? - self.t_s[row];
+        let share = since_s / length_s;
+        let (start, end) = (self.row_rad(row), self.row_rad(row + 1));
+        let even = start.zip_with(end, |start, end| start + share * (end - start));
+        if !(0.0..=1.0).contains(&share) || !self.rates.are_joined(row) {
+            return Some(even);
+        }
+        // What the rates at both ends are beyond the mean rate, as angles over the row. A wheel that turns one
+        // way does not turn back in between (Fritsch & Carlson 1980).
+        let turned = end.zip_with(start, |end, start| end - start);
+        let beyond = |rate: Wheels<f64>| {
+            rate.zip_with(turned, |rate, turned| {
+                (rate * length_s).clamp(f64::min(3.0 * turned, 0.0), f64::max(3.0 * turned, 0.0)) - turned
+            })
+        };
+        let bent = beyond(self.rates.at_row(row)).zip_with(beyond(self.rates.at_row(row + 1)), |start, end| {
+            share * (1.0 - share) * ((1.0 - share) * start - share * end)
+        });
+        Some(even.zip_with(bent, |even, bent| even + bent))
+    }
+
+    /// Rates of the wheels at an instant of a row's interval, rad/s.
+    fn rate_at(&self, row: usize, t_s: f64) -> Wheels<f64> {
+        let Some(next_s) = self.t_s.get(row + 1) else { return self.rates.at_row(row) };
+        let length_s = next_s - self.t_s[row];
+        if !self.rates.are_joined(row) {
+            return self.row_rate(row);
+        }
+        let share = ((t_s - self.t_s[row]) / length_s).clamp(0.0, 1.0);
+        self.rates.at_row(row).zip_with(self.rates.at_row(row + 1), |start, end| start + share * (end - start))
+    }
+
+    /// Mean rates over a row's interval by its own counts, rad/s.
+    fn row_rate(&self, row: usize) -> Wheels<f64> {
+        let Some(next_s) = self.t_s.get(row + 1) else { return self.rates.at_row(row) };
+        let length_s = next_s - self.t_s[row];
+        let turned = self.row_rad(row + 1).zip_with(self.row_rad(row), |end, start| end - start);
+        turned.map(|turned_rad| if length_s > 0.0 { turned_rad / length_s } else { 0.0 })
     }
 }
 
@@ -197,7 +252,23 @@ impl Cursor<'_, '_> {
         let mut push = |t_s: f64, next: Wheels<f64>, row: usize| {
             let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
             let row_s = [rows_s[row], rows_s.get(row + 1).copied().unwrap_or(t_s)];
-            intervals.push(WheelInterval { t_s: at_s, dt_s: t_s - at_s, wheel_rad, row_s });
+            let dt_s = t_s - at_s;
+            let ends = [at_s, t_s].map(|t_s| self.track.rate_at(row, t_s));
+            let rate_rad_s = if self.track.rates.row_by_row && dt_s > 0.0 {
+                wheel_rad.map(|rad| rad / dt_s)
+            } else {
+                ends[0].zip_with(ends[1], |start, end| 0.5 * (start + end))
+            };
+            let stands = self.track.rates.stands(rows_s, [at_s, t_s], row);
+            intervals.push(WheelInterval {
+                t_s: at_s,
+                dt_s,
+                wheel_rad,
+                row_s,
+                rate_rad_s,
+                rate_at_ends_rad_s: ends,
+                stands,
+            });
             (at_s, angle) = (t_s, next);
         };
         while row + 1 < rows_s.len() && rows_s[row + 1] < to_s - TIME_TOLERANCE_S {
@@ -250,8 +321,13 @@ mod tests {
     #[test]
     fn steps_follow_the_rows_and_share_the_outer_intervals() {
         assert_eq!(steps(ticks(), true, 0.0, 2.0), Some(vec![(10.0, 0.0), (10.0, -10.0)]));
-        assert_eq!(steps(ticks(), true, 0.5, 3.0), Some(vec![(5.0, 0.0), (10.0, -10.0), (20.0, 0.0)]));
-        assert_eq!(steps(ticks(), true, 2.5, 3.5), Some(vec![(20.0, 0.0)]));
+        // Over the last row the left wheel speeds up from 50/3 to 20 a second: it turns 40 in 2 s, and in the
+        // first one 20 − (20 − 50/3)/4. Rejects an even row, 20. The right one turns in neither outer row.
+        let [first, middle, last] = steps(ticks(), true, 0.5, 3.0).expect("spanned")[..] else { panic!("three rows") };
+        assert_eq!((first, middle, last.1), ((5.0, 0.0), (10.0, -10.0), 0.0));
+        assert!((last.0 - (20.0 - 10.0 / 12.0)).abs() < 1e-12, "{last:?}");
+        let [(left, right)] = steps(ticks(), true, 2.5, 3.5).expect("spanned")[..] else { panic!("one row") };
+        assert!((left - 20.0).abs() < 1.0 && right == 0.0, "{left} {right}");
         // A rounding beside a row is that row.
         assert_eq!(steps(ticks(), true, 1.0 + 1e-10, 2.0 - 1e-10), Some(vec![(10.0, -10.0)]));
         assert_eq!(steps(ticks(), true, 4.0, 4.0), Some(vec![(0.0, 0.0)]));

@@ -21,10 +21,14 @@ pub struct Interval<'r> {
     pub row_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
-    /// Travel of each wheel in the interval before, by the same, metres; zero at the start of a run.
-    pub previous_m: Wheels<f64>,
-    /// Length of the interval before, seconds; that of this one at the start of a run.
-    pub previous_dt_s: f64,
+    /// Mean speed of each wheel's contact, m/s: what covariates are made of. Where counts are coarse it is that
+    /// of several rows around, so that the rounding of this row's counts, which the residuals have too, is not
+    /// in it.
+    pub speed_m_s: Wheels<f64>,
+    /// Speed of each wheel's contact at the start and at the end, m/s, from as many rows before as after.
+    pub speed_at_ends_m_s: [Wheels<f64>; 2],
+    /// What a count of each wheel is, metres; 0 where counts are as good as exact.
+    pub count_m: Wheels<f64>,
     /// Distance between the wheels in force, metres.
     pub wheel_separation_m: f64,
     /// Angle of each wheel at the start, by its counter, radians: its phase where the log is continuous.
@@ -55,18 +59,13 @@ impl Interval<'_> {
         Pose::new(distance_m, 0.0, turn_rad)
     }
 
-    /// Mean speed of each wheel's contact, m/s; zero in an interval of no length.
+    /// Change of each wheel's speed over the interval, m/s. Changes of successive intervals add up to that of
+    /// the speeds.
     #[inline]
     #[must_use]
-    pub fn speed_m_s(&self) -> Wheels<f64> {
-        self.travel_m.map(|travel_m| if self.dt_s > 0.0 { travel_m / self.dt_s } else { 0.0 })
-    }
-
-    /// Mean speed of each wheel's contact in the interval before, m/s.
-    #[inline]
-    #[must_use]
-    pub fn previous_speed_m_s(&self) -> Wheels<f64> {
-        self.previous_m.map(|travel_m| if self.previous_dt_s > 0.0 { travel_m / self.previous_dt_s } else { 0.0 })
+    pub fn speed_change_m_s(&self) -> Wheels<f64> {
+        let [start, end] = self.speed_at_ends_m_s;
+        end.zip_with(start, |end, start| end - start)
     }
 
     /// Time on the session's clock, seconds; that of the run where the run does not say when it began.
@@ -84,7 +83,7 @@ pub struct Measurement<'r> {
     pub t_s: f64,
     /// Where the robot was then, by the counts and what the instrument saw.
     pub world_from_body: Pose,
-    /// How it moved then, by the counts.
+    /// How it moved then, by the counts of as many rows before as after.
     pub twist: Twist,
     /// The run.
     pub run: &'r RunInfo,
@@ -112,6 +111,12 @@ pub struct TermParameter {
 pub trait ModelTerm: CopyTerm + Send + Sync {
     /// The parameters in the order of the gradients.
     fn parameters(&self) -> &[TermParameter];
+
+    /// The values at which the term is asked next: one that is not linear over so large a value gives what it
+    /// does there, over that value.
+    fn linearize_at(&mut self, values: &[f64]) {
+        let _ = values;
+    }
 
     /// A run begins; nothing stays known of the run before.
     fn restart(&mut self, run: &RunInfo) {

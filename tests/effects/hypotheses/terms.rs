@@ -64,8 +64,8 @@ const CASES: [(Channel, &[&str], f64, f64); 38] = [
     // The row in which a wheel turns round knows its way on balance.
     (Channel::Wheels, &["wheel v", "exp(-wheel distance since reversal / 2 mm)"], 0.3, 0.15),
     (Channel::LeftWheel, &["wheel v", "exp(-|wheel v| / 0.05 m/s)"], 0.3, 0.06),
-    // The speeds at which a ramp is slow are two rows of it.
-    (Channel::RightWheel, &["wheel acceleration", "exp(-|wheel v| / 0.05 m/s)"], 0.05, 0.2),
+    // The speeds at which a ramp is slow are two rows of it, and its corner is spread over two.
+    (Channel::RightWheel, &["wheel acceleration", "exp(-|wheel v| / 0.05 m/s)"], 0.05, 0.3),
     // The speed of a row by its own stamps goes with their errors, and the first rows have no beat yet.
     (Channel::Wheels, &["wheel v", "row length"], 0.01, 0.3),
     // A row knows the time at its start.

@@ -138,18 +138,33 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         // The first measurement is at the robot at rest.
         let body_from_seen = sighted(term, run.truth[0].t_s, seen(0), Twist::default());
         let mut pose = seen(0) * body_from_seen.inverse();
-        let (mut measurement, mut previous) = (1, None);
-        for row in rows(run, ticks_per_rev) {
-            let travel_m = row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
-            let (previous_m, previous_dt_s) = previous.unwrap_or((Wheels::both(0.0), row.dt_s));
-            previous = Some((travel_m, row.dt_s));
+        let mut measurement = 1;
+        let rows = rows(run, ticks_per_rev);
+        let travel_of = |row: &Row| row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
+        // Between two rows the speed is that of the rows around: of one to either side, or of four where stamps are
+        // irregular; at the ends of the log, of as many as there are.
+        let mean_s = rows.iter().map(|row| row.dt_s).sum::<f64>() / rows.len() as f64;
+        let odd = rows.iter().filter(|row| (row.dt_s / mean_s - 1.0).abs() > 0.05).count();
+        let is_even = 10 * odd < rows.len();
+        let speed_between_m_s = |next: usize| {
+            let half = if is_even { 1 } else { 4 }.min(next).min(rows.len() - next).max(1);
+            let both = &rows[next.saturating_sub(half)..(next + half).min(rows.len())];
+            let time_s: f64 = both.iter().map(|row| row.dt_s).sum();
+            let travel_m = both.iter().map(travel_of).fold(Wheels::both(0.0), |a, b| a.zip_with(b, |a, b| a + b));
+            travel_m.map(|travel_m| travel_m / time_s)
+        };
+        for (number, row) in rows.iter().enumerate() {
+            let travel_m = travel_of(row);
+            let speeds_m_s = [number, number + 1].map(speed_between_m_s);
+            let mean_m_s = speeds_m_s[0].zip_with(speeds_m_s[1], |start, end| 0.5 * (start + end));
             let interval = Interval {
                 t_s: row.t_s,
                 dt_s: row.dt_s,
                 row_s: [row.t_s, row.t_s + row.dt_s],
                 travel_m,
-                previous_m,
-                previous_dt_s,
+                speed_m_s: if is_even { travel_m.map(|travel_m| travel_m / row.dt_s) } else { mean_m_s },
+                count_m: Wheels::both(0.0),
+                speed_at_ends_m_s: speeds_m_s,
                 wheel_separation_m: geometry.wheel_separation_m(),
                 wheel_rad: row.wheel_rad,
                 turned_rad: row.turned_rad,

@@ -141,6 +141,7 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let increment = interval.increment();
+        self.flips.reversals.debounce(0.5 * (interval.count_m.left + interval.count_m.right));
         gradient[0].theta_rad = self.flips.after(increment.distance_m, increment.turn_rad, self.decay_m);
     }
 }

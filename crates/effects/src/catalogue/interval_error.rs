@@ -9,8 +9,6 @@
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
 //! milliseconds.
 
-use std::collections::VecDeque;
-
 use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
@@ -112,44 +110,9 @@ struct Term {
     sampling_period: SamplingPeriodEstimator,
     /// What its lateness makes of the wheels' travel at the last row, for a share of one.
     off_m: Wheels<f64>,
-    /// The logged interval whose parts come in.
-    row: Option<Row>,
-    /// Length and travel of the rows before.
-    recent: VecDeque<(f64, Wheels<f64>)>,
-}
-
-/// A logged interval.
-#[derive(Clone, Copy)]
-struct Row {
-    end_s: f64,
-    length_s: f64,
-    /// What its end being late makes of the wheels' travel beyond what its start does.
-    gained_m: Wheels<f64>,
-    /// What came in so far.
-    travel_m: Wheels<f64>,
-}
-
-/// Rows whose speed is taken for that of the wheels, the last of them left out.
-const RECENT_ROWS: usize = 5;
-/// A wheel that went faster by this than it goes now has changed its speed.
-const SPEED_CHANGE_RATIO: f64 = 1.5;
-
-impl Term {
-    /// The speed of the wheels by rows that have nothing to do with when this one and the one before were
-    /// stamped: the speed of an interval by its own stamps goes with their errors, and would lengthen or
-    /// shorten all distances.
-    fn speed_m_s(&self, now_m_s: Wheels<f64>) -> Wheels<f64> {
-        let known = self.recent.iter().take(self.recent.len().saturating_sub(1));
-        let (length_s, travel_m) = known.fold((0.0, Wheels::both(0.0)), |(length_s, sum), (of_row_s, travel_m)| {
-            (length_s + of_row_s, sum.zip_with(*travel_m, |sum, travel_m| sum + travel_m))
-        });
-        if length_s <= 0.0 {
-            return Wheels::both(0.0);
-        }
-        // At a start or a stop the rows before say little.
-        travel_m
-            .zip_with(now_m_s, |travel_m, now| (travel_m / length_s).clamp(-SPEED_CHANGE_RATIO * now.abs(), SPEED_CHANGE_RATIO * now.abs()))
-    }
+    /// The logged interval whose parts come in: its end, its length, and what its end being late makes of the
+    /// wheels' travel beyond what its start does.
+    row: Option<(f64, f64, Wheels<f64>)>,
 }
 
 impl ModelTerm for Term {
@@ -164,25 +127,18 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let [from_s, row_s] = interval.row_s;
-        if self.row.is_none_or(|row| row.end_s != row_s) {
-            if let Some(Row { length_s, travel_m, .. }) = self.row.take() {
-                self.recent.push_back((length_s, travel_m));
-                if self.recent.len() > RECENT_ROWS {
-                    self.recent.pop_front();
-                }
-            }
+        if self.row.is_none_or(|(end_s, ..)| end_s != row_s) {
             self.sampling_period.next_row(from_s, row_s);
             // What a late stamp makes of a travel is gone with the next one: only the speed then and the row
             // count.
-            let off_m = self.speed_m_s(interval.speed_m_s()).map(|speed_m_s| speed_m_s * self.sampling_period.late_s);
+            let off_m = interval.speed_m_s.map(|speed_m_s| speed_m_s * self.sampling_period.late_s);
             let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
-            self.row = Some(Row { end_s: row_s, length_s: row_s - from_s, gained_m, travel_m: Wheels::both(0.0) });
+            self.row = Some((row_s, row_s - from_s, gained_m));
         }
-        let Some(row) = &mut self.row else { return };
-        row.travel_m = row.travel_m.zip_with(interval.travel_m, |sum, travel_m| sum + travel_m);
-        if row.length_s > 0.0 {
-            let share = interval.dt_s / row.length_s;
-            gradient[0] = interval.change(row.gained_m.map(|gained_m| gained_m * share));
+        if let Some((_, length_s, gained_m)) = self.row
+            && length_s > 0.0
+        {
+            gradient[0] = interval.change(gained_m.map(|gained_m| gained_m * interval.dt_s / length_s));
         }
     }
 }

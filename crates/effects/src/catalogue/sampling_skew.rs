@@ -73,10 +73,9 @@ impl ModelTerm for Term {
         &[TermParameter { name: "right_delay_s", unit: "s", prior_sigma: 2e-3 }]
     }
 
-    /// Of the right wheel's counts, its delay times the speed gained since the interval before came too
-    /// early.
+    /// Of the right wheel's counts, its delay times the speed gained came too early.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let gained_m_s = interval.speed_m_s().right - interval.previous_speed_m_s().right;
+        let gained_m_s = interval.speed_change_m_s().right;
         gradient[0] = interval.change(Wheels { left: 0.0, right: -gained_m_s });
     }
 }

@@ -91,11 +91,9 @@ impl ModelTerm for Term {
         &[TermParameter { name: "kappa_s", unit: "s", prior_sigma: 0.01 }]
     }
 
-    /// The change of the mean speeds from the interval before: summed over a start and a stop it is nothing,
-    /// exactly.
+    /// The change of the speeds: summed over a start and a stop it is nothing, exactly.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let gained_m_s = interval.speed_m_s().zip_with(interval.previous_speed_m_s(), |now, before| now - before);
-        gradient[0] = interval.change(gained_m_s.map(|gained_m_s| -gained_m_s));
+        gradient[0] = interval.change(interval.speed_change_m_s().map(|gained_m_s| -gained_m_s));
     }
 }
 

@@ -95,7 +95,7 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let lost_m = |travel_m: f64, speed_m_s: f64| travel_m * speed_m_s.abs();
-        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s(), lost_m).map(|lost_m| -lost_m));
+        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s, lost_m).map(|lost_m| -lost_m));
     }
 }
 

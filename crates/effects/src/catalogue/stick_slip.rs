@@ -167,7 +167,7 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let speed_m_s = interval.speed_m_s();
+        let speed_m_s = interval.speed_m_s;
         let before = self.wound;
         self.wound = Wheels::from_sides(|side| self.next(before[side], interval.travel_m[side], speed_m_s[side]));
         gradient[0] = interval.change(before.zip_with(self.wound, |before, after| before - after));

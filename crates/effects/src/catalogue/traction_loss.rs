@@ -215,43 +215,14 @@ const MAX_STEPS: f64 = 40.0;
 struct Term {
     grip_m_s2: f64,
     ground_m_s: Wheels<f64>,
-    row: Option<Row>,
     /// Distance that each wheel has lost while the floor had not given way yet: a floor that holds all that
     /// is asked of it is none of this effect. `None` once it has.
     held_m: Option<Wheels<f64>>,
 }
 
-/// The logged interval in force.
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    from_s: f64,
-    end_s: f64,
-    /// Mean speeds of the treads in it, m/s.
-    speed_m_s: Wheels<f64>,
-    acceleration_m_s2: Wheels<f64>,
-}
-
-impl Row {
-    /// A row and how its speeds change, by those of the row before; a run begins at rest.
-    fn after(last: Option<Self>, [from_s, end_s]: [f64; 2], speed_m_s: Wheels<f64>) -> Self {
-        let length_s = end_s - from_s;
-        let (last_s, last_m_s) =
-            last.map_or((length_s, Wheels::both(0.0)), |row| (row.end_s - row.from_s, row.speed_m_s));
-        let apart_s = 0.5 * (length_s + last_s);
-        let acceleration_m_s2 =
-            speed_m_s.zip_with(last_m_s, |now, before| if apart_s > 0.0 { (now - before) / apart_s } else { 0.0 });
-        Self { from_s, end_s, speed_m_s, acceleration_m_s2 }
-    }
-
-    /// A tread's mean speed at an instant of it.
-    fn speed_at_m_s(&self, side: Side, t_s: f64) -> f64 {
-        self.speed_m_s[side] + self.acceleration_m_s2[side] * (t_s - 0.5 * (self.from_s + self.end_s))
-    }
-}
-
 impl Term {
     fn new(grip_m_s2: f64) -> Self {
-        Self { grip_m_s2, ground_m_s: Wheels::both(0.0), row: None, held_m: Some(Wheels::both(0.0)) }
+        Self { grip_m_s2, ground_m_s: Wheels::both(0.0), held_m: Some(Wheels::both(0.0)) }
     }
 
     /// How fast the ground gains on a tread that is so much faster, m/s².
@@ -301,19 +272,15 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let row = match self.row {
-            Some(row) if row.end_s == interval.row_s[1] => row,
-            last => Row::after(last, interval.row_s, interval.speed_m_s()),
-        };
-        self.row = Some(row);
+        let [start_m_s, end_m_s] = interval.speed_at_ends_m_s;
+        let gained_m_s = interval.speed_change_m_s();
         let mut lost_m = Wheels::from_sides(|side| {
-            let speed_m_s = row.speed_at_m_s(side, interval.t_s);
-            self.slide(side, interval.dt_s, speed_m_s, row.acceleration_m_s2[side])
+            let acceleration_m_s2 = if interval.dt_s > 0.0 { gained_m_s[side] / interval.dt_s } else { 0.0 };
+            self.slide(side, interval.dt_s, start_m_s[side], acceleration_m_s2)
         });
         if let Some(held_m) = self.held_m {
             lost_m = lost_m.zip_with(held_m, |lost_m, held_m| lost_m + held_m);
-            let end_s = interval.t_s + interval.dt_s;
-            let yields = |side| (row.speed_at_m_s(side, end_s) - self.ground_m_s[side]).abs() > TREAD_JITTER_M_S;
+            let yields = |side| (end_m_s[side] - self.ground_m_s[side]).abs() > TREAD_JITTER_M_S;
             if !Side::BOTH.into_iter().any(yields) {
                 self.held_m = Some(lost_m);
                 return;
@@ -385,16 +352,19 @@ mod tests {
         let (mut truth, mut predicted, mut delay) = (Vec::new(), vec![Vec::new(); variants.len()], Vec::new());
         let (dt_s, steps, length_s) = (1e-3, 25_u32, 0.025);
         let mut previous_m = 0.0;
+        let mean_m_s = |t_s: f64| {
+            (acceleration_m_s2 * t_s).min(cruise_m_s - acceleration_m_s2 * (t_s - stops_s).max(0.0)).max(0.0)
+        };
         for row in 0..90 {
             let (mut travel_m, mut lost_m) = (0.0, 0.0);
             for k in 0..steps {
                 let t_s = dt_s * f64::from(row * steps + k);
-                let mean_m_s = (acceleration_m_s2 * t_s).min(cruise_m_s - acceleration_m_s2 * (t_s - stops_s).max(0.0));
+                let mean_m_s = mean_m_s(t_s);
                 let moves = mean_m_s > 0.0;
                 let (above_m_s, trembles_m_s2) = if moves { trembles(t_s) } else { (0.0, 0.0) };
                 let changes_m_s2 = if t_s < cruise_m_s / acceleration_m_s2 { acceleration_m_s2 } else { 0.0 }
                     - if moves && t_s > stops_s { acceleration_m_s2 } else { 0.0 };
-                let speed_m_s = mean_m_s.max(0.0) + above_m_s;
+                let speed_m_s = mean_m_s + above_m_s;
                 let mut step = specimen_step();
                 step.dt_s = dt_s;
                 step.travel_m.left = speed_m_s * dt_s;
@@ -411,8 +381,9 @@ mod tests {
                 dt_s: length_s,
                 row_s: [from_s, from_s + length_s],
                 travel_m: Wheels { left: travel_m, right: 0.0 },
-                previous_m: Wheels { left: previous_m, right: 0.0 },
-                previous_dt_s: length_s,
+                speed_m_s: Wheels { left: travel_m / length_s, right: 0.0 },
+                count_m: Wheels::both(0.0),
+                speed_at_ends_m_s: [from_s, from_s + length_s].map(|t_s| Wheels { left: mean_m_s(t_s), right: 0.0 }),
                 wheel_separation_m: 0.4,
                 wheel_rad: Wheels::both(0.0),
                 turned_rad: Wheels { left: travel_m / 0.08, right: 0.0 },

@@ -20,41 +20,20 @@ pub(super) struct Recorded {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PreviousIntervals {
     memory: MotionHistoryTracker,
-    row: Option<Row>,
-}
-
-/// The logged interval in force: its end, and its wheels' speeds and what these gained over it, so that gains
-/// add up to the speeds.
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    end_s: f64,
-    wheel_m_s: Wheels<f64>,
-    wheel_m_s2: Wheels<f64>,
 }
 
 impl PreviousIntervals {
-    pub(super) const NONE: Self = Self { memory: MotionHistoryTracker::NONE, row: None };
+    pub(super) const NONE: Self = Self { memory: MotionHistoryTracker::NONE };
 
     /// The middle of an interval that takes time.
     pub(super) fn moment<'i>(&mut self, interval: &Interval<'i>) -> KinematicSample<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
-        let (v_m_s, omega_rad_s) = (distance_m / interval.dt_s, turn_rad / interval.dt_s);
-        let wheel_m_s = interval.speed_m_s();
-        let [from_s, to_s] = interval.row_s;
-        let row = match self.row {
-            // A measurement between two rows cuts an interval: its speed changed where its row began, and not
-            // at the measurement.
-            Some(row) if row.end_s == to_s => row,
-            before => {
-                let changed = |now: f64, before: f64| (now - before) / (to_s - from_s).max(interval.dt_s);
-                let wheel_m_s2 =
-                    before.map_or(Wheels::both(0.0), |before| wheel_m_s.zip_with(before.wheel_m_s, changed));
-                Row { end_s: to_s, wheel_m_s, wheel_m_s2 }
-            }
-        };
-        self.row = Some(row);
-        let wheel_m_s2 = row.wheel_m_s2;
+        let wheel_m_s = interval.speed_m_s;
+        let Increment { distance_m: v_m_s, turn_rad: omega_rad_s } =
+            Increment::from_travel(wheel_m_s, interval.wheel_separation_m);
+        let wheel_m_s2 = interval.speed_change_m_s().map(|gained_m_s| gained_m_s / interval.dt_s);
         let Wheels { left, right } = wheel_m_s2;
+        self.memory.debounce(interval.count_m);
         let MotionHistory { since_reversal_m, wheel_since_reversal_m, last_turn } =
             self.memory.after(interval.travel_m, distance_m, turn_rad);
         KinematicSample {

@@ -1,0 +1,100 @@
+//! Distributions of tests where encoders are coarse: from the runs simulated once more by the fitted model, their
+//! counts rounded anew ([`ModelFit::resimulated`]).
+//!
+//! A test whose p-value is p by formula has z = Φ⁻¹(1 − p), standard normal if the formula holds. Over simulated
+//! runs its mean and standard deviation say how far it does not, and z is judged by these. A score test's
+//! statistic, χ² by formula, is inflated by a factor where errors last; it is judged over that factor.
+
+use estimation::ModelFit;
+use rayon::prelude::*;
+
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::{Candidate, terms};
+use crate::scan::{detectable_statistic, scan_parts_of};
+use crate::settings::residuals::RESIMULATIONS;
+use crate::statistics::{p_of_upper_student, z_of_upper};
+
+/// A model whose tests depend on the rounding of counts.
+pub(crate) struct NullDistribution<'m, 'a> {
+    model: &'m AugmentedModel<'a>,
+}
+
+impl<'m, 'a> NullDistribution<'m, 'a> {
+    /// Of a model; `None` where formulas hold.
+    pub(crate) fn of(model: &'m AugmentedModel<'a>) -> Option<Self> {
+        model.fit.depends_on_rounding().then_some(Self { model })
+    }
+
+    /// What simulated runs give, one after the other.
+    pub(crate) fn resimulated<T: Send>(&self, of: impl Fn(&ModelFit<'_>) -> T + Sync) -> Vec<T> {
+        let again = |number: u64| of(&self.model.fit.resimulated(&mut terms(&self.model.candidates), number));
+        (1..=RESIMULATIONS).into_par_iter().map(again).collect()
+    }
+
+    /// By how much the score statistics of parts are inflated; 1 where they are not.
+    pub(crate) fn inflation(&self, parts: &[&[Candidate]]) -> Vec<f64> {
+        let scores = |fit: &ModelFit<'_>| {
+            scan_parts_of(fit, &self.model.candidates, parts, |own, projected, _| {
+                let (statistic, dimensions) = detectable_statistic(own, projected);
+                if dimensions > 0 { statistic / dimensions as f64 } else { 1.0 }
+            })
+        };
+        let simulated = self.resimulated(scores);
+        let mean = |part: usize| {
+            let of = simulated.iter().filter_map(|scores| scores.get(part));
+            let (sum, count) = of.fold((0.0, 0.0_f64), |(sum, count), score| (sum + score, count + 1.0));
+            if count > 0.0 { f64::max(sum / count, 1.0) } else { 1.0 }
+        };
+        (0..parts.len()).map(mean).collect()
+    }
+
+    /// The same for one candidate.
+    pub(crate) fn inflation_of(&self, candidate: &Candidate) -> f64 {
+        self.inflation(&[std::slice::from_ref(candidate)]).first().copied().unwrap_or(1.0)
+    }
+}
+
+/// A p-value by formula, judged among those of simulated runs; it is made no stricter.
+pub(crate) fn among_simulated<'p>(p_value: f64, simulated: impl Iterator<Item = &'p f64>) -> f64 {
+    let z: Vec<f64> = simulated.map(|p_value| z_of_upper(*p_value)).collect();
+    judged(z_of_upper(p_value), &z).max(p_value)
+}
+
+/// A correlation, as coefficient and in standard errors, beyond what simulated runs have in its direction.
+pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(f64, f64)]) -> (f64, f64) {
+    let count = simulated.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| simulated.iter().map(of).sum::<f64>() / count;
+    let (coefficient_mean, sigmas_mean) = (mean(|of| of.0), mean(|of| of.1));
+    let variance = simulated.iter().map(|of| (of.1 - sigmas_mean).powi(2)).sum::<f64>() / (count - 1.0);
+    // What has the other sign explains nothing, and what is larger explains all.
+    let left = |value: f64, mean: f64| {
+        if value * mean > 0.0 { value.signum() * f64::max(value.abs() - mean.abs(), 0.0) } else { value }
+    };
+    (left(coefficient, coefficient_mean), left(sigmas, sigmas_mean) / variance.sqrt().max(1.0))
+}
+
+/// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0 and
+/// 1, by formula.
+fn judged(z: f64, simulated: &[f64]) -> f64 {
+    let count = simulated.len() as f64;
+    let mean = simulated.iter().sum::<f64>() / count;
+    let variance = simulated.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let (mean, sd) = (mean.max(0.0), variance.sqrt().max(1.0));
+    p_of_upper_student((z - mean) / (sd * (1.0 + 1.0 / count).sqrt()), count - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_judged_among_simulated_ones() {
+        // Mean 2, variance (4 + 0 + 4)/2 = 4: (6 − 2)/(2 √(4/3)) = √3 of Student's t with two degrees of
+        // freedom, whose upper tail there is (1 − √3/√5)/2.
+        let p = judged(6.0, &[0.0, 2.0, 4.0]);
+        assert!((p - 0.5 * (1.0 - (3.0_f64 / 5.0).sqrt())).abs() < 1e-9, "{p}");
+        // Below the formula's mean and variance nothing is gained. Rejects a z over its own sd of 0.1.
+        let p = judged(3.0, &[-1.1, -1.0, -0.9]);
+        assert!((p - p_of_upper_student(3.0 / (4.0_f64 / 3.0).sqrt(), 2.0)).abs() < 1e-12, "{p}");
+    }
+}

@@ -1,0 +1,164 @@
+//! The same runs once more, as the fitted model would have them: the path smoothed, its counts rounded anew with
+//! phases by chance, its measurements made by the model with noise of the fitted sizes.
+//!
+//! Where encoders are coarse, errors of rounding are neither normal nor independent: on a straight whose rows
+//! have whole numbers of counts, the error stays. No formula says what whiteness, kurtosis or a score are then;
+//! their values on such runs do (parametric bootstrap; Efron & Tibshirani 1993, chapter 6).
+
+use std::sync::Arc;
+
+use kinematics::{Increment, Pose, Side, Wheels};
+use model_term::ModelTerm;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::model::Instrument;
+use crate::model_fit::ModelFit;
+use crate::optimizer::Solution;
+use crate::propagation::{CarriedState, Propagator};
+use crate::records::{Segment, Start};
+use crate::rounding::rounding_variances;
+use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
+
+impl ModelFit<'_> {
+    /// Has the rounding of counts a part in what measurements are off by, so that the distributions of tests
+    /// depend on it?
+    #[must_use]
+    pub fn depends_on_rounding(&self) -> bool {
+        let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
+        self.records.segments.iter().any(|segment| {
+            let [along_m2, of_heading_rad2, _] = rounding_variances(segment.quantum_rad, &self.solution.model);
+            along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
+                || of_heading_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+        })
+    }
+
+    /// The runs once more, by the values found, with the pass at them. `number` addresses the draws; `terms` are
+    /// those of the fit.
+    #[must_use]
+    pub fn resimulated(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
+        let mut records = (*self.records).clone();
+        let mut carried: Option<CarriedState> = None;
+        for (index, segment) in records.segments.iter_mut().enumerate() {
+            let mut draws = Draws::of(number, index);
+            let smooth = smooth_turns(segment);
+            let rolled = self.rolled(segment, &smooth, &mut draws);
+            let before = carried.take().filter(|_| segment.continues);
+            carried = Some(self.measure_again(segment, &rolled, index, before, terms, &mut draws));
+            count_again(segment, &smooth, &mut draws);
+        }
+        let mut again = Self { records: Arc::new(records), ..self.clone() };
+        again.solution.pass = again.scan(terms);
+        again
+    }
+
+    /// The segment with what its wheels roll: the smoothed turns and the fitted noise of wheels and turns.
+    fn rolled<'a>(&self, segment: &Segment<'a>, smooth: &[Wheels<f64>], draws: &mut Draws) -> Segment<'a> {
+        let Solution { model, noise, .. } = &self.solution;
+        let [wheel, turn, ..] = noise.variance;
+        let mut rolled = segment.clone();
+        for (interval, smooth) in rolled.intervals.iter_mut().zip(smooth) {
+            let travel_m = model.m_per_rad.zip_with(*smooth, |m_per_rad, rad| m_per_rad * rad);
+            let Increment { turn_rad, .. } = Increment::from_travel(travel_m, model.separation_m);
+            let apart_m = 0.5 * model.separation_m * (turn * turn_rad.abs()).sqrt() * draws.normal();
+            interval.wheel_rad = Wheels::from_sides(|side| {
+                let noise_m = (wheel * travel_m[side].abs()).sqrt() * draws.normal();
+                let sense = if side == Side::Left { -1.0 } else { 1.0 };
+                smooth[side] + (noise_m + sense * apart_m) / model.m_per_rad[side]
+            });
+        }
+        rolled
+    }
+
+    /// Measures the rolled path at the segment's instants.
+    fn measure_again(
+        &self,
+        segment: &mut Segment<'_>,
+        rolled: &Segment<'_>,
+        index: usize,
+        before: Option<CarriedState>,
+        terms: &mut [Box<dyn ModelTerm>],
+        draws: &mut Draws,
+    ) -> CarriedState {
+        let Solution { model, noise, free_headings, .. } = &self.solution;
+        let [_, _, position_m2, heading_rad2] = noise.variance;
+        let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
+        let mut propagator = Propagator::new(rolled, model, terms);
+        if let Some(before) = before {
+            propagator.carry_on(before);
+        }
+        propagator.restart();
+        let (start, first) = match (segment.start, segment.measurements.first()) {
+            (Start::MeasuredPose, Some(first)) => {
+                let theta_rad = first.theta_rad.unwrap_or(free_headings.get(index).copied().unwrap_or(0.0));
+                (Pose::new(first.x_m, first.y_m, theta_rad), (first.t_s, first.after))
+            }
+            _ => (Pose::IDENTITY, (rolled.intervals.first().map_or(0.0, |interval| interval.t_s), 0)),
+        };
+        let mounted = start * body_from_sensor.inverse();
+        let off = propagator.measurement_offset(mounted, first.0, first.1, latency_s);
+        let mut pose = mounted * off.inverse();
+        let mut at = first.1;
+        for measurement in &mut segment.measurements {
+            pose = propagator.dead_reckon(pose, at..measurement.after);
+            at = measurement.after;
+            let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
+            let seen = pose * off * body_from_sensor;
+            let [xy, theta] = measurement.variance_factor;
+            let (position_m, heading_rad) = ((position_m2 * xy).sqrt(), (heading_rad2 * theta).sqrt());
+            measurement.x_m = seen.x_m + position_m * draws.normal();
+            measurement.y_m = seen.y_m + position_m * draws.normal();
+            measurement.theta_rad = measurement.theta_rad.map(|_| seen.theta_rad + heading_rad * draws.normal());
+        }
+        propagator.carried(pose * body_from_sensor)
+    }
+}
+
+/// How the wheels turned by their rates, interval by interval: without the rounding of single rows.
+fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
+    let of = |interval: &crate::wheel_angles::WheelInterval| {
+        let [start, end] = interval.rate_at_ends_rad_s;
+        if interval.stands {
+            Wheels::both(0.0)
+        } else {
+            start.zip_with(end, |start, end| 0.5 * (start + end) * interval.dt_s)
+        }
+    };
+    segment.intervals.iter().map(of).collect()
+}
+
+/// Counts the smoothed turns, each wheel from a phase by chance on.
+fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
+    for side in Side::BOTH {
+        let quantum_rad = segment.quantum_rad[side];
+        let phase = draws.uniform();
+        let counted = |turned_rad: f64| {
+            if quantum_rad > 0.0 { (turned_rad / quantum_rad + phase).floor() * quantum_rad } else { turned_rad }
+        };
+        let (mut turned_rad, mut before) = (0.0, counted(0.0));
+        for (interval, smooth) in segment.intervals.iter_mut().zip(smooth) {
+            turned_rad += smooth[side];
+            let now = counted(turned_rad);
+            interval.wheel_rad[side] = now - before;
+            before = now;
+        }
+    }
+}
+
+/// Draws of one segment: addressed by its number and that of the simulation.
+struct Draws(Xoshiro256PlusPlus);
+
+impl Draws {
+    fn of(number: u64, segment: usize) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ segment as u64))
+    }
+
+    fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+
+    fn uniform(&mut self) -> f64 {
+        self.0.random::<f64>()
+    }
+}

@@ -1,0 +1,320 @@
+//! Angular rates of both wheels at the rows of a log, and the rounding of their counts.
+//!
+//! A row's own rounding stands in its counts, and so in every residual that they predict. A rate made of the
+//! same row has it too, and the product of both is not zero on average: terms in speed and acceleration, and
+//! latencies, are then biased by several standard deviations (errors in variables; Fuller 1987). A rate from
+//! as many rows before as after, weighted alike, does not have it. Rates are slopes of local regressions over
+//! 2m + 1 rows, m as small as it may be: the smallest at which their noise is below a tenth of the signal's
+//! variance, unless a wider one blurs more than it averages out (Savitzky & Golay 1964; Lepski 1990).
+
+use kinematics::Wheels;
+
+use crate::settings::{
+    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_ROW_RATE_NOISE, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD,
+    QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
+};
+
+/// Rates at the rows of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct WheelRates {
+    /// At each row, rad/s.
+    pub(crate) at_rows_rad_s: Wheels<Vec<f64>>,
+    /// Rows are so fine, and their stamps so exact, that a single interval says how fast the wheels turned.
+    pub(crate) row_by_row: bool,
+    /// Radians that a count stands for; 0 where angles are not rounded.
+    pub(crate) quantum_rad: Wheels<f64>,
+    /// First rows of the stretches without a gap, in order.
+    starts: Vec<usize>,
+    /// Rows between which and the one before a count came, in order.
+    counted: Vec<usize>,
+    /// Time that a robot which sets off gently takes for a count, seconds; `None` where there are no counts.
+    count_s: Option<f64>,
+}
+
+impl WheelRates {
+    /// The rates of a run. `quantum_rad` is what a count stands for, where counts were recorded.
+    pub(crate) fn of(
+        t_s: &[f64],
+        turn_rad: &Wheels<Vec<f64>>,
+        quantum_rad: Wheels<f64>,
+        (separation_m, m_per_rad): (f64, Wheels<f64>),
+        continuous: bool,
+    ) -> Self {
+        let pieces = pieces(t_s, continuous);
+        let jitter_s = jitter_s(t_s);
+        let stretch_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
+        let m_per_rad = [m_per_rad.left, m_per_rad.right];
+        let turns = [&turn_rad.left, &turn_rad.right];
+        let quanta = [quantum_rad.left, quantum_rad.right];
+        // Variance of a row's angle over the speed at its stamp: rounding, and speed times the stamp's error.
+        let mean_square = [0, 1].map(|side| mean_square_rate(t_s, turns[side]));
+        let variance = [0, 1].map(|side| quanta[side].powi(2) / 12.0 + mean_square[side] * jitter_s * jitter_s);
+        let row_by_row = stretch_s > 0.0
+            && [0, 1]
+                .iter()
+                .all(|&side| 2.0 * variance[side] / (stretch_s * stretch_s) <= MAX_ROW_RATE_NOISE * mean_square[side]);
+        let of_window = |half: usize| turns.map(|turn_rad| slopes(t_s, turn_rad, &pieces, half));
+        let noise = |half: usize| {
+            let half = half as f64;
+            let squares = half * (half + 1.0) * (2.0 * half + 1.0) / 3.0 * stretch_s * stretch_s;
+            variance.map(|variance| variance / squares)
+        };
+        let mut rates = of_window(RATE_WINDOWS[0]);
+        for pair in RATE_WINDOWS.windows(2) {
+            let [now, wider] = [noise(pair[0]), noise(pair[1])];
+            if is_below_signal(&rates, now, separation_m, m_per_rad) || variance == [0.0; 2] {
+                break;
+            }
+            let next = of_window(pair[1]);
+            let blurs = [0, 1].iter().any(|&side| {
+                let moved = mean(rates[side].iter().zip(&next[side]).map(|(a, b)| (a - b).powi(2)));
+                moved - (now[side] - wider[side]) > now[side]
+            });
+            if blurs {
+                break;
+            }
+            rates = next;
+        }
+        let [left, right] = rates;
+        let starts = pieces.iter().map(|piece| piece.start).collect();
+        let came = |row: &usize| turns.iter().any(|turn_rad| turn_rad[*row] != turn_rad[row - 1]);
+        let is_rounded = quanta.iter().any(|quantum| *quantum > 0.0);
+        let counted = if is_rounded { (1..t_s.len()).filter(came).collect() } else { Vec::new() };
+        let count_m = [0, 1].map(|side| quanta[side] * m_per_rad[side]).into_iter().fold(0.0, f64::max);
+        let count_s = is_rounded.then(|| (2.0 * count_m / GENTLE_ACCELERATION_M_S2).sqrt());
+        Self { at_rows_rad_s: Wheels { left, right }, row_by_row, quantum_rad, starts, counted, count_s }
+    }
+
+    /// Comes no count in a part of a row's interval, nor within the time that a robot which sets off gently takes
+    /// for one?
+    pub(crate) fn stands(&self, rows_s: &[f64], [from_s, to_s]: [f64; 2], row: usize) -> bool {
+        let Some(count_s) = self.count_s else { return false };
+        let next = self.counted.partition_point(|counted| *counted <= row);
+        let before = next.checked_sub(1).map_or(f64::NEG_INFINITY, |at| rows_s[self.counted[at]]);
+        let after = self.counted.get(next).map_or(f64::INFINITY, |counted| rows_s[counted - 1]);
+        before <= from_s - count_s && after >= to_s + count_s
+    }
+
+    /// Is there no gap between a row and the next?
+    pub(crate) fn are_joined(&self, row: usize) -> bool {
+        self.starts.binary_search(&(row + 1)).is_err()
+    }
+
+    /// Rates at a row.
+    pub(crate) fn at_row(&self, row: usize) -> Wheels<f64> {
+        Wheels { left: self.at_rows_rad_s.left[row], right: self.at_rows_rad_s.right[row] }
+    }
+}
+
+/// What a count of recorded angles stands for, where nearly all steps are multiples of one angle: a driver that
+/// turns counts into angles leaves them rounded. 0 where they are not. The greatest common divisor by Euclid,
+/// up to the rounding of the file's numbers.
+pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
+    let steps = || angle_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > QUANTUM_TOLERANCE);
+    let divisor = |mut a: f64, mut b: f64| {
+        while b > QUANTUM_TOLERANCE {
+            (a, b) = (b, (a - (a / b).round() * b).abs());
+        }
+        a
+    };
+    let quantum =
+        steps().take(MIN_GRID_STEPS).fold(0.0, |quantum: f64, step| divisor(quantum.max(step), quantum.min(step)));
+    if quantum < MIN_QUANTUM_RAD || steps().count() < MIN_GRID_STEPS {
+        return 0.0;
+    }
+    let (on_grid, all) = steps().fold((0.0, 0.0_f64), |(on_grid, all), step| {
+        let off_rad = step - (step / quantum).round() * quantum;
+        (on_grid + f64::from(u8::from(off_rad.abs() < 0.1 * quantum)), all + 1.0)
+    });
+    if on_grid >= MIN_GRID_FRACTION * all { quantum } else { 0.0 }
+}
+
+/// Is the noise of the rates of the centre and of the turn below a tenth of their own variance?
+fn is_below_signal(rates: &[Vec<f64>; 2], noise: [f64; 2], separation_m: f64, m_per_rad: [f64; 2]) -> bool {
+    let of = |weights: [f64; 2]| {
+        let noise: f64 = (0..2).map(|side| (weights[side] * m_per_rad[side]).powi(2) * noise[side]).sum();
+        let speed = |row: usize| (0..2).map(|side| weights[side] * m_per_rad[side] * rates[side][row]).sum::<f64>();
+        let rows = rates[0].len();
+        let middle = mean((0..rows).map(speed));
+        let variance = mean((0..rows).map(|row| (speed(row) - middle).powi(2)));
+        noise <= RATE_NOISE_FRACTION * (variance - noise)
+    };
+    of([0.5, 0.5]) && of([-1.0 / separation_m, 1.0 / separation_m])
+}
+
+/// Slope of a local regression at each row, over as many rows before as after, up to `half`, and none beyond
+/// the piece of the log; at the piece's ends, the slope of its first and last interval.
+fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half: usize) -> Vec<f64> {
+    let mut slopes = vec![0.0; t_s.len()];
+    for piece in pieces {
+        let last = piece.end - 1;
+        for row in piece.clone() {
+            let own = half.min(row - piece.start).min(last - row);
+            let rows = if own > 0 {
+                row - own..row + own + 1
+            } else if row == piece.start {
+                row..(row + 2).min(piece.end)
+            } else {
+                row - 1..row + 1
+            };
+            slopes[row] = slope(&t_s[rows.clone()], &turn_rad[rows]);
+        }
+    }
+    slopes
+}
+
+/// Slope of the regression of angles on times; 0 of a single one.
+fn slope(t_s: &[f64], turn_rad: &[f64]) -> f64 {
+    if let (&[from_s, _, to_s], &[from, _, to]) = (t_s, turn_rad) {
+        // The most frequent window, whose middle has no weight where rows are even.
+        return (to - from) / (to_s - from_s);
+    }
+    let count = t_s.len() as f64;
+    let (middle_s, middle_rad) = (t_s.iter().sum::<f64>() / count, turn_rad.iter().sum::<f64>() / count);
+    let (products, squares) = t_s.iter().zip(turn_rad).fold((0.0, 0.0), |(products, squares), (t_s, turn_rad)| {
+        let since_s = t_s - middle_s;
+        (products + since_s * (turn_rad - middle_rad), squares + since_s * since_s)
+    });
+    if squares > 0.0 { products / squares } else { 0.0 }
+}
+
+/// Stretches of rows without a gap; in a log with gaps each row stands alone.
+fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
+    let longest_s = if continuous {
+        GAP_RATIO * median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(f64::INFINITY)
+    } else {
+        0.0
+    };
+    let mut start = 0;
+    t_s.chunk_by(|a, b| b - a <= longest_s)
+        .map(|piece| {
+            let of = start..start + piece.len();
+            start = of.end;
+            of
+        })
+        .collect()
+}
+
+/// Standard deviation of the stamps' errors, seconds: of second differences, which even rows do not have, by
+/// their median, so that lost rows do not count.
+fn jitter_s(t_s: &[f64]) -> f64 {
+    let second = |three: &[f64]| (three[2] - 2.0 * three[1] + three[0]).abs();
+    median(t_s.windows(3).map(second)).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt())
+}
+
+fn mean_square_rate(t_s: &[f64], turn_rad: &[f64]) -> f64 {
+    let pairs = t_s.windows(2).zip(turn_rad.windows(2));
+    let (squares, time_s) = pairs.fold((0.0, 0.0), |(squares, time_s), (t_s, turn_rad)| {
+        let (passed_s, turned_rad) = (t_s[1] - t_s[0], turn_rad[1] - turn_rad[0]);
+        if passed_s > 0.0 {
+            (squares + turned_rad * turned_rad / passed_s, time_s + passed_s)
+        } else {
+            (squares, time_s)
+        }
+    });
+    if time_s > 0.0 { squares / time_s } else { 0.0 }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count.max(1.0)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRIVE: (f64, Wheels<f64>) = (0.4, Wheels { left: 0.1, right: 0.1 });
+
+    /// Rows of 10 ms at a speed that rises and falls, counted by so many radians.
+    fn rows(quantum_rad: f64, count: usize) -> (Vec<f64>, Wheels<Vec<f64>>) {
+        let t_s: Vec<f64> = (0..count).map(|row| 0.01 * row as f64).collect();
+        let angle = |t_s: f64, side: f64| 3.0 * t_s - 1.5 * (1.1 * t_s + side).cos();
+        let counted = |side: f64| {
+            let counts = t_s.iter().map(|t_s| angle(*t_s, side));
+            counts.map(|rad| if quantum_rad > 0.0 { (rad / quantum_rad).floor() * quantum_rad } else { rad }).collect()
+        };
+        let turns = Wheels { left: counted(0.0), right: counted(0.7) };
+        (t_s, turns)
+    }
+
+    fn rates(quantum_rad: f64) -> WheelRates {
+        let (t_s, turns) = rows(quantum_rad, 800);
+        WheelRates::of(&t_s, &turns, Wheels::both(quantum_rad), DRIVE, true)
+    }
+
+    #[test]
+    fn a_rate_does_not_have_its_own_rows_rounding() {
+        let (t_s, turns) = rows(0.02, 800);
+        let before = WheelRates::of(&t_s, &turns, Wheels::both(0.02), DRIVE, true);
+        let mut moved = turns.clone();
+        moved.left[400] += 0.02;
+        let after = WheelRates::of(&t_s, &moved, Wheels::both(0.02), DRIVE, true);
+        // Rejects causal and one-sided differences.
+        assert!((before.at_row(400).left - after.at_row(400).left).abs() < 1e-9);
+        // Its neighbours have it alike, with opposite signs.
+        let change = |row: usize| after.at_row(row).left - before.at_row(row).left;
+        assert!(change(399) > 0.01 && (change(399) + change(401)).abs() < 1e-9, "{} {}", change(399), change(401));
+    }
+
+    #[test]
+    fn windows_grow_with_the_rounding_until_it_is_below_a_tenth_of_the_signal() {
+        for quantum_rad in [0.0, 1e-4, 2e-3, 2e-2, 5e-2] {
+            let found = rates(quantum_rad);
+            let exact = |t_s: f64| 3.0 + 1.65 * (1.1 * t_s).sin();
+            let errors = (50..750).map(|row| found.at_row(row).left - exact(0.01 * row as f64));
+            let noise = mean(errors.map(|error| error * error));
+            // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A tenth
+            // of it, for both wheels. Rejects a window of one row at 0.05 rad, with a noise of 1.0.
+            assert!(noise < 0.1 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
+            assert_eq!(found.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
+        }
+    }
+
+    #[test]
+    fn a_robot_stands_where_no_count_is_near() {
+        // A count of 1 mm at row 50: at 0.2 m/s² it takes 0.1 s.
+        let t_s: Vec<f64> = (0..100).map(|row| 0.01 * f64::from(row)).collect();
+        let turns =
+            Wheels { left: (0..100).map(|row| if row < 50 { 0.0 } else { 0.01 }).collect(), right: vec![0.0; 100] };
+        let found = WheelRates::of(&t_s, &turns, Wheels::both(0.01), DRIVE, true);
+        let stands = |row: usize| found.stands(&t_s, [t_s[row], t_s[row + 1]], row);
+        let standing: Vec<usize> = (0..99).filter(|row| stands(*row)).collect();
+        // Row 49's interval has the count. Rejects a standstill up to the count itself.
+        assert_eq!((standing[38], standing[39], standing.len()), (38, 60, 38 + 1 + 39));
+    }
+
+    #[test]
+    fn gaps_and_ends_are_no_part_of_a_window() {
+        let (mut t_s, turns) = rows(0.0, 100);
+        t_s[50..].iter_mut().for_each(|t_s| *t_s += 0.5);
+        let found = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, true);
+        assert!(found.are_joined(48) && !found.are_joined(49) && found.are_joined(50));
+        let own = |row: usize| (turns.left[row + 1] - turns.left[row]) / 0.01;
+        assert!((found.at_row(49).left - own(48)).abs() < 1e-9 && (found.at_row(50).left - own(50)).abs() < 1e-9);
+        assert!((found.at_row(0).left - own(0)).abs() < 1e-9 && (found.at_row(99).left - own(98)).abs() < 1e-9);
+        // In a log with gaps every row is alone.
+        let gaps = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, false);
+        assert!((0..99).all(|row| !gaps.are_joined(row)));
+    }
+
+    #[test]
+    fn angles_that_are_counts_are_known_as_such() {
+        let (_, counted) = rows(std::f64::consts::TAU / 4096.0, 800);
+        let found = quantum_of_angles(&counted.left);
+        assert!((found * 4096.0 / std::f64::consts::TAU - 1.0).abs() < 1e-3, "{found}");
+        let (_, smooth) = rows(0.0, 800);
+        assert_eq!(quantum_of_angles(&smooth.left), 0.0);
+        assert_eq!(quantum_of_angles(&counted.left[..50]), 0.0, "too few to say");
+        assert_eq!(quantum_of_angles(&[1.0; 500]), 0.0, "at rest");
+    }
+}

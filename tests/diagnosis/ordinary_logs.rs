@@ -1,0 +1,109 @@
+//! Logs of robots that this project's simulator did not drive ([`crate::plain_robot`]): nothing is wrong with
+//! the robot, and nothing is found; what is wrong is named.
+//!
+//! Kinds of ordinary logs: coarse encoders, slow rows, stamps that jitter, sparse truth, one run or many. The
+//! campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis ordinary_logs -- --nocapture`.
+#![allow(clippy::print_stdout)] // every case with its seed
+
+use diagnose::{Document, Options, diagnose};
+use rayon::prelude::*;
+
+use crate::plain_robot::{PlainRobot, Reports, Stamps};
+
+fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    robot.write(folder.path());
+    let dataset = dataset::read(folder.path()).expect("a dataset").dataset;
+    let found = diagnose(std::slice::from_ref(&dataset), &Options::default());
+    found.map(|found| found.document).map_err(|error| error.to_string())
+}
+
+fn shown(document: &Document) -> Vec<String> {
+    let found = document.findings.iter().map(|finding| {
+        let term = finding.unlisted_term.as_ref();
+        let term = term.map_or(String::new(), |term| {
+            let covariates = term.covariates.join(" · ");
+            format!(" [{} {covariates} {:.2e} ± {:.1e}]", term.channel, term.coefficient, term.sigma)
+        });
+        format!("{}{term} z {:.1}", finding.names.join("|"), finding.z)
+    });
+    let failed = document.checks.iter().filter(|check| !check.passes);
+    found.chain(failed.map(|check| format!("check {} p {:.1e}", check.name, check.p_value))).collect()
+}
+
+/// Robots of each kind, and the first seed.
+fn robots() -> (u64, u64) {
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
+    (number("YAIR_ROBOTS").unwrap_or(2), number("YAIR_SEED").unwrap_or(500))
+}
+
+type Change = fn(&mut PlainRobot);
+
+/// What is ordinary about a log, and what may be found in it because it is there.
+const KINDS: &[(&str, Change, &[&str])] = &[
+    ("20 000 ticks a turn", |_| {}, &[]),
+    ("40 000 ticks a turn", |of| of.ticks_per_rev = 40_000.0, &[]),
+    ("2000 ticks a turn", |of| of.ticks_per_rev = 2000.0, &[]),
+    ("500 ticks a turn", |of| of.ticks_per_rev = 500.0, &[]),
+    ("120 ticks a turn", |of| of.ticks_per_rev = 120.0, &[]),
+    ("500 ticks, speed ripple", |of| (of.ticks_per_rev, of.ripple) = (500.0, 0.03), &[]),
+    ("jitter of 2 ms", |of| of.stamps = Stamps::Jitter(2e-3), &["interval_error"]),
+    ("received 5 ms late", |of| of.stamps = Stamps::Received(5e-3), &["interval_error"]),
+    ("counts at 10 Hz", |of| of.odometry_hz = 10.0, &[]),
+    ("counts at 20 Hz", |of| of.odometry_hz = 20.0, &[]),
+    (
+        "500 ticks at 20 Hz, jitter of 3 ms, poses of 3 mm at 5 Hz",
+        |of| {
+            (of.ticks_per_rev, of.odometry_hz, of.stamps) = (500.0, 20.0, Stamps::Jitter(3e-3));
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad) = (5.0, 3e-3, 3e-3);
+        },
+        &["interval_error"],
+    ),
+    ("20 Hz, truth between rows", |of| (of.odometry_hz, of.truth_between_rows) = (20.0, 0.5), &[]),
+    ("ends of runs", |of| of.reports = Reports::Ends, &[]),
+    ("positions", |of| of.reports = Reports::Positions, &[]),
+    ("truth at 50 Hz", |of| of.truth_hz = 50.0, &[]),
+    ("truth at 1 Hz", |of| of.truth_hz = 1.0, &[]),
+    ("rough wheels", |of| of.wheel_sigma_m_per_sqrt_m = 2e-3, &[]),
+    ("perfect wheels", |of| of.wheel_sigma_m_per_sqrt_m = 0.0, &[]),
+    ("one run", |of| of.runs = 1, &[]),
+    ("four runs", |of| of.runs = 4, &[]),
+    ("one long log", |of| of.joined = true, &[]),
+    ("3 % of rows lost", |of| of.lost_rows = 0.03, &["dropped_samples"]),
+];
+
+/// Kinds whose name has the text of YAIR_KIND in it; all without.
+fn kinds() -> impl Iterator<Item = &'static (&'static str, Change, &'static [&'static str])> {
+    let of = std::env::var("YAIR_KIND").unwrap_or_default();
+    KINDS.iter().filter(move |(name, ..)| name.contains(&of))
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_wrong() {
+    let (robots, first) = robots();
+    let mut with_findings = 0;
+    let mut all = 0;
+    for (kind, change, exempt) in kinds() {
+        let of = |seed: u64| {
+            let mut robot = PlainRobot::ordinary(seed);
+            change(&mut robot);
+            (seed, diagnosed(&robot))
+        };
+        let found: Vec<_> = (first..first + robots).into_par_iter().map(of).collect();
+        let mut wrong = 0;
+        for (seed, document) in &found {
+            let is_wrong = match document {
+                Ok(document) => document.findings.iter().any(|finding| !exempt.contains(&finding.names[0].as_str())),
+                Err(_) => true,
+            };
+            wrong += u64::from(is_wrong);
+            if is_wrong || document.as_ref().is_ok_and(|document| !document.findings.is_empty()) {
+                let shown = document.as_ref().map_or_else(|error| vec![error.clone()], shown);
+                println!("  {kind}, seed {seed}: {}", shown.join("; "));
+            }
+        }
+        println!("{kind}: {wrong} of {robots}");
+        (with_findings, all) = (with_findings + wrong, all + robots);
+    }
+    println!("{with_findings} of {all} nulls have a finding");
+}
