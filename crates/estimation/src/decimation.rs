@@ -1,8 +1,8 @@
 //! Records with longer intervals, for covariates that hardly change from one row of a fast log to the next.
 //!
 //! Between two measurements at 10 Hz a log at 100 Hz has ten rows. A covariate that varies within tenths of a
-//! second may be evaluated for five of them together. The arc of joined rows differs from theirs by the
-//! square of the change of the wheels' speeds.
+//! second may be evaluated for five of them together. How far the rows together go across the arc of their sum is
+//! kept.
 
 use kinematics::Wheels;
 
@@ -66,6 +66,9 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                 last.rate_at_ends_rad_s[1] = interval.rate_at_ends_rad_s[1];
                 last.stands &= interval.stands;
                 last.dt_s = all_s;
+                // Arcs that follow each other go across the arc of their sum.
+                let (a, b) = (last.wheel_rad, interval.wheel_rad);
+                last.bend_rad2 += interval.bend_rad2 + 0.5 * (a.right * b.left - a.left * b.right);
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.row_s[1] = interval.row_s[1];
             }

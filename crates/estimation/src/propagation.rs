@@ -308,7 +308,12 @@ impl<'f, 'a> Propagator<'f, 'a> {
             let middle = |g: &Pose, by_turn: &Vector3<f64>| {
                 Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
             };
-            let mut step = Vector3::new(distance_m * chord * cos, distance_m * chord * sin, turn_rad);
+            let across_m = self.model.across_m(interval);
+            let mut step = Vector3::new(
+                distance_m * chord * cos - across_m * sin,
+                distance_m * chord * sin + across_m * cos,
+                turn_rad,
+            );
             let curvature = sinc_derivative(half_rad);
             let by_turn = Vector3::new(
                 0.5 * distance_m * (curvature * cos - chord * sin),
@@ -317,10 +322,13 @@ impl<'f, 'a> Propagator<'f, 'a> {
             );
             let along = Vector3::new(chord * cos, chord * sin, 0.0);
             let per_m = 1.0 / separation_m;
+            // Across it is in proportion to either wheel, and inversely to the separation.
+            let across = Vector3::new(-across_m * sin, across_m * cos, 0.0);
+            let by_turn = by_turn - Vector3::new(across_m * cos, across_m * sin, 0.0) * 0.5;
             let steps = [
-                along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m),
-                along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m),
-                -by_turn * turn_rad,
+                along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m) + across,
+                along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m) + across,
+                -by_turn * turn_rad - across,
             ];
             if !self.gradients.is_empty() {
                 self.term_gradients(interval, travel_m, run_from_start * before);
@@ -364,7 +372,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
             self.term_gradients(interval, travel_m, self.run_from_chain * pose);
             let Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
             let arc = Increment { distance_m: distance_m + x_m, turn_rad: turn_rad + theta_rad }.arc();
-            pose = pose * arc * Pose::new(0.0, y_m, 0.0);
+            let across_m = self.model.across_m(interval);
+            pose = pose * arc * Pose::new(0.0, y_m + across_m, 0.0);
             self.session_m += distance_m.abs();
             self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
         }

@@ -114,6 +114,10 @@ pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
 /// Budgeted: one lost row is bridged.
 pub(crate) const GAP_RATIO: f64 = 2.5;
 
+/// Longest row within which the wheels' rates change steadily, seconds.
+/// Budgeted: robots speed up and stop in some tenths of a second; within a longer row they may do both.
+pub(crate) const MAX_STEADY_ROW_S: f64 = 0.3;
+
 /// Steps of an angle below this, radians, are rounding of the file's numbers and no counts.
 /// Budgeted: files with six decimals round by half of 1e-6, and a step twice.
 pub(crate) const QUANTUM_TOLERANCE: f64 = 3e-6;

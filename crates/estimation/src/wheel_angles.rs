@@ -25,6 +25,9 @@ pub(crate) struct WheelInterval {
     pub(crate) rate_rad_s: Wheels<f64>,
     /// Rates at the start and at the end.
     pub(crate) rate_at_ends_rad_s: [Wheels<f64>; 2],
+    /// What makes the centre go across the arc of its wheels' turns: (w_R Δr_L − w_L Δr_R) T/12 for turns w and rates
+    /// that change by Δr, rad². It is (ω Δv − v Δω) T²/12 of the robot, the second term of Magnus 1954.
+    pub(crate) bend_rad2: f64,
     /// No count comes in it, nor near it.
     pub(crate) stands: bool,
 }
@@ -174,7 +177,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         let share = since_s / length_s;
         let (start, end) = (self.row_rad(row), self.row_rad(row + 1));
         let even = start.zip_with(end, |start, end| start + share * (end - start));
-        if !(0.0..=1.0).contains(&share) || !self.rates.are_joined(row) {
+        if !(0.0..=1.0).contains(&share) || !self.rates.are_joined(self.t_s, row) {
             return Some(even);
         }
         // What the rates at both ends are beyond the mean rate, as angles over the row. A wheel that turns one
@@ -195,7 +198,7 @@ impl<'a> WheelAngleInterpolator<'a> {
     fn rate_at(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let Some(next_s) = self.t_s.get(row + 1) else { return self.rates.at_row(row) };
         let length_s = next_s - self.t_s[row];
-        if !self.rates.are_joined(row) {
+        if !self.rates.are_joined(self.t_s, row) {
             return self.row_rate(row);
         }
         let share = ((t_s - self.t_s[row]) / length_s).clamp(0.0, 1.0);
@@ -259,6 +262,12 @@ impl Cursor<'_, '_> {
             } else {
                 ends[0].zip_with(ends[1], |start, end| 0.5 * (start + end))
             };
+            let change = ends[1].zip_with(ends[0], |end, start| end - start);
+            let bend_rad2 = if self.track.rates.are_joined(rows_s, row) {
+                (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0
+            } else {
+                0.0
+            };
             let stands = self.track.rates.stands(rows_s, [at_s, t_s], row);
             intervals.push(WheelInterval {
                 t_s: at_s,
@@ -267,6 +276,7 @@ impl Cursor<'_, '_> {
                 row_s,
                 rate_rad_s,
                 rate_at_ends_rad_s: ends,
+                bend_rad2,
                 stands,
             });
             (at_s, angle) = (t_s, next);
@@ -321,16 +331,26 @@ mod tests {
     #[test]
     fn steps_follow_the_rows_and_share_the_outer_intervals() {
         assert_eq!(steps(ticks(), true, 0.0, 2.0), Some(vec![(10.0, 0.0), (10.0, -10.0)]));
-        // Over the last row the left wheel speeds up from 50/3 to 20 a second: it turns 40 in 2 s, and in the
-        // first one 20 − (20 − 50/3)/4. Rejects an even row, 20. The right one turns in neither outer row.
-        let [first, middle, last] = steps(ticks(), true, 0.5, 3.0).expect("spanned")[..] else { panic!("three rows") };
-        assert_eq!((first, middle, last.1), ((5.0, 0.0), (10.0, -10.0), 0.0));
-        assert!((last.0 - (20.0 - 10.0 / 12.0)).abs() < 1e-12, "{last:?}");
-        let [(left, right)] = steps(ticks(), true, 2.5, 3.5).expect("spanned")[..] else { panic!("one row") };
-        assert!((left - 20.0).abs() < 1.0 && right == 0.0, "{left} {right}");
+        assert_eq!(steps(ticks(), true, 0.5, 3.0), Some(vec![(5.0, 0.0), (10.0, -10.0), (20.0, 0.0)]));
+        assert_eq!(steps(ticks(), true, 2.5, 3.5), Some(vec![(20.0, 0.0)]));
         // A rounding beside a row is that row.
         assert_eq!(steps(ticks(), true, 1.0 + 1e-10, 2.0 - 1e-10), Some(vec![(10.0, -10.0)]));
         assert_eq!(steps(ticks(), true, 4.0, 4.0), Some(vec![(0.0, 0.0)]));
+    }
+
+    #[test]
+    fn within_short_rows_wheels_speed_up() {
+        // Rows at 0, 0.1, 0.2 and 0.4 s, in which the left wheel turns 10, 10 and 40.
+        let mut dataset = dataset(ticks(), true);
+        dataset.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s *= 0.1);
+        let session = dataset.session();
+        let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
+        let [first, middle, last] = track.steps(0.05, 0.3).expect("spanned")[..] else { panic!("three rows") };
+        // Over the last row it speeds up from 500/3 to 200 a second: it turns 40, and in the first half of it
+        // 20 − (20 − 50/3)/4. Rejects an even row, 20. The right one turns in neither outer row.
+        assert!((last.left - (20.0 - 10.0 / 12.0)).abs() < 1e-9, "{last:?}");
+        assert!((first.left - 5.0).abs() < 1e-9 && (middle.left - 10.0).abs() < 1e-9, "{first:?} {middle:?}");
+        assert_eq!((first.right, last.right), (0.0, 0.0));
     }
 
     #[test]

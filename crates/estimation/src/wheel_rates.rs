@@ -10,8 +10,8 @@
 use kinematics::Wheels;
 
 use crate::settings::{
-    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_ROW_RATE_NOISE, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD,
-    QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
+    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S, MIN_GRID_FRACTION, MIN_GRID_STEPS,
+    MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
 };
 
 /// Rates at the rows of a run.
@@ -95,9 +95,11 @@ impl WheelRates {
         before <= from_s - count_s && after >= to_s + count_s
     }
 
-    /// Is there no gap between a row and the next?
-    pub(crate) fn are_joined(&self, row: usize) -> bool {
-        self.starts.binary_search(&(row + 1)).is_err()
+    /// Do the wheels' rates change steadily between a row and the next? Not over a gap, nor over rows that are
+    /// longer than it takes a robot to speed up.
+    pub(crate) fn are_joined(&self, t_s: &[f64], row: usize) -> bool {
+        let is_short = t_s.get(row + 1).is_some_and(|next_s| next_s - t_s[row] <= MAX_STEADY_ROW_S);
+        is_short && self.starts.binary_search(&(row + 1)).is_err()
     }
 
     /// Rates at a row.
@@ -298,13 +300,17 @@ mod tests {
         let (mut t_s, turns) = rows(0.0, 100);
         t_s[50..].iter_mut().for_each(|t_s| *t_s += 0.5);
         let found = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, true);
-        assert!(found.are_joined(48) && !found.are_joined(49) && found.are_joined(50));
+        let joined = |row: usize| found.are_joined(&t_s, row);
+        assert!(joined(48) && !joined(49) && joined(50));
         let own = |row: usize| (turns.left[row + 1] - turns.left[row]) / 0.01;
         assert!((found.at_row(49).left - own(48)).abs() < 1e-9 && (found.at_row(50).left - own(50)).abs() < 1e-9);
         assert!((found.at_row(0).left - own(0)).abs() < 1e-9 && (found.at_row(99).left - own(98)).abs() < 1e-9);
         // In a log with gaps every row is alone.
         let gaps = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, false);
-        assert!((0..99).all(|row| !gaps.are_joined(row)));
+        assert!((0..99).all(|row| !gaps.are_joined(&t_s, row)));
+        let slow_s: Vec<f64> = (0..100).map(f64::from).collect();
+        let slow = WheelRates::of(&slow_s, &turns, Wheels::both(0.0), DRIVE, true);
+        assert!((0..99).all(|row| !slow.are_joined(&slow_s, row)));
     }
 
     #[test]
