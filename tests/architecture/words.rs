@@ -17,7 +17,7 @@ const PRIVATE: &[(&str, &str)] = &[
     ("Apart", "Grouping"),
     ("ArcScatter", "BridgeCovariance"),
     ("Asked", "MeanStructure"),
-    ("Beat", "SamplingPeriodEstimator"),
+    ("Beat", "sampling_period.rs"),
     ("Bend", "Curvature"),
     ("Choice", "Candidate"),
     ("Coarse", "Decimated"),

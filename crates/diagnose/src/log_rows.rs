@@ -6,6 +6,7 @@
 //! probability 1.6e-5: P(R < r) ≈ 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables.
 
 use dataset::{Dataset, Odometry, Run, WheelLog};
+use estimation::stamp_jitter_s;
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::check::{Check, TestResult};
@@ -63,6 +64,8 @@ fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
 
 fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
     let mut rows = Rows::default();
+    // Counts of a row are as uncertain as the stamps at both of its ends make them.
+    let apart_s = std::f64::consts::SQRT_2 * stamp_jitter_s(t_s);
     let rates: Vec<(f64, f64)> = t_s
         .windows(2)
         .zip(ticks.windows(2))
@@ -76,7 +79,7 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         let (least, most) =
             around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), rate| (a.min(*rate), b.max(*rate)));
         rows.all += 1;
-        let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING);
+        let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING).max(mean.abs() * apart_s);
         let is_standing = rate.abs() < STANDSTILL_RATE_RATIO * mean.abs() || mean == 0.0;
         if !is_standing && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain {
             rows.outlying += 1;
@@ -109,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_sound_log_has_no_outlying_rows() {
-        for jitter_s in [0.0, 1e-3, 5e-3] {
+        for jitter_s in [0.0, 1e-3, 5e-3, 9e-3] {
             let (t_s, ticks) = column(jitter_s);
             assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, outlying: 0 }, "{jitter_s}");
         }

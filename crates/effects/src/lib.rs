@@ -21,7 +21,6 @@ mod estimates;
 mod forward;
 mod hypothesis;
 mod motion_history;
-mod sampling_period;
 mod stream;
 mod term;
 

@@ -170,6 +170,7 @@ mod tests {
                 row_s: [f64::from(row), f64::from(row) + dt_s],
                 rate_rad_s: *wheel_rad,
                 rate_at_ends_rad_s: [[0.0, 0.05], [0.05, -0.1], [-0.1, -0.2]][usize::from(row)].map(Wheels::both),
+                late_s: [0.0; 2],
                 bend_rad2: 0.0,
                 stands: false,
             })

@@ -39,6 +39,7 @@ mod propagation;
 mod records;
 mod resimulation;
 mod rounding;
+mod sampling_period;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -64,3 +65,4 @@ pub use records::{Records, Segment};
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;
+pub use wheel_rates::stamp_jitter_s;

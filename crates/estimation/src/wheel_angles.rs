@@ -9,6 +9,7 @@
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
+use crate::sampling_period::lateness_s;
 use crate::settings::{MAX_EXTRAPOLATION, TIME_TOLERANCE_S};
 use crate::wheel_rates::{WheelRates, quantum_of_angles};
 
@@ -21,6 +22,8 @@ pub(crate) struct WheelInterval {
     pub(crate) wheel_rad: Wheels<f64>,
     /// Start and end of the logged interval of which it is a part, or the whole.
     pub(crate) row_s: [f64; 2],
+    /// How late the stamps at its start and its end are, seconds.
+    pub(crate) late_s: [f64; 2],
     /// Mean rate of each wheel, rad/s, for covariates ([`WheelRates`]).
     pub(crate) rate_rad_s: Wheels<f64>,
     /// Rates at the start and at the end.
@@ -41,6 +44,8 @@ pub struct WheelAngleInterpolator<'a> {
     first_rad: Wheels<f64>,
     continuous: bool,
     rates: WheelRates,
+    /// How late each row's stamp is, seconds.
+    late_s: Vec<f64>,
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
@@ -90,7 +95,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         let rates = WheelRates::of(&odometry.t_s, &turn_rad, quantum_rad, drive, continuous);
-        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates })
+        let late_s = if continuous { lateness_s(&odometry.t_s) } else { vec![0.0; odometry.t_s.len()] };
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })
     }
 
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
@@ -205,6 +211,16 @@ impl<'a> WheelAngleInterpolator<'a> {
         self.rates.at_row(row).zip_with(self.rates.at_row(row + 1), |start, end| start + share * (end - start))
     }
 
+    /// How late the stamps are at an instant of a row's interval, seconds.
+    fn late_at(&self, row: usize, t_s: f64) -> f64 {
+        let (start, Some(end), Some(next_s)) = (self.late_s[row], self.late_s.get(row + 1), self.t_s.get(row + 1))
+        else {
+            return self.late_s[row];
+        };
+        let share = ((t_s - self.t_s[row]) / (next_s - self.t_s[row])).clamp(0.0, 1.0);
+        start + share * (end - start)
+    }
+
     /// Mean rates over a row's interval by its own counts, rad/s.
     fn row_rate(&self, row: usize) -> Wheels<f64> {
         let Some(next_s) = self.t_s.get(row + 1) else { return self.rates.at_row(row) };
@@ -274,6 +290,7 @@ impl Cursor<'_, '_> {
                 dt_s,
                 wheel_rad,
                 row_s,
+                late_s: [at_s, t_s].map(|t_s| self.track.late_at(row, t_s)),
                 rate_rad_s,
                 rate_at_ends_rad_s: ends,
                 bend_rad2,

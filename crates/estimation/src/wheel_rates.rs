@@ -41,7 +41,7 @@ impl WheelRates {
         continuous: bool,
     ) -> Self {
         let pieces = pieces(t_s, continuous);
-        let jitter_s = jitter_s(t_s);
+        let jitter_s = stamp_jitter_s(t_s);
         let stretch_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
         let m_per_rad = [m_per_rad.left, m_per_rad.right];
         let turns = [&turn_rad.left, &turn_rad.right];
@@ -197,9 +197,10 @@ fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-/// Standard deviation of the stamps' errors, seconds: of second differences, which even rows do not have, by
+/// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not have, by
 /// their median, so that lost rows do not count.
-fn jitter_s(t_s: &[f64]) -> f64 {
+#[must_use]
+pub fn stamp_jitter_s(t_s: &[f64]) -> f64 {
     let second = |three: &[f64]| (three[2] - 2.0 * three[1] + three[0]).abs();
     median(t_s.windows(3).map(second)).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt())
 }

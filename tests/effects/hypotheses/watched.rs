@@ -161,6 +161,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
                 t_s: row.t_s,
                 dt_s: row.dt_s,
                 row_s: [row.t_s, row.t_s + row.dt_s],
+                late_s: [0.0; 2],
                 travel_m,
                 speed_m_s: if is_even { travel_m.map(|travel_m| travel_m / row.dt_s) } else { mean_m_s },
                 count_m: Wheels::both(0.0),

@@ -9,14 +9,12 @@
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
 //! milliseconds.
 
-use dataset::RunInfo;
 use model_term::{Interval, ModelTerm, TermParameter};
-use kinematics::{Pose, Wheels};
+use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, Needs};
 use crate::description::{Description, Excitation, Summary};
-use crate::sampling_period::SamplingPeriodEstimator;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -50,7 +48,7 @@ impl PhysicalEffect for IntervalError {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Variant::plain(Term::default()))
+        Hypothesis::Terms(Variant::plain(Term))
     }
 
     fn description() -> Description {
@@ -104,16 +102,10 @@ impl Forward for State {
     }
 }
 
-/// What irregular stamps make of a run's rows.
-#[derive(Clone, Default)]
-struct Term {
-    sampling_period: SamplingPeriodEstimator,
-    /// What its lateness makes of the wheels' travel at the last row, for a share of one.
-    off_m: Wheels<f64>,
-    /// The logged interval whose parts come in: its end, its length, and what its end being late makes of the
-    /// wheels' travel beyond what its start does.
-    row: Option<(f64, f64, Wheels<f64>)>,
-}
+/// What irregular stamps make of a run's rows: counts that were read before their stamp are short by the speed
+/// times how late it is.
+#[derive(Clone)]
+struct Term;
 
 impl ModelTerm for Term {
     /// Plausible: all of it.
@@ -121,25 +113,12 @@ impl ModelTerm for Term {
         &[TermParameter { name: "share", unit: "1", prior_sigma: 1.0 }]
     }
 
-    fn restart(&mut self, _run: &RunInfo) {
-        *self = Self::default();
-    }
-
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let [from_s, row_s] = interval.row_s;
-        if self.row.is_none_or(|(end_s, ..)| end_s != row_s) {
-            self.sampling_period.next_row(from_s, row_s);
-            // What a late stamp makes of a travel is gone with the next one: only the speed then and the row
-            // count.
-            let off_m = interval.speed_m_s.map(|speed_m_s| speed_m_s * self.sampling_period.late_s);
-            let gained_m = off_m.zip_with(std::mem::replace(&mut self.off_m, off_m), |now, before| now - before);
-            self.row = Some((row_s, row_s - from_s, gained_m));
-        }
-        if let Some((_, length_s, gained_m)) = self.row
-            && length_s > 0.0
-        {
-            gradient[0] = interval.change(gained_m.map(|gained_m| gained_m * interval.dt_s / length_s));
-        }
+        // What a late stamp makes of a travel is gone with the next one: only the ends count.
+        let [start_m, end_m] = [0, 1].map(|end| {
+            interval.speed_at_ends_m_s[end].map(|speed_m_s| speed_m_s * interval.late_s[end])
+        });
+        gradient[0] = interval.change(end_m.zip_with(start_m, |end_m, start_m| end_m - start_m));
     }
 }
 
@@ -155,7 +134,7 @@ mod tests {
         state.seed_run(Address { seed: 1, point: 0, trial: 0, run: 0 }.stream(StreamName::new("test")));
         for row in 0..1000 {
             let due_s = f64::from(row);
-            let mut sample = SampleClock { stamp_s: due_s, read_s: Wheels::both(due_s) };
+            let mut sample = SampleClock { stamp_s: due_s, read_s: kinematics::Wheels::both(due_s) };
             state.clock(&mut sample);
             let (stamp_s, read_s) = (sample.stamp_s - due_s, sample.read_s.left - due_s);
             assert!(stamp_s.abs() <= 0.004 + 1e-12 && (read_s - 0.75 * stamp_s).abs() < 1e-12);

@@ -186,6 +186,7 @@ mod tests {
                 t_s,
                 dt_s: 0.04,
                 row_s: [t_s, t_s + 0.04],
+                late_s: [0.0; 2],
                 travel_m: Wheels::both(0.0),
                 speed_m_s: Wheels::both(t_s + 0.02),
                 speed_at_ends_m_s: [t_s, t_s + 0.04].map(Wheels::both),

@@ -144,6 +144,7 @@ mod tests {
                 t_s,
                 dt_s,
                 row_s: [t_s, t_s + dt_s],
+                late_s: [0.0; 2],
                 travel_m: turned_rad.map(|rad| 0.08 * rad),
                 speed_m_s: turned_rad.map(|rad| 0.08 * rad / f64::max(dt_s, 0.1)),
                 count_m: Wheels::both(0.0),
