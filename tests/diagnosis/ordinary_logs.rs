@@ -27,6 +27,9 @@ fn shown(document: &Document) -> Vec<String> {
         });
         format!("{}{term} z {:.1}", finding.names.join("|"), finding.z)
     });
+    let candidates = document.candidates.iter().take(if std::env::var("YAIR_DEBUG").is_ok() { 6 } else { 0 });
+    let candidates = candidates.map(|of| format!("{} z {:.1} odds {:.0} {:?}", of.id, of.z, of.log_odds, of.refused));
+    let found = found.chain(candidates);
     let failed = document.checks.iter().filter(|check| !check.passes);
     found.chain(failed.map(|check| format!("check {} p {:.1e}", check.name, check.p_value))).collect()
 }
@@ -48,7 +51,8 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ("120 ticks a turn", |of| of.ticks_per_rev = 120.0, &[]),
     ("500 ticks, speed ripple", |of| (of.ticks_per_rev, of.ripple) = (500.0, 0.03), &[]),
     ("jitter of 2 ms", |of| of.stamps = Stamps::Jitter(2e-3), &["interval_error"]),
-    ("received 5 ms late", |of| of.stamps = Stamps::Received(5e-3), &["interval_error"]),
+    // Stamps late by 5 ms on average are a clock that is ahead of the instrument's.
+    ("received 5 ms late", |of| of.stamps = Stamps::Received(5e-3), &["interval_error", "truth_latency"]),
     ("counts at 10 Hz", |of| of.odometry_hz = 10.0, &[]),
     ("counts at 20 Hz", |of| of.odometry_hz = 20.0, &[]),
     (
@@ -106,4 +110,18 @@ fn nothing_is_found_where_nothing_is_wrong() {
         (with_findings, all) = (with_findings + wrong, all + robots);
     }
     println!("{with_findings} of {all} nulls have a finding");
+}
+
+/// Writes the datasets of the kinds asked for below the folder YAIR_KEEP, to be looked at.
+#[test]
+fn datasets_are_kept_where_asked() {
+    let Some(folder) = std::env::var_os("YAIR_KEEP").map(std::path::PathBuf::from) else { return };
+    let (robots, first) = robots();
+    for (kind, change, _) in kinds() {
+        for seed in first..first + robots {
+            let mut robot = PlainRobot::ordinary(seed);
+            change(&mut robot);
+            robot.write(&folder.join(kind.replace(' ', "_")).join(seed.to_string()));
+        }
+    }
 }

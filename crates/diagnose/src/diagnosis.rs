@@ -164,6 +164,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         sentence: text::summary(&findings, gain.as_ref()),
         checks: structure.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
         findings: findings.iter().map(text::finding).collect(),
+        candidates: alternatives.iter().map(text::candidate).collect(),
         blind_to,
         sensitivity,
         calibration: CalibrationReport {

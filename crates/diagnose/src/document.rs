@@ -34,6 +34,8 @@ pub struct Document {
     pub checks: Vec<Check>,
     /// What was found.
     pub findings: Vec<Finding>,
+    /// Every effect that was tested, most probable first.
+    pub candidates: Vec<CandidateCause>,
     /// Effects that are not detectable in this data, with their detection limits.
     pub blind_to: Vec<Blind>,
     /// The detection limit of every candidate, found or not.
@@ -55,6 +57,19 @@ pub struct Document {
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended_model_why_null: Option<String>,
+}
+
+/// An effect of the catalogue, tested beside the calibration alone, and why it is no cause of a finding.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CandidateCause {
+    /// The effect.
+    pub id: String,
+    /// Standard normal quantile of its p-value, corrected for the variants tried.
+    pub z: f64,
+    /// Log Bayes factor of the effect over none.
+    pub log_odds: f64,
+    /// Why it is not named; `None` where it is.
+    pub refused: Option<String>,
 }
 
 /// A question to the residuals.

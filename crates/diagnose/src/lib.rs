@@ -48,8 +48,8 @@ mod wald;
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
-    Blind, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm,
-    Value, Verdict,
+    Blind, CandidateCause, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted,
+    Smallest, UnlistedTerm, Value, Verdict,
 };
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};

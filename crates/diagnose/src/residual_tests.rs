@@ -348,17 +348,6 @@ fn covariates(
     // Statistic and p-value of each detectable group.
     let answers = scan_parts_of(&model.fit, &model.candidates, &parts, |own, projected, equations| {
         let (statistic, dimensions) = detectable_statistic(own, projected);
-        if std::env::var("YAIR_DEBUG").is_ok() && statistic > 15.0 {
-            for (k, candidate) in own.iter().enumerate() {
-                eprintln!(
-                    "{candidate:?} g {:.3} I {:.3} z {:.2} share {:?}",
-                    projected.gradient[k],
-                    projected.information[(k, k)],
-                    projected.gradient[k] / projected.information[(k, k)].sqrt(),
-                    projected.share[k]
-                );
-            }
-        }
         let freedom = freedom(&model.fit, equations);
         let p_value = |statistic| p_of_score(statistic, dimensions, equations.count, freedom);
         (dimensions > 0).then(|| Answer {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::alternatives::{Alternative, Status};
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
 use crate::document::{self, Gain, UnlistedTerm, Value, Verdict};
@@ -23,6 +24,18 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         sentence: sentence(finding),
         unlisted_term,
     }
+}
+
+/// A candidate cause as scripts get it.
+pub(crate) fn candidate(alternative: &Alternative) -> document::CandidateCause {
+    let refused = match alternative.status {
+        Status::Found | Status::NotDiscriminated => None,
+        Status::ExplainsLess => Some("explains less than what was found, and is not needed beside that"),
+        Status::NotSignificant => Some("not significant"),
+        Status::NotDetectable => Some("not detectable in these data"),
+    };
+    let Alternative { id, z, log_odds, .. } = alternative;
+    document::CandidateCause { id: id.clone(), z: *z, log_odds: *log_odds, refused: refused.map(ToOwned::to_owned) }
 }
 
 fn listed(values: &BTreeMap<String, Value>) -> String {

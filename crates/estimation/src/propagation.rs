@@ -299,43 +299,45 @@ impl<'f, 'a> Propagator<'f, 'a> {
         let sized = self.model.term_values.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
         for interval in &self.segment.intervals[propagation.intervals.clone()] {
             let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-            let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
+            let of_counts = Increment::from_travel(travel_m, separation_m);
             let before = moved.motion;
+            let mut of_terms = Pose::IDENTITY;
+            if !self.gradients.is_empty() {
+                self.term_gradients(interval, travel_m, run_from_start * before);
+                for (gradient, size) in self.gradients.iter().zip(&self.model.term_values[..sized]) {
+                    of_terms.x_m += size * gradient.x_m;
+                    of_terms.y_m += size * gradient.y_m;
+                    of_terms.theta_rad += size * gradient.theta_rad;
+                }
+            }
+            // One arc of counts and terms together: where terms undo what stamps jitter by, their squares count.
+            let distance_m = of_counts.distance_m + of_terms.x_m;
+            let turn_rad = of_counts.turn_rad + of_terms.theta_rad;
+            let across_m = self.model.across_m(interval);
+            let aside_m = across_m + of_terms.y_m;
             let half_rad = 0.5 * turn_rad;
             let (sin, cos) = sin_cos(before.theta_rad + half_rad);
             let chord = sinc(half_rad);
-            // In the frame of the step's middle; a turn acts on half of the distance.
-            let middle = |g: &Pose, by_turn: &Vector3<f64>| {
-                Vector3::new(cos * g.x_m - sin * g.y_m, sin * g.x_m + cos * g.y_m, 0.0) + by_turn * g.theta_rad
-            };
-            let across_m = self.model.across_m(interval);
-            let mut step = Vector3::new(
-                distance_m * chord * cos - across_m * sin,
-                distance_m * chord * sin + across_m * cos,
+            let step = Vector3::new(
+                distance_m * chord * cos - aside_m * sin,
+                distance_m * chord * sin + aside_m * cos,
                 turn_rad,
             );
             let curvature = sinc_derivative(half_rad);
             let by_turn = Vector3::new(
-                0.5 * distance_m * (curvature * cos - chord * sin),
-                0.5 * distance_m * (curvature * sin + chord * cos),
+                0.5 * (distance_m * (curvature * cos - chord * sin) - aside_m * cos),
+                0.5 * (distance_m * (curvature * sin + chord * cos) - aside_m * sin),
                 1.0,
             );
             let along = Vector3::new(chord * cos, chord * sin, 0.0);
             let per_m = 1.0 / separation_m;
             // Across it is in proportion to either wheel, and inversely to the separation.
             let across = Vector3::new(-across_m * sin, across_m * cos, 0.0);
-            let by_turn = by_turn - Vector3::new(across_m * cos, across_m * sin, 0.0) * 0.5;
             let steps = [
                 along * (0.5 * travel_m.left) - by_turn * (travel_m.left * per_m) + across,
                 along * (0.5 * travel_m.right) + by_turn * (travel_m.right * per_m) + across,
-                -by_turn * turn_rad - across,
+                -by_turn * of_counts.turn_rad - across,
             ];
-            if !self.gradients.is_empty() {
-                self.term_gradients(interval, travel_m, run_from_start * before);
-                for (gradient, size) in self.gradients.iter().zip(&self.model.term_values[..sized]) {
-                    step += *size * middle(gradient, &by_turn);
-                }
-            }
             for (by, of_step) in moved.by_geometry.iter_mut().zip(steps) {
                 *by = turned(*by, step) + of_step;
             }
@@ -350,11 +352,11 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 .zip(&mut self.propagation_by_terms.y)
                 .zip(&mut self.propagation_by_terms.theta);
             for (((x, y), theta), gradient) in propagations.zip(&self.gradients) {
-                *x += cos * gradient.x_m - sin * gradient.y_m + by_turn.x * gradient.theta_rad;
-                *y += sin * gradient.x_m + cos * gradient.y_m + by_turn.y * gradient.theta_rad;
+                *x += chord * cos * gradient.x_m - sin * gradient.y_m + by_turn.x * gradient.theta_rad;
+                *y += chord * sin * gradient.x_m + cos * gradient.y_m + by_turn.y * gradient.theta_rad;
                 *theta += gradient.theta_rad;
             }
-            self.session_m += distance_m.abs();
+            self.session_m += of_counts.distance_m.abs();
             self.wheel_rad = self.wheel_rad.zip_with(interval.wheel_rad, |angle, rad| angle + rad);
         }
         let end = Vector3::new(moved.motion.x_m, moved.motion.y_m, 0.0);

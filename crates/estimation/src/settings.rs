@@ -151,6 +151,10 @@ pub(crate) const QUANTUM_TOLERANCE: f64 = 3e-6;
 /// Budgeted: 200 000 counts a turn; on a wheel of 80 mm, 2.5 µm.
 pub(crate) const MIN_QUANTUM_RAD: f64 = 3e-5;
 
+/// What stamps jitter by, as a share of a row, up to which rates go by them.
+/// Budgeted: a rate over three rows is then off by 2 %.
+pub(crate) const MAX_EXACT_JITTER: f64 = 0.05;
+
 /// Steps that must be there before angles are taken for counts.
 /// Budgeted: chance does not put 98 of 100 on a grid.
 pub(crate) const MIN_GRID_STEPS: usize = 100;

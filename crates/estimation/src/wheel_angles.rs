@@ -94,8 +94,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         };
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
-        let rates = WheelRates::of(&odometry.t_s, &turn_rad, quantum_rad, drive, continuous);
         let late_s = if continuous { lateness_s(&odometry.t_s) } else { vec![0.0; odometry.t_s.len()] };
+        let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })
     }
 

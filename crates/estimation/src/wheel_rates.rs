@@ -10,8 +10,8 @@
 use kinematics::Wheels;
 
 use crate::settings::{
-    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S, MIN_GRID_FRACTION, MIN_GRID_STEPS,
-    MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
+    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S, MIN_GRID_FRACTION,
+    MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
 };
 
 /// Rates at the rows of a run.
@@ -32,16 +32,27 @@ pub(crate) struct WheelRates {
 }
 
 impl WheelRates {
-    /// The rates of a run. `quantum_rad` is what a count stands for, where counts were recorded.
+    /// The rates of a run, whose stamps are so late against a regular beat. `quantum_rad` is what a count stands for,
+    /// where counts were recorded.
     pub(crate) fn of(
-        t_s: &[f64],
+        (t_s, late_s): (&[f64], &[f64]),
         turn_rad: &Wheels<Vec<f64>>,
         quantum_rad: Wheels<f64>,
         (separation_m, m_per_rad): (f64, Wheels<f64>),
         continuous: bool,
     ) -> Self {
-        let pieces = pieces(t_s, continuous);
         let jitter_s = stamp_jitter_s(t_s);
+        let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
+        // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due, and is
+        // off by no more than the stamps, one way or the other.
+        let due_s: Vec<f64>;
+        let t_s = if jitter_s > MAX_EXACT_JITTER * row_s {
+            due_s = t_s.iter().zip(late_s).map(|(t_s, late_s)| t_s - late_s).collect();
+            &due_s
+        } else {
+            t_s
+        };
+        let pieces = pieces(t_s, continuous);
         let stretch_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
         let m_per_rad = [m_per_rad.left, m_per_rad.right];
         let turns = [&turn_rad.left, &turn_rad.right];
@@ -145,7 +156,7 @@ fn is_below_signal(rates: &[Vec<f64>; 2], noise: [f64; 2], separation_m: f64, m_
 }
 
 /// Slope of a local regression at each row, over as many rows before as after, up to `half`, and none beyond
-/// the piece of the log; at the piece's ends, the slope of its first and last interval.
+/// the piece of the log; at the piece's ends, over as many rows as are to one side.
 fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half: usize) -> Vec<f64> {
     let mut slopes = vec![0.0; t_s.len()];
     for piece in pieces {
@@ -155,9 +166,9 @@ fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half
             let rows = if own > 0 {
                 row - own..row + own + 1
             } else if row == piece.start {
-                row..(row + 2).min(piece.end)
+                row..(row + half + 1).min(piece.end)
             } else {
-                row - 1..row + 1
+                (row - half).max(piece.start)..row + 1
             };
             slopes[row] = slope(&t_s[rows.clone()], &turn_rad[rows]);
         }
@@ -252,16 +263,16 @@ mod tests {
 
     fn rates(quantum_rad: f64) -> WheelRates {
         let (t_s, turns) = rows(quantum_rad, 800);
-        WheelRates::of(&t_s, &turns, Wheels::both(quantum_rad), DRIVE, true)
+        WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(quantum_rad), DRIVE, true)
     }
 
     #[test]
     fn a_rate_does_not_have_its_own_rows_rounding() {
         let (t_s, turns) = rows(0.02, 800);
-        let before = WheelRates::of(&t_s, &turns, Wheels::both(0.02), DRIVE, true);
+        let before = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.02), DRIVE, true);
         let mut moved = turns.clone();
         moved.left[400] += 0.02;
-        let after = WheelRates::of(&t_s, &moved, Wheels::both(0.02), DRIVE, true);
+        let after = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &moved, Wheels::both(0.02), DRIVE, true);
         // Rejects causal and one-sided differences.
         assert!((before.at_row(400).left - after.at_row(400).left).abs() < 1e-9);
         // Its neighbours have it alike, with opposite signs.
@@ -289,7 +300,7 @@ mod tests {
         let t_s: Vec<f64> = (0..100).map(|row| 0.01 * f64::from(row)).collect();
         let turns =
             Wheels { left: (0..100).map(|row| if row < 50 { 0.0 } else { 0.01 }).collect(), right: vec![0.0; 100] };
-        let found = WheelRates::of(&t_s, &turns, Wheels::both(0.01), DRIVE, true);
+        let found = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.01), DRIVE, true);
         let stands = |row: usize| found.stands(&t_s, [t_s[row], t_s[row + 1]], row);
         let standing: Vec<usize> = (0..99).filter(|row| stands(*row)).collect();
         // Row 49's interval has the count. Rejects a standstill up to the count itself.
@@ -300,17 +311,17 @@ mod tests {
     fn gaps_and_ends_are_no_part_of_a_window() {
         let (mut t_s, turns) = rows(0.0, 100);
         t_s[50..].iter_mut().for_each(|t_s| *t_s += 0.5);
-        let found = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, true);
+        let found = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.0), DRIVE, true);
         let joined = |row: usize| found.are_joined(&t_s, row);
         assert!(joined(48) && !joined(49) && joined(50));
         let own = |row: usize| (turns.left[row + 1] - turns.left[row]) / 0.01;
         assert!((found.at_row(49).left - own(48)).abs() < 1e-9 && (found.at_row(50).left - own(50)).abs() < 1e-9);
         assert!((found.at_row(0).left - own(0)).abs() < 1e-9 && (found.at_row(99).left - own(98)).abs() < 1e-9);
         // In a log with gaps every row is alone.
-        let gaps = WheelRates::of(&t_s, &turns, Wheels::both(0.0), DRIVE, false);
+        let gaps = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.0), DRIVE, false);
         assert!((0..99).all(|row| !gaps.are_joined(&t_s, row)));
         let slow_s: Vec<f64> = (0..100).map(f64::from).collect();
-        let slow = WheelRates::of(&slow_s, &turns, Wheels::both(0.0), DRIVE, true);
+        let slow = WheelRates::of((&slow_s, &[0.0; 100]), &turns, Wheels::both(0.0), DRIVE, true);
         assert!((0..99).all(|row| !slow.are_joined(&slow_s, row)));
     }
 
