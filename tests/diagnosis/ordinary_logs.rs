@@ -125,3 +125,43 @@ fn datasets_are_kept_where_asked() {
         }
     }
 }
+
+/// What is wrong with a robot or its log, and the name that is right.
+const FAULTS: &[(&str, Change, &str)] = &[
+    ("an eccentric wheel", |of| of.eccentricity = 3e-3, "wheel_eccentricity"),
+    ("an eccentric wheel, one long log", |of| (of.eccentricity, of.joined) = (3e-3, true), "wheel_eccentricity"),
+    (
+        "an eccentric wheel, 500 ticks a turn",
+        |of| (of.eccentricity, of.ticks_per_rev) = (3e-3, 500.0),
+        "wheel_eccentricity",
+    ),
+    ("truth 50 ms late", |of| of.latency_s = 0.05, "truth_latency"),
+    ("truth 50 ms late, one long log", |of| (of.latency_s, of.joined) = (0.05, true), "truth_latency"),
+    ("truth 100 ms late, 500 ticks a turn", |of| (of.latency_s, of.ticks_per_rev) = (0.1, 500.0), "truth_latency"),
+];
+
+#[test]
+fn what_is_wrong_is_named_and_nothing_else() {
+    let (robots, first) = robots();
+    let of_kind = std::env::var("YAIR_KIND").unwrap_or_default();
+    let mut complaints = Vec::new();
+    for (fault, change, id) in FAULTS.iter().filter(|(fault, ..)| fault.contains(&of_kind)) {
+        let of = |seed: u64| {
+            let mut robot = PlainRobot::ordinary(seed);
+            change(&mut robot);
+            (seed, diagnosed(&robot))
+        };
+        let found: Vec<_> = (first..first + robots).into_par_iter().map(of).collect();
+        for (seed, document) in &found {
+            let is_right = document
+                .as_ref()
+                .is_ok_and(|document| matches!(&document.findings[..], [finding] if finding.names[0] == *id));
+            let shown = document.as_ref().map_or_else(|error| vec![error.clone()], shown);
+            println!("{} {fault}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
+            if !is_right {
+                complaints.push(format!("{fault}, seed {seed}"));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{complaints:#?}");
+}

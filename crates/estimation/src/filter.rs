@@ -215,6 +215,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
             return;
         };
+        self.propagator.skip(0..first.intervals.start);
         match self.segment.start {
             Start::MeasuredPose => self.start_at((0, first.from), first.intervals.start, free_heading_rad),
             Start::Origin => {

@@ -364,6 +364,14 @@ impl<'f, 'a> Propagator<'f, 'a> {
         moved
     }
 
+    /// Goes over intervals before the first measurement that is taken: wheels turn and terms remember, as where a run
+    /// is cut into blocks or its measurements are thinned.
+    pub(crate) fn skip(&mut self, intervals: Range<usize>) {
+        if !matches!(self.propagations, PropagationSource::Cached(..)) {
+            let _ = self.dead_reckon(Pose::IDENTITY, intervals);
+        }
+    }
+
     /// The pose of the drive's centre after some intervals, by exact arcs of counts and terms together;
     /// without derivatives.
     pub(crate) fn dead_reckon(&mut self, mut pose: Pose, intervals: Range<usize>) -> Pose {

@@ -163,12 +163,15 @@ fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half
         let last = piece.end - 1;
         for row in piece.clone() {
             let own = half.min(row - piece.start).min(last - row);
-            let rows = if own > 0 {
+            let rows = if piece.len() == 1 {
+                // Alone between two gaps.
+                row.saturating_sub(1)..(row + 2).min(t_s.len())
+            } else if own > 0 {
                 row - own..row + own + 1
             } else if row == piece.start {
                 row..(row + half + 1).min(piece.end)
             } else {
-                (row - half).max(piece.start)..row + 1
+                row.saturating_sub(half).max(piece.start)..row + 1
             };
             slopes[row] = slope(&t_s[rows.clone()], &turn_rad[rows]);
         }

@@ -325,6 +325,50 @@ fn cached_propagations_follow_the_model_to_first_order() {
     assert!(off(1e-3) < 1e-4, "{}", off(1e-3));
 }
 
+/// Adds distance by the phase of the left wheel.
+#[derive(Clone)]
+struct PhaseTerm;
+
+impl ModelTerm for PhaseTerm {
+    fn parameters(&self) -> &'static [TermParameter] {
+        const OFF: TermParameter = TermParameter { name: "distance_m", unit: "m", prior_sigma: 1.0 };
+        &[OFF]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        gradient[0] = Pose::new((0.4 * interval.wheel_rad.left).cos(), 0.0, 0.0);
+    }
+}
+
+/// A block in the middle of a run says what a log says that begins there, whose counters do not begin anew.
+#[test]
+fn a_block_of_a_run_knows_the_phases_of_its_wheels() {
+    let whole = dataset_of(1, true);
+    let mut second = whole.clone();
+    let run = &mut second.runs[0];
+    run.odometry.t_s.drain(..6);
+    let WheelLog::Angles(angles) = &mut run.odometry.wheels else { unreachable!("the helper logs angles") };
+    angles.left.drain(..6);
+    angles.right.drain(..6);
+    run.truth.retain(|sample| sample.t_s >= 6.0);
+    let model = Model { latency_s: 0.0, ..MODEL };
+    let of = |dataset: &Dataset, blocks: usize| {
+        let session = [dataset.session()];
+        let fit = ModelFit::from_parameters(model.clone(), NOISE, &session);
+        let mut fit = fit;
+        fit.solution.model.term_values = vec![0.0];
+        fit.in_blocks(&mut [Box::new(PhaseTerm)], blocks)
+    };
+    let (blocks, alone) = (of(&whole, 2), of(&second, 1));
+    // The products of the phase with all but the latency, which goes by rates on both sides of the cut: to rounding.
+    // Rejects phases that begin with the run's in each block.
+    let phase = Column::Term(0).index();
+    for column in (0..=phase).filter(|column| *column != Column::Latency.index()) {
+        let [whole, cut] = [&blocks[1], &alone[0]].map(|of| of.information[(phase, column)]);
+        assert!((whole / cut - 1.0).abs() < 1e-9, "{column}: {whole} {cut}");
+    }
+}
+
 #[test]
 fn dead_reckoning_to_every_measurement_ends_where_a_run_cut_there_ends() {
     let dataset = dataset_of(1, true);
