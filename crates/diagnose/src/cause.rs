@@ -47,6 +47,8 @@ pub(crate) enum Basis {
     OtherClock(f64),
     /// Calibrated wheels are so many times as large as nominal ones.
     WheelFactor(f64),
+    /// The clock of the instrument is off by so many seconds: of all runs, or of these.
+    ClockOffset(f64),
     /// A fault of the records, in words.
     RecordFault(String),
     /// So many isolated errors of the instrument among so many measurements.

@@ -11,6 +11,7 @@ use crate::alternatives::{Alternative, alternatives};
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, mean_terms};
 use crate::check::TestResult;
+use crate::clock_offsets::clock_offsets;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
 use crate::findings::{StageResults, findings};
@@ -105,6 +106,9 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
+    let clocks = clock_offsets(datasets);
+    let (datasets, clocks) =
+        clocks.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.offsets[..]));
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
     let outlying = as_recorded.as_ref().is_ok_and(|base| {
@@ -145,6 +149,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         log: log.as_ref(),
         spans: spans.as_ref(),
         faults: &faults,
+        clocks,
         uncorrelated,
         without: &options.without,
     });

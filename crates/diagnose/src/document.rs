@@ -104,6 +104,8 @@ pub struct Finding {
     pub sentence: String,
     /// The sparse term, when no catalogued effect fits.
     pub unlisted_term: Option<UnlistedTerm>,
+    /// Ids of the runs that it concerns; `None` for all.
+    pub runs: Option<Vec<String>>,
 }
 
 /// A size.

@@ -9,6 +9,7 @@ use estimation::{ModelFit, NoiseComponent};
 use crate::candidate::Candidate;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
+use crate::clock_offsets::ClockOffset;
 use crate::document::{UnlistedTerm, Value};
 use crate::model_comparison::relative_odds;
 use crate::record_faults::Fault;
@@ -21,7 +22,7 @@ use crate::settings::findings::{
 use crate::settings::levels::{
     LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
 };
-use crate::statistics::{sidak, z_of_p};
+use crate::statistics::{p_of_chi_square, sidak, z_of_p};
 use crate::wald::Test;
 
 /// Something that the calibrated model gets wrong.
@@ -39,6 +40,8 @@ pub(crate) struct Finding {
     pub(crate) parameters: BTreeMap<String, Value>,
     pub(crate) basis: Basis,
     pub(crate) doubts: Vec<Doubt>,
+    /// Ids of the runs that it concerns; `None` for all.
+    pub(crate) runs: Option<Vec<String>>,
 }
 
 impl Finding {
@@ -135,6 +138,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
         parameters: parameters(candidate, &test.estimates),
         basis: Basis::Mean,
         doubts: Vec::new(),
+        runs: None,
     }
 }
 
@@ -158,6 +162,7 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
         parameters: BTreeMap::new(),
         basis: Basis::Products(trials),
         doubts: Vec::new(),
+        runs: None,
     })
 }
 
@@ -253,6 +258,33 @@ pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding
     Some(of_causes(vec![cause], 0.0, BTreeMap::from([(size.to_owned(), value)]), Basis::WheelFactor(factor)))
 }
 
+/// The finding of a clock that is far off.
+pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
+    let parameter_of = |id: &'static str| effects::description(id)?.clock_offset.map(|name| (id, name));
+    let (cause, parameters) = match CATALOGUE.iter().copied().find_map(parameter_of) {
+        Some((id, name)) if !without.iter().any(|out| out == id) => {
+            let value = Value { value: offset.offset_s, sigma: Some(offset.sigma_s), unit: "s".to_owned() };
+            (Cause::Effect(id), BTreeMap::from([(name.to_owned(), value)]))
+        }
+        _ => (Cause::Unknown, BTreeMap::new()),
+    };
+    let basis = Basis::ClockOffset(offset.offset_s);
+    let found = of_causes(vec![cause], p_of_chi_square(2.0 * offset.gain, 1.0), parameters, basis);
+    Finding { runs: offset.runs.clone(), ..found }
+}
+
+/// Adds what was taken off the clock before the fit to what was found of it after.
+pub(crate) fn add_offset(findings: &mut [Finding], of_clock: &Finding) -> bool {
+    let same = |finding: &&mut Finding| finding.runs.is_none() && finding.first() == of_clock.first();
+    let Some(found) = findings.iter_mut().find(same) else { return false };
+    for (name, value) in &of_clock.parameters {
+        if let Some(own) = found.parameters.get_mut(name) {
+            own.value += value.value;
+        }
+    }
+    true
+}
+
 /// The finding of a gross fault.
 pub(crate) fn of_fault(fault: &Fault) -> Finding {
     let value = |(name, value): &(&'static str, f64)| {
@@ -267,6 +299,7 @@ pub(crate) fn of_fault(fault: &Fault) -> Finding {
         parameters: fault.values.iter().map(value).collect(),
         basis: Basis::RecordFault(fault.sentence.clone()),
         doubts: Vec::new(),
+        runs: None,
     }
 }
 
@@ -296,7 +329,7 @@ pub(crate) fn of_causes(
         causes.push(Cause::Unknown);
     }
     let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) / causes.len() as f64 };
-    Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new() }
+    Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new(), runs: None }
 }
 
 /// A noise effect by the log likelihood of each candidate cause. The likeliest comes first. Those that
@@ -340,6 +373,7 @@ mod tests {
             parameters: BTreeMap::from([("share".to_owned(), value)]),
             basis: Basis::Mean,
             doubts: Vec::new(),
+            runs: None,
         }
     }
 

@@ -3,6 +3,7 @@
 
 use crate::cause::Doubt;
 use crate::check::TestResult;
+use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
@@ -29,6 +30,7 @@ pub(crate) struct StageResults<'e, 'a> {
     pub(crate) log: Option<&'e TestResult>,
     pub(crate) spans: Option<&'e TestResult>,
     pub(crate) faults: &'e [&'e Fault],
+    pub(crate) clocks: &'e [ClockOffset],
     /// The odometry is uncorrelated with what the instrument measured.
     pub(crate) uncorrelated: bool,
     /// Effects that are not to be named.
@@ -47,9 +49,10 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 10] = [
+    let stages: [Stage; 11] = [
         record_faults,
         mean_effects,
+        clocks,
         sparse_terms,
         noise_effects,
         faults_of_the_log,
@@ -71,6 +74,17 @@ fn mean_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> V
     findings.extend(finding::of_search(&results.structure.found));
     if let Some(relative_odds) = results.structure.competing {
         finding::beside_unlisted(&mut findings, relative_odds);
+    }
+    findings
+}
+
+/// Clocks that were set right before the fit, or whose runs were left out.
+fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    for offset in results.clocks {
+        let found = finding::of_clock(offset, results.without);
+        if offset.runs.is_some() || !finding::add_offset(&mut findings, &found) {
+            findings.push(found);
+        }
     }
     findings
 }

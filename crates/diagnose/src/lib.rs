@@ -12,6 +12,7 @@ mod augmented_model;
 mod candidate;
 mod cause;
 mod check;
+mod clock_offsets;
 mod covariates;
 mod detectability;
 mod diagnosis;

@@ -23,6 +23,7 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         parameters: finding.parameters.clone(),
         sentence: sentence(finding),
         unlisted_term,
+        runs: finding.runs.clone(),
     }
 }
 
@@ -122,6 +123,18 @@ fn basis(finding: &Finding) -> String {
         Basis::WheelFactor(factor) => format!(
             "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
         ),
+        Basis::ClockOffset(offset_s) => {
+            let whose = match finding.runs.as_deref() {
+                None => "all runs".to_owned(),
+                Some([run]) => format!("run {run} alone, which is left out of everything else"),
+                Some(runs) => format!("runs {}, which are left out of everything else", runs.join(", ")),
+            };
+            format!(
+                "the instrument's poses are of {:.0} ms {} their stamps, in {whose}",
+                1e3 * offset_s.abs(),
+                if *offset_s > 0.0 { "before" } else { "after" }
+            )
+        }
         Basis::RecordFault(sentence) => sentence.clone(),
         Basis::IsolatedErrors(isolated, of) => {
             format!("{isolated} of {of} measurements are isolated outliers: the next ones agree with odometry again")

@@ -25,6 +25,8 @@ pub struct Description {
     /// Its mean term depends on single rows of the log, not only on what the wheels did between two
     /// measurements.
     pub goes_by_rows: bool,
+    /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
+    pub clock_offset: Option<&'static str>,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
 }
@@ -39,6 +41,7 @@ impl Description {
             isolated_error: None,
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
+            clock_offset: None,
             benchmark: Benchmark::OF_MEAN,
         }
     }

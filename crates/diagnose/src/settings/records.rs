@@ -5,6 +5,51 @@
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_FAULT_LOG_LIKELIHOOD_GAIN: f64 = 20.0;
 
+/// Seconds. Offsets of clocks are sought up to this.
+/// Convention: an instrument that is later than a second is another recording.
+pub(crate) const MAX_CLOCK_OFFSET_S: f64 = 1.0;
+
+/// Seconds. Step of the offsets that are tried.
+/// Budgeted: a parabola through three of them finds the best to a hundredth of a second.
+pub(crate) const CLOCK_STEP_S: f64 = 0.04;
+
+/// Seconds. A run's own clock is off by this at the least.
+/// Budgeted: smaller offsets leave the fit sound, and compete with effects that resemble them.
+pub(crate) const MIN_CLOCK_OFFSET_S: f64 = 0.08;
+
+/// Seconds. An offset of all runs that is taken off before the fit.
+/// Budgeted: a tenth of a second and less is estimated with everything else.
+pub(crate) const MIN_COMMON_CLOCK_OFFSET_S: f64 = 0.15;
+
+/// Standard deviations. A run's own clock is off by as many of its estimate at the least.
+/// Budgeted: errors of rounded turns are alike, and the estimate is less certain than it says.
+pub(crate) const MIN_CLOCK_SIGMAS: f64 = 6.0;
+
+/// Natural logarithm. Likelihood that an offset gains at the least.
+/// Convention: as for corrections of the records.
+pub(crate) const MIN_CLOCK_GAIN: f64 = 20.0;
+
+/// Fraction. Share of the turns and distances between poses that counts leave unexplained where their clock is
+/// right; of counts that leave more, nothing is said.
+/// Budgeted: swapped wheels leave four times what there is.
+pub(crate) const MAX_CLOCK_UNEXPLAINED: f64 = 0.5;
+
+/// Radians. Turns between poses below this, root mean square, are noise of headings.
+/// Budgeted: ten times the noise of an ordinary instrument.
+pub(crate) const MIN_CLOCK_TURN_RAD: f64 = 0.01;
+
+/// Number. Fewer runs do not say which of them is the odd one.
+/// Derived: of two, either is.
+pub(crate) const MIN_CLOCK_RUNS: usize = 4;
+
+/// Number. Fewer pairs of poses do not say an offset.
+/// Budgeted: three seconds at ten a second.
+pub(crate) const MIN_CLOCK_PAIRS: usize = 30;
+
+/// Number. Of more pairs of poses in a run, so many are taken.
+/// Budgeted: a run takes a few milliseconds.
+pub(crate) const MAX_CLOCK_PAIRS: usize = 600;
+
 /// Relative. Prior standard deviation of the wheels' sizes.
 /// Convention: wheels are known to a few per cent.
 pub(crate) const WHEEL_PRIOR_SIGMA: f64 = 0.05;

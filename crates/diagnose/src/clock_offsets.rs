@@ -1,0 +1,270 @@
+//! Clocks of instrument and robot that are far apart: of all runs, or of one among many.
+//!
+//! Before anything is fitted: turns and distances between successive poses, against those of the counts between
+//! the same instants a time τ earlier. With n pairs and sums of squares S_θ and S_d of the differences, the profile
+//! log likelihood is −n/2 (ln S_θ + ln S_d); it needs no start pose, no path and no more than nominal wheels. An
+//! offset of all runs is taken off before the fit. A run with an offset of its own is left out: it would be
+//! explained by whatever term it pays best.
+//! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
+
+use dataset::{Dataset, RunView};
+use estimation::WheelAngleInterpolator;
+use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
+
+use crate::settings::records::{
+    CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
+    MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_COMMON_CLOCK_OFFSET_S,
+};
+
+/// An offset of the instrument's clock: its poses are of so long before their stamps.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ClockOffset {
+    /// Ids of the runs, where it is not of all.
+    pub(crate) runs: Option<Vec<String>>,
+    pub(crate) offset_s: f64,
+    pub(crate) sigma_s: f64,
+    /// Log likelihood over that without it.
+    pub(crate) gain: f64,
+}
+
+/// What was found, and the records without it.
+pub(crate) struct Clocks {
+    pub(crate) offsets: Vec<ClockOffset>,
+    pub(crate) records: Vec<Dataset>,
+}
+
+/// A run's own offset.
+struct OfRun {
+    run: (usize, usize),
+    profile: Profile,
+}
+
+/// Looks for offsets; `None` where there are none.
+pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
+    let mut all = Vec::new();
+    for (session, dataset) in datasets.iter().enumerate() {
+        let geometry = dataset.robot.geometry().ok()?;
+        let view = dataset.session();
+        for (position, run) in view.runs.iter().enumerate() {
+            let profile = Profile::of(run, dataset, &geometry);
+            all.extend(profile.map(|profile| OfRun { run: (session, position), profile }));
+        }
+    }
+    let mut offsets_s: Vec<f64> = all.iter().map(|of| of.profile.offset_s).collect();
+    if offsets_s.is_empty() {
+        return None;
+    }
+    offsets_s.sort_by(f64::total_cmp);
+    let middle_s = offsets_s[offsets_s.len() / 2];
+    let id = |(session, position): (usize, usize)| datasets[session].runs[position].info.id.clone();
+    let is_odd = |of: &&OfRun| {
+        let apart_s = (of.profile.offset_s - middle_s).abs();
+        all.len() >= MIN_CLOCK_RUNS
+            && apart_s >= MIN_CLOCK_OFFSET_S.max(MIN_CLOCK_SIGMAS * of.profile.sigma_s)
+            && of.profile.gain_over(middle_s) > MIN_CLOCK_GAIN
+    };
+    let odd: Vec<&OfRun> = all.iter().filter(is_odd).collect();
+    // Where many runs have clocks of their own, none is the odd one.
+    let odd = if 2 * odd.len() < all.len() { odd } else { Vec::new() };
+    let own = |of: &&OfRun| ClockOffset {
+        runs: Some(vec![id(of.run)]),
+        offset_s: of.profile.offset_s,
+        sigma_s: of.profile.sigma_s,
+        gain: of.profile.gain_over(middle_s),
+    };
+    let mut offsets: Vec<ClockOffset> = odd.iter().map(own).collect();
+    let gain: f64 = all.iter().map(|of| of.profile.gain_over(0.0) - of.profile.gain_over(middle_s)).sum();
+    let is_common = middle_s.abs() >= MIN_COMMON_CLOCK_OFFSET_S && gain > MIN_CLOCK_GAIN;
+    if is_common {
+        let information: f64 = all.iter().map(|of| of.profile.sigma_s.powi(-2)).sum();
+        offsets.push(ClockOffset { runs: None, offset_s: middle_s, sigma_s: information.sqrt().recip(), gain });
+    }
+    if offsets.is_empty() {
+        return None;
+    }
+    let mut records = datasets.to_vec();
+    if is_common {
+        let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
+        runs.flat_map(|run| &mut run.truth).for_each(|sample| sample.t_s -= middle_s);
+    }
+    for of in odd.iter().rev() {
+        records[of.run.0].runs.remove(of.run.1);
+    }
+    Some(Clocks { offsets, records })
+}
+
+/// Time, place and heading of a measured pose.
+type Pose4 = (f64, f64, f64, f64);
+
+/// The profile log likelihood of a run's offset, negative, on a grid.
+struct Profile {
+    costs: Vec<f64>,
+    offset_s: f64,
+    sigma_s: f64,
+}
+
+impl Profile {
+    /// Of a run that measures poses often enough; `None` of others, and of one that hardly moves.
+    fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
+        let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
+        let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
+        let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
+        let within = |t_s: f64| t_s - MAX_CLOCK_OFFSET_S >= first_s && t_s + MAX_CLOCK_OFFSET_S <= last_s;
+        let poses: Vec<Pose4> = truth
+            .iter()
+            .filter(|sample| within(sample.t_s))
+            .filter_map(|sample| Some((sample.t_s, sample.x_m, sample.y_m, sample.theta_rad()?)))
+            .collect();
+        if !run.info().continuous || poses.len() <= MIN_CLOCK_PAIRS {
+            return None;
+        }
+        let stride = poses.len().div_ceil(MAX_CLOCK_PAIRS);
+        let pairs = || poses.windows(2).step_by(stride).map(|pair| (pair[0], pair[1]));
+        let steps = (MAX_CLOCK_OFFSET_S / CLOCK_STEP_S).round() as i32;
+        // Mean squares of what counts leave of turns and distances.
+        let left_at = |offset_s: f64| {
+            let (mut turns, mut distances, mut count) = (0.0, 0.0, 0.0);
+            for (a, b) in pairs() {
+                let turned = |t_s: f64| turns_at(rows_s, track.turns(), t_s - offset_s);
+                let wheels =
+                    turned(b.0).zip_with(turned(a.0), |b, a| b - a).zip_with(geometry.m_per_rad(), |rad, r| rad * r);
+                let turn_rad = (wheels.right - wheels.left) / geometry.wheel_separation_m();
+                let distance_m = 0.5 * (wheels.left + wheels.right);
+                turns += wrap_to_pi(b.3 - a.3 - turn_rad).powi(2);
+                distances += ((b.1 - a.1).hypot(b.2 - a.2) - distance_m.abs()).powi(2);
+                count += 1.0;
+            }
+            (turns / count, distances / count, count)
+        };
+        let cost = |step: i32| {
+            let (turns, distances, count) = left_at(CLOCK_STEP_S * f64::from(step));
+            // Below a tenth of a milliradian and of a millimetre a pair, nothing distinguishes offsets.
+            0.5 * count * ((turns + 1e-8).ln() + (distances + 1e-8).ln())
+        };
+        let costs: Vec<f64> = (-steps..=steps).map(cost).collect();
+        let best = (1..costs.len() - 1).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+        let curvature = costs[best - 1] - 2.0 * costs[best] + costs[best + 1];
+        let slope = 0.5 * (costs[best + 1] - costs[best - 1]);
+        if curvature <= 0.0 {
+            return None;
+        }
+        let at = f64::from(i32::try_from(best).ok()? - steps) - slope / curvature;
+        let mean = |of: fn(&(Pose4, Pose4)) -> f64| {
+            let (sum, count) = pairs().fold((0.0, 0.0_f64), |(sum, count), pair| (sum + of(&pair), count + 1.0));
+            sum / count
+        };
+        let turned = mean(|(a, b)| wrap_to_pi(b.3 - a.3).powi(2));
+        let went = mean(|(a, b)| (b.1 - a.1).powi(2) + (b.2 - a.2).powi(2));
+        let (turns_left, distances_left, _) = left_at(CLOCK_STEP_S * at);
+        let explains = if turned > MIN_CLOCK_TURN_RAD * MIN_CLOCK_TURN_RAD {
+            turns_left < MAX_CLOCK_UNEXPLAINED * turned
+        } else {
+            distances_left < MAX_CLOCK_UNEXPLAINED * went
+        };
+        if !explains {
+            return None;
+        }
+        Some(Self { costs, offset_s: CLOCK_STEP_S * at, sigma_s: CLOCK_STEP_S / curvature.sqrt() })
+    }
+
+    /// Log likelihood of its offset over that of another.
+    fn gain_over(&self, offset_s: f64) -> f64 {
+        let lowest = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
+        let middle = (self.costs.len() / 2) as f64;
+        let at = (offset_s / CLOCK_STEP_S + middle).clamp(0.0, 2.0 * middle);
+        let (below, share) = (at.floor() as usize, at.fract());
+        let above = (below + 1).min(self.costs.len() - 1);
+        self.costs[below] + share * (self.costs[above] - self.costs[below]) - lowest
+    }
+}
+
+/// Turns of the wheels at an instant of the log, between rows in proportion.
+fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wheels<f64> {
+    let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
+    let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
+    turns.as_ref().map(|turns| turns[row] + share * (turns[row + 1] - turns[row]))
+}
+
+#[cfg(test)]
+mod tests {
+    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use kinematics::{Increment, Pose};
+
+    use super::*;
+
+    /// Runs of twenty seconds that speed up, slow down and turn, whose poses are of so long before their stamps.
+    fn driven(offsets_s: &[f64]) -> Dataset {
+        let wheels_at =
+            |t_s: f64| Wheels { left: 4.0 * t_s - 2.0 * (0.9 * t_s).cos(), right: 4.0 * t_s + 1.5 * (1.3 * t_s).sin() };
+        let path: Vec<Pose> = (1..=2600)
+            .scan(Pose::IDENTITY, |pose, step| {
+                let [a, b] = [step - 1, step].map(|step| wheels_at(0.01 * f64::from(step)));
+                let travel_m = b.zip_with(a, |b, a| 0.08 * (b - a));
+                *pose = *pose * Increment::from_travel(travel_m, 0.36).arc();
+                Some(*pose)
+            })
+            .collect();
+        let run = |(number, offset_s): (usize, &f64)| {
+            let t_s: Vec<f64> = (0..=1000).map(|row| 0.02 * f64::from(row)).collect();
+            let angles = Wheels {
+                left: t_s.iter().map(|t_s| wheels_at(t_s + 3.0).left).collect(),
+                right: t_s.iter().map(|t_s| wheels_at(t_s + 3.0).right).collect(),
+            };
+            let truth = (0..=200).map(|k| {
+                let stamp_s = 0.1 * f64::from(k);
+                let pose = path[((stamp_s + 3.0 - offset_s) / 0.01).round() as usize - 1];
+                TruthSample::new(stamp_s, pose.x_m, pose.y_m, Some(pose.theta_rad))
+            });
+            Run {
+                info: RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() },
+                odometry: Odometry { t_s: t_s.clone(), wheels: WheelLog::Angles(angles), ..Odometry::default() },
+                truth: truth.collect(),
+                ..Run::default()
+            }
+        };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: 0.36,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: offsets_s.iter().enumerate().map(run).collect(),
+        }
+    }
+
+    #[test]
+    fn a_run_whose_clock_is_off_is_named_and_left_out() {
+        let found = clock_offsets(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]).expect("one is off");
+        let [offset] = &found.offsets[..] else { panic!("one run") };
+        assert_eq!(offset.runs.as_deref(), Some(&["run-2".to_owned()][..]));
+        // Poses are taken at hundredths of a second.
+        assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
+        assert_eq!(found.records[0].runs.len(), 4);
+    }
+
+    #[test]
+    fn a_clock_that_is_off_in_all_runs_is_set_right() {
+        let found = clock_offsets(&[driven(&[-0.4; 4])]).expect("all are off");
+        assert_eq!((found.offsets.len(), found.offsets[0].runs.as_deref()), (1, None));
+        assert!((found.offsets[0].offset_s + 0.4).abs() < 0.01, "{}", found.offsets[0].offset_s);
+        // Rejects a shift the other way: the records are then off by nothing.
+        assert!(clock_offsets(&found.records).is_none());
+        assert!(clock_offsets(&[driven(&[0.05; 4])]).is_none(), "what the fit can estimate");
+        assert!(clock_offsets(&[driven(&[0.0, 0.3])]).is_none(), "of two, either is the odd one");
+    }
+
+    #[test]
+    fn of_counts_that_do_not_follow_the_robot_nothing_is_said() {
+        let mut swapped = driven(&[0.3; 4]);
+        for run in &mut swapped.runs {
+            let WheelLog::Angles(Wheels { left, right }) = &mut run.odometry.wheels else { unreachable!("angles") };
+            std::mem::swap(left, right);
+        }
+        assert!(clock_offsets(&[swapped]).is_none());
+    }
+}
