@@ -21,7 +21,7 @@ use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 
-const NOISES: usize = 4;
+const NOISES: usize = NoiseComponent::ALL.len();
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -107,6 +107,10 @@ pub(crate) const SPEED_CHANGE_WINDOW_S: f64 = 0.5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const SPEED_CHANGE_RATIO: f64 = 0.2;
 
+/// Motion against the direction of travel, metres, that counts as a reversal.
+/// Tuned: by hand; above the counts of a standstill.
+pub(crate) const REVERSAL_M: f64 = 1e-3;
+
 // Outliers.
 
 /// Squared Mahalanobis distance of a measurement's innovation above which it is an outlier.

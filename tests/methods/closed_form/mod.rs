@@ -462,8 +462,8 @@ fn as_optiodom(dataset: &Dataset, twice: bool) -> [f64; 3] {
 }
 
 /// Dividing the mean heading by the number of runs once more leaves a fifth of the correction with five runs
-/// a direction: on the paper's robot a base of
-/// 360.6 mm where 351.47 is right (its wheels are 3.28 % larger than nominal). And a term for unequal wheels in the corner is wrong where they are unequal.
+/// a direction: on the paper's robot a base of 360.6 mm where 351.47 is right (its wheels are 3.28 % larger
+/// than nominal). And a term for unequal wheels in the corner is wrong where they are unequal.
 #[test]
 fn jung_chung_divides_once_and_does_not_couple_the_corner() {
     let protocols = [Schedule::Squares { side_m: 4.0, runs_each_way: 5 }];

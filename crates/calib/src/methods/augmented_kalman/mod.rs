@@ -24,7 +24,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use filter::{AugmentedFilter, PoseInnovation, Settling};
 pub use follow::{Followed, settled_at};
-pub use noise::{NoiseFilter, Variances};
+pub use noise::{NoiseFilter, NoiseSource, Variances};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};

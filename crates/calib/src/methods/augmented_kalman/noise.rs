@@ -12,16 +12,19 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::settings::{MAX_NOISE_FACTOR, MAX_NOISE_STEP, NOISE_PRIOR_MEASUREMENTS};
 
-/// Noise variances, of which there are three: the wheels' (m, variance of travel a metre), the instrument's
-/// position (m²) and heading (rad²).
+/// Noise variances in the order of [`NoiseSource`].
 pub type Variances = Vector3<f64>;
 
-/// The wheels' noise is the first of [`Variances`].
-pub(super) const WHEELS: usize = 0;
-/// The instrument's position is the second.
-pub(super) const POSITION: usize = 1;
-/// The instrument's heading is the third.
-pub(super) const HEADING: usize = 2;
+/// What a noise variance is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// The wheels: variance of travel a metre, m.
+    Wheels,
+    /// The instrument's position, m².
+    Position,
+    /// The instrument's heading, rad².
+    Heading,
+}
 
 /// Estimate of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -298,7 +301,7 @@ mod tests {
     fn what_is_known_stays_and_what_is_absent_goes_to_the_border() {
         let measurements = measurements();
         let found = scored(&measurements, [false, true, false]);
-        assert_eq!(found.variances()[POSITION], 1e-6);
+        assert_eq!(found.variances()[NoiseSource::Position as usize], 1e-6);
         // Innovations without any scatter: every variance ends where its range does, and none is negative.
         let mut filter = guess();
         measurements.iter().for_each(|(_, expected)| filter.measurement(&Vector3::zeros(), expected));
