@@ -214,7 +214,7 @@ impl Covariate {
 
     /// Is it known of a measurement: of the robot's twist and heading then, and of the time?
     #[must_use]
-    pub const fn is_of_a_look(&self) -> bool {
+    pub const fn is_of_a_measurement(&self) -> bool {
         matches!(self, Self::CosHeading | Self::SinHeading | Self::RunTime) || self.is_a_speed()
     }
 

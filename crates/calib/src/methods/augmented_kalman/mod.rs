@@ -158,7 +158,7 @@ impl Method for AugmentedKalman {
     }
 
     fn about(&self) -> &'static str {
-        "any path with straights and turns, seen as poses: a Kalman filter of pose and factors, with its noise estimated"
+        "any path with straights and turns, measured as poses: a Kalman filter of pose and factors, with its noise estimated"
     }
 
     /// Martinelli's robot wandered; straights and spins show all three factors.
