@@ -248,7 +248,7 @@ pub enum CalibError {
         why: String,
     },
     /// A parameter that the method must have is not determined by the runs.
-    #[error("{method}: {} cannot be told from these runs: {why}", parameter.key())]
+    #[error("{method}: {} is not observable in these runs: {why}", parameter.key())]
     Unobservable {
         /// The method.
         method: &'static str,

@@ -2,8 +2,9 @@
 
 use estimation::ModelFit;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
-use crate::augmented_model::{AugmentedModel, cost, count};
+use crate::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
@@ -39,7 +40,18 @@ pub(crate) fn rivals<'a>(
     let close = close_statistic(best);
     let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
-    let mut fits = known.with_each(base, without, index, &best_variants);
+    // Models that each have one of these candidates more, without those that diverge.
+    let mut fit_each = |added: &[Candidate]| {
+        let with = |candidate: &Candidate| {
+            let mut candidates = without.candidates.clone();
+            candidates.insert(index, candidate.clone());
+            known.fit(&candidates).cloned().or_else(|| refit(base, without, candidates))
+        };
+        let models: Vec<AugmentedModel<'a>> = added.par_iter().filter_map(with).collect();
+        models.iter().for_each(|model| known.keep(model));
+        models
+    };
+    let mut fits = fit_each(&best_variants);
     // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
@@ -49,7 +61,7 @@ pub(crate) fn rivals<'a>(
     for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
             contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
-        fits.extend(known.with_each(base, without, index, &next));
+        fits.extend(fit_each(&next));
         contenders.retain(|entry| !can_be(&fits, entry));
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
