@@ -181,7 +181,7 @@ pub(crate) fn search<'a>(
 }
 
 /// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
-/// among the others it is not seen.
+/// among the others it is not detected.
 pub(crate) fn search_ungated<'a>(
     base: &ModelFit<'a>,
     found: &SearchResult<'a>,

@@ -1,7 +1,7 @@
 //! The covariates of terms outside of the catalogue: their names, normalisation and values.
 //!
 //! Both models of [`crate::SparseTerm`] read this one list, and so do scenarios and findings: a name means
-//! the same wherever it stands. How the speeds, the heading or the way come about is each model's own.
+//! the same wherever it stands. How the speeds, the heading or the distance come about is each model's own.
 
 use std::collections::BTreeMap;
 

@@ -365,7 +365,7 @@ pub(crate) const SUBSAMPLE_MEASUREMENTS: usize = 1 << 16;
 pub(crate) const MAX_SUBSAMPLE_ROWS: usize = 1 << 19;
 
 /// Contiguous subsamples that the preliminary fit is made of.
-/// Derived: enough to be held out; more would be too short to be thinned, and to determine lengths.
+/// Derived: enough to be held out; more would be too short to be thinned, and to determine the geometry.
 pub(crate) const SUBSAMPLES: usize = 8;
 
 /// Step of a variance, as a share of it, at which the preliminary fit ends before whiteness is judged.
