@@ -85,7 +85,7 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
         if let Some(ratio) = hidden.ratio {
             let aliases = if hidden.aliases.is_empty() { "none".to_owned() } else { hidden.aliases.join(", ") };
             terminal.say(&format!(
-                "  {ratio:.2} times the detection limit; names that cannot be told from it: {aliases}"
+                "  {ratio:.2} times the detection limit; effects that are not discriminated from it: {aliases}"
             ))?;
         }
     }
@@ -111,7 +111,11 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(planned) = &result.planned {
         let reported: Vec<String> = planned.reported.iter().map(|reported| reported.names.join("|")).collect();
         let reported = if reported.is_empty() { "nothing".to_owned() } else { reported.join(" + ") };
-        let can = if planned.is_resolvable() { "the right name can be told" } else { "nothing tells the right name" };
+        let can = if planned.is_resolvable() {
+            "the right cause can be discriminated"
+        } else {
+            "no experiment discriminates the right cause"
+        };
         terminal.say(&match planned.planned {
             true => format!("after the planned runs: {reported}; by the oracle {can}"),
             false => format!("no planned runs; by the oracle {can}"),

@@ -10,7 +10,7 @@ use crate::diagnosis_page::Page;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
-/// What the calibrated model gets wrong: its name or that it cannot be told, the extended model, and the gain
+/// What the calibrated model gets wrong: the causes that explain it, the extended model, and the gain
 /// on runs that it has not seen.
 #[derive(Args)]
 pub(crate) struct Arguments {

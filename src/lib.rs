@@ -11,7 +11,7 @@
 //! let measured = yair::sim_yair::simulate(&scenario, 1, 0)?.dataset;
 //! let direct = yair::calib::method("direct").expect("a method of the table of contents");
 //! let found = direct.calibrate(&[measured.session()])?;
-//! // The robot believes in 363 mm; the paper's spins find it within a few millimetres.
+//! // The robot has 363 mm; the paper's spins determine them to a few millimetres.
 //! assert!((found.geometry.wheel_separation_m() - 0.363).abs() < 0.005);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

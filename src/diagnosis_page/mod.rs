@@ -45,7 +45,7 @@ impl Page<'_> {
         };
         writeln!(page, "# Diagnosis of {names}\n\n{}\n", words::verdict(self.document))?;
         self.findings(page)?;
-        self.evidence(page, pictures)?;
+        self.residuals(page, pictures)?;
         self.checks(page)?;
         self.alternatives(page)?;
         self.blind(page)?;
@@ -60,7 +60,7 @@ impl Page<'_> {
         writeln!(page, "## What was found\n")?;
         writeln!(
             page,
-            "| finding | names that would do as well | probability of the first | z | what it is |\n| --- | --- | --- | --- | --- |"
+            "| finding | other causes that explain it | probability of the first cause | z | what it is |\n| --- | --- | --- | --- | --- |"
         )?;
         for finding in &self.document.findings {
             let others = if finding.names.len() > 1 { finding.names[1..].join(", ") } else { "–".to_owned() };
@@ -72,7 +72,7 @@ impl Page<'_> {
             let score = gain.log_score_per_observation;
             writeln!(
                 page,
-                "{} runs, or blocks of runs, were held out, each once: a value that a measurement sees there is e^{:.4} times as likely under the extended model (95 %: {:.4} to {:.4}).\n",
+                "Cross-validated over {} runs or blocks of runs, the mean log predictive density of a measured component rises by {:.4} with the extended model (95 %: {:.4} to {:.4}).\n",
                 gain.held_out_runs,
                 score.extended - score.base,
                 score.low,
@@ -84,18 +84,18 @@ impl Page<'_> {
         Ok(())
     }
 
-    fn evidence(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
-        writeln!(page, "## Evidence\n")?;
+    fn residuals(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
+        writeln!(page, "## Residuals\n")?;
         let matter: Vec<&str> = that_matter(self.residuals).iter().map(|against| &against.label[..]).collect();
         if self.document.verdict == Verdict::Consistent {
             writeln!(
                 page,
-                "Residuals of the calibrated model go with nothing that was recorded. The largest accident, {}:\n",
+                "The residuals of the calibrated model depend on no recorded covariate. The largest dependence, within p_value, is on {}:\n",
                 matter.join(" and ")
             )?;
         } else {
-            let extended = if self.document.gain.is_some() { ", and what the extended one does," } else { "" };
-            writeln!(page, "What the calibrated model leaves{extended} against {}:\n", matter.join(", "))?;
+            let extended = if self.document.gain.is_some() { " and of the extended model" } else { "" };
+            writeln!(page, "Residuals of the calibrated{extended} against {}:\n", matter.join(", "))?;
         }
         for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "residuals") {
             writeln!(page, "![{alt}]({stem}.svg)\n")?;
@@ -112,7 +112,7 @@ impl Page<'_> {
     fn checks(&self, page: &mut String) -> std::fmt::Result {
         let checks = &self.document.checks;
         let failed = checks.iter().filter(|check| !check.passes).count();
-        writeln!(page, "## Checks of what is left\n")?;
+        writeln!(page, "## Checks of the residuals\n")?;
         let of = if self.document.gain.is_some() { "extended" } else { "calibrated" };
         writeln!(
             page,
@@ -127,7 +127,7 @@ impl Page<'_> {
                 "| {} | {answer} | {:.2} | {} |",
                 words::question(check),
                 check.statistic,
-                chance(check.p_value)
+                p_value(check.p_value)
             )?;
         }
         writeln!(page)
@@ -144,10 +144,9 @@ impl Page<'_> {
         if !standing.is_empty() {
             writeln!(
                 page,
-                "Each effect alone beside the calibration, before any other was in the model: how far out it stands, and by how much it makes the data less likely than the best \
-                 (logarithms, to second order).\n"
+                "Each effect alone beside the calibration, before any other is in the model: its significance, and its log odds against the best, to second order.\n"
             )?;
-            writeln!(page, "| effect | z | log odds to the best | what became of it |\n| --- | --- | --- | --- |")?;
+            writeln!(page, "| effect | z | log odds against the best | outcome |\n| --- | --- | --- | --- |")?;
             for alternative in standing.iter().take(MAX_ALTERNATIVES) {
                 writeln!(
                     page,
@@ -162,7 +161,7 @@ impl Page<'_> {
         }
         if !others.is_empty() {
             let ids: Vec<String> = others.iter().map(|other| format!("`{}` (z = {:.1})", other.id, other.z)).collect();
-            writeln!(page, "Asked for and not seen: {}.\n", ids.join(", "))?;
+            writeln!(page, "Tested and not significant: {}.\n", ids.join(", "))?;
         }
         Ok(())
     }
@@ -173,7 +172,7 @@ impl Page<'_> {
         if blind.is_empty() {
             writeln!(
                 page,
-                "Every effect of the catalogue that goes with what is driven would have been detected at a size that is large for a real robot.\n"
+                "Every effect of the catalogue that these motions excite would have been detected at a size that is large for a real robot.\n"
             )?;
         } else {
             writeln!(page, "| effect | detection limit | why |\n| --- | --- | --- |")?;
@@ -205,7 +204,7 @@ impl Page<'_> {
             })
             .collect();
         if !shows.is_empty() {
-            writeln!(page, "Would have shown, and did not: {}.\n", shows.join("; "))?;
+            writeln!(page, "Detectable, and not detected: {}.\n", shows.join("; "))?;
         }
         Ok(())
     }
@@ -233,7 +232,7 @@ impl Page<'_> {
     }
 
     fn calibration(&self, page: &mut String) -> std::fmt::Result {
-        writeln!(page, "## Calibration\n\nWith what was found in the model.\n")?;
+        writeln!(page, "## Calibration\n\nEstimated together with the effects that were found.\n")?;
         writeln!(page, "| parameter | value | sigma |\n| --- | --- | --- |")?;
         for method in &self.document.calibration.methods {
             for (name, value) in &method.parameters {
@@ -255,7 +254,7 @@ impl Page<'_> {
     }
 }
 
-fn chance(p: f64) -> String {
+fn p_value(p: f64) -> String {
     match p {
         p if p >= 1e-3 => format!("{p:.3}"),
         p if p > 0.0 => format!("{p:.0e}"),

@@ -23,7 +23,7 @@ pub(super) fn verdict(document: &Document) -> String {
         .iter()
         .map(|finding| match &finding.names[..] {
             [_, others @ ..] if !others.is_empty() => {
-                format!("{} – or it is {}, which this data cannot tell from it", meaning(finding), named(others))
+                format!("{} – or it is {}, which these data do not discriminate", meaning(finding), named(others))
             }
             _ => meaning(finding),
         })
@@ -43,11 +43,11 @@ pub(super) fn gain(document: &Document) -> Option<String> {
         )
     } else if high < 0.0 {
         format!(
-            "On runs that it was not fitted to, dead reckoning drifts **more** with the extended model: {becomes}. It explains what the instrument saw, and is not to be used for odometry."
+            "On runs that it was not fitted to, dead reckoning drifts **more** with the extended model: {becomes}. It explains what the instrument measured, and is not to be used for odometry."
         )
     } else {
         format!(
-            "What dead reckoning gains on runs that it was not fitted to is not certain: {becomes}, a gain of {:.0} to {:.0} % of the drift (95 %).",
+            "On runs that it was not fitted to, the gain of the extended model in dead reckoning is not significant: {becomes}, a gain of {:.0} to {:.0} % of the drift (95 %).",
             100.0 * low / base,
             100.0 * high / base
         )
@@ -91,25 +91,25 @@ pub(super) fn question(check: &Check) -> String {
     }
     match name {
         "run_to_run" => "Is the noise the same in every run?".to_owned(),
-        "outliers" => "Do no measurements lie far off? (how many do)".to_owned(),
-        "log_spans" => "Does the log last as long as what was seen of the robot? (how many times as long)".to_owned(),
-        "log_rows" => "Do all rows of the log go on where the rows around them do? (how many do not)".to_owned(),
-        "speed" => "Do residuals not go with speed?".to_owned(),
-        "yaw_rate" => "… with yaw rate?".to_owned(),
-        "speed_times_yaw_rate" => "… with speed times yaw rate?".to_owned(),
-        "acceleration" => "… with acceleration?".to_owned(),
-        "heading_in_the_room" => "… with the heading in the room?".to_owned(),
-        "left_wheel_phase" => "… with the phase of the left wheel?".to_owned(),
-        "right_wheel_phase" => "… with the phase of the right wheel?".to_owned(),
-        "time_in_run" => "… with time in the run?".to_owned(),
-        "time_in_session" => "… with time in the session?".to_owned(),
-        "distance" => "… with the distance driven?".to_owned(),
-        "distance_since_reversal" => "… with the distance since a reversal?".to_owned(),
-        "position" => "… with the place in the room?".to_owned(),
-        "left_wheel_cycles" => "… with the left wheel's phase, several times a turn?".to_owned(),
-        "right_wheel_cycles" => "… with the right wheel's phase, several times a turn?".to_owned(),
-        "row_length" => "… with how much longer a row is than usual?".to_owned(),
-        other => format!("… with {}?", other.trim_start_matches("covariate_")),
+        "outliers" => "Are no measurements outliers? (how many are)".to_owned(),
+        "log_spans" => "Does the log last as long as the measurements? (how many times as long)".to_owned(),
+        "log_rows" => "Do all rows of the log agree with the rows around them? (how many do not)".to_owned(),
+        "speed" => "Are residuals independent of speed?".to_owned(),
+        "yaw_rate" => "… of yaw rate?".to_owned(),
+        "speed_times_yaw_rate" => "… of speed times yaw rate?".to_owned(),
+        "acceleration" => "… of acceleration?".to_owned(),
+        "heading_in_the_room" => "… of the heading in the room?".to_owned(),
+        "left_wheel_phase" => "… of the phase of the left wheel?".to_owned(),
+        "right_wheel_phase" => "… of the phase of the right wheel?".to_owned(),
+        "time_in_run" => "… of time in the run?".to_owned(),
+        "time_in_session" => "… of time in the session?".to_owned(),
+        "distance" => "… of the distance driven?".to_owned(),
+        "distance_since_reversal" => "… of the distance since a reversal?".to_owned(),
+        "position" => "… of the place in the room?".to_owned(),
+        "left_wheel_cycles" => "… of the left wheel's phase, several times a turn?".to_owned(),
+        "right_wheel_cycles" => "… of the right wheel's phase, several times a turn?".to_owned(),
+        "row_length" => "… of how much longer a row is than usual?".to_owned(),
+        other => format!("… of {}?", other.trim_start_matches("covariate_")),
     }
 }
 
@@ -117,9 +117,9 @@ pub(super) fn question(check: &Check) -> String {
 pub(super) fn status(alternative: &Alternative) -> &'static str {
     match alternative.status {
         Status::Found => "found",
-        Status::NotDiscriminated => "cannot be told from what was found",
+        Status::NotDiscriminated => "not discriminated from what was found",
         Status::ExplainsLess => "explains less than what was found, or nothing beside it",
         Status::NotSignificant => "not significant",
-        Status::NotDetectable => "these data could not show it",
+        Status::NotDetectable => "not detectable in these data",
     }
 }

@@ -205,8 +205,9 @@ fn documents_help_and_comments_are_in_the_fields_words() {
         .lines()
         .skip(1)
         .take_while(|line| !line.trim().is_empty())
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help")
+        // What a line goes on with stands further in.
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
+        .filter(|name| !matches!(*name, "" | "help"))
         .collect();
     assert!(names.contains(&"diagnose"), "{names:?}");
     hold("yair --help".to_owned(), &commands);

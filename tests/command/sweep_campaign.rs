@@ -167,7 +167,8 @@ fn a_precision_is_kept_by_every_number() {
     let result = plan(Some(precision)).run(0, &|_| ()).expect("runs");
     for point in &result.points {
         assert_eq!(point.precise, Some(true));
-        // 2.1/√n of the outer quantiles asks for about 1760 trials of normals; four times that would be waste.
+        // 2.1/√n of the outer quantiles asks for about 1760 trials of normals; four times that would be
+        // waste.
         assert!((800..8000).contains(&point.trials), "{}", point.trials);
         for estimator in &point.estimators {
             let (std, _) = estimator.std().expect("a spread");

@@ -30,7 +30,7 @@ fn a_report_shows_what_was_found() {
     let verdict = report.lines().nth(2).expect("a verdict");
     assert!(verdict.contains("the right wheel's radius varies by 0.30"), "{verdict}");
     for heading in
-        ["What was found", "Evidence", "Checks of what is left", "Alternatives", "Next experiment", "Calibration"]
+        ["What was found", "Residuals", "Checks of the residuals", "Alternatives", "Next experiment", "Calibration"]
     {
         assert!(report.contains(&format!("\n## {heading}\n")), "{heading}");
     }

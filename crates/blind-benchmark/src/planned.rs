@@ -1,9 +1,9 @@
 //! The planned run: whether what diagnosis says to drive next leaves the right name alone.
 //!
 //! The robot of a case drives as planned, with what it hides and under the case's noise, and all of its
-//! sessions are diagnosed together. What can be told at all is the oracle's to say: after the planned runs,
-//! or after a battery of all kinds of runs on the same floor and in the same time, it must tell the right
-//! name from every other one of the set.
+//! sessions are diagnosed together. What can be resolved at all is the oracle's to say: after the planned
+//! runs, or after a battery of all kinds of runs on the same floor and in the same time, it must tell the
+//! right name from every other one of the set.
 
 use std::f64::consts::TAU;
 
@@ -29,12 +29,12 @@ pub(crate) fn planned(
     };
     let (EffectKind::Mean, Some(found)) = (hidden.kind, result.findings().find(among)) else { return Ok(None) };
     let others = |name: &str| name != hidden.id && found.names.iter().any(|of| of == name);
-    let tells = |plans: Vec<SessionPlan>| -> Result<_, ChallengeError> {
+    let resolves = |plans: Vec<SessionPlan>| -> Result<_, ChallengeError> {
         let more = drive(case, plans)?;
-        let told = more.as_ref().is_some_and(|more| {
+        let resolved = more.as_ref().is_some_and(|more| {
             more.rivals.iter().filter(|(name, _)| others(name)).all(|(_, left)| *left >= DISCRIMINATION_LEVEL)
         });
-        Ok((told, more))
+        Ok((resolved, more))
     };
     let mut planned = Planned {
         names: found.names.clone(),
@@ -45,15 +45,15 @@ pub(crate) fn planned(
     };
     let next = next.filter(|next| next.predicted.is_some());
     if let Some(next) = next {
-        let (told, more) = tells(sessions(case, next))?;
-        (planned.planned, planned.resolved_by_plan) = (true, told);
+        let (resolved, more) = resolves(sessions(case, next))?;
+        (planned.planned, planned.resolved_by_plan) = (true, resolved);
         let all =
             case.datasets.iter().cloned().chain(more.into_iter().flat_map(|more| more.datasets)).collect::<Vec<_>>();
         if let Ok(diagnosis) = diagnose(&all, &Options::default()) {
             planned.reported = reported(&diagnosis.document, case);
         }
     }
-    (planned.resolved_by_battery, _) = tells(battery(case))?;
+    (planned.resolved_by_battery, _) = resolves(battery(case))?;
     Ok(Some(planned))
 }
 

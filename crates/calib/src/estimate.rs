@@ -248,7 +248,7 @@ pub enum CalibError {
         why: String,
     },
     /// A parameter that the method must have is not determined by the runs.
-    #[error("{method}: {} cannot be told from these runs: {why}", parameter.key())]
+    #[error("{method}: {} is not observable in these runs: {why}", parameter.key())]
     Unobservable {
         /// The method.
         method: &'static str,
@@ -317,7 +317,7 @@ pub(crate) fn covariance_of_lengths(relative: impl Fn(usize, usize) -> f64, leng
     Covariance::from_fn(3, 3, |row, column| relative(row, column) * lengths_m[row] * lengths_m[column])
 }
 
-/// A drive from its estimated lengths.
+/// A drive from its estimated geometry.
 pub(crate) fn drive(
     method: &'static str,
     diameter_m: Wheels<f64>,

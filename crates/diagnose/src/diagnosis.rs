@@ -63,7 +63,7 @@ pub struct Diagnosis {
     pub document: Document,
     /// The simulated robot with what was found, where it can be written.
     pub extended: Result<Scenario, String>,
-    /// What the calibrated and the extended model leave, against everything recorded.
+    /// Residuals of the calibrated and of the extended model against every recorded covariate.
     pub residuals: Residuals,
     /// Every effect that was tested, and what became of it.
     pub alternatives: Vec<Alternative>,
@@ -71,10 +71,10 @@ pub struct Diagnosis {
     pub found: FittedModel,
 }
 
-/// A model with the terms whose sizes it has, for whoever wants to hold it against other records.
+/// A model with its terms, to be compared with other records.
 #[derive(Debug, Clone)]
 pub struct FittedModel {
-    /// Lengths, and sizes in the order of the terms' parameters.
+    /// Geometry, and values in the order of the terms' parameters.
     pub model: estimation::Model,
     candidates: Vec<Candidate>,
 }
@@ -84,7 +84,7 @@ impl FittedModel {
         Self { model: extended.fit.solution.model.clone(), candidates: extended.candidates.clone() }
     }
 
-    /// Its terms, at the start of their lives.
+    /// Its terms, in their initial states.
     #[must_use]
     pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
         crate::candidate::terms(&self.candidates)

@@ -42,7 +42,7 @@ pub struct Document {
     pub sensitivity: Vec<Blind>,
     /// The calibration with what was found in the model.
     pub calibration: CalibrationReport,
-    /// What the extension gains on runs that it has not seen.
+    /// What the extension gains on held-out runs.
     pub gain: Option<Gain>,
     /// Why there is no gain.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -125,10 +125,10 @@ pub struct UnlistedTerm {
     /// `along`, `across` or `yaw` of the motion, or `seen_along`, `seen_across`, `seen_heading` of what the
     /// instrument sees.
     pub channel: String,
-    /// Its rate, or its size where it is seen, is the coefficient times the product of these; `1` for none.
+    /// Its rate, or its size in the measurement, is the coefficient times the product of these; `1` for none.
     /// `kind = "term"` in a scenario takes them.
     pub covariates: Vec<String>,
-    /// In m/s or rad/s; in metres or radians where it is seen.
+    /// In m/s or rad/s; in metres or radians in the measurement.
     pub coefficient: f64,
     /// One standard deviation.
     pub sigma: f64,

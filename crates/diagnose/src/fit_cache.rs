@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use estimation::ModelFit;
-use rayon::prelude::*;
 
-use crate::augmented_model::{AugmentedModel, others, refit, without};
+use crate::augmented_model::{AugmentedModel, others, without};
 use crate::candidate::Candidate;
 use crate::scan::{Scored, scan};
 
@@ -29,28 +28,9 @@ impl<'a> FitCache<'a> {
         &self.scans[at].1
     }
 
-    fn fit(&self, candidates: &[Candidate]) -> Option<&AugmentedModel<'a>> {
+    /// The fit of these candidates, where one was made.
+    pub(crate) fn fit(&self, candidates: &[Candidate]) -> Option<&AugmentedModel<'a>> {
         self.fits.iter().map(Arc::as_ref).find(|model| model.candidates == candidates)
-    }
-
-    /// Models that each have a candidate more than another at one place, without those that diverge.
-    pub(crate) fn with_each(
-        &mut self,
-        base: &ModelFit<'a>,
-        without: &AugmentedModel<'a>,
-        index: usize,
-        added: &[Candidate],
-    ) -> Vec<AugmentedModel<'a>> {
-        let with = |candidate: &Candidate| {
-            let mut candidates = without.candidates.clone();
-            candidates.insert(index, candidate.clone());
-            self.fit(&candidates).cloned().or_else(|| refit(base, without, candidates))
-        };
-        let models: Vec<AugmentedModel<'a>> = added.par_iter().filter_map(with).collect();
-        for model in &models {
-            self.keep(model);
-        }
-        models
     }
 
     /// A model without one of its candidates; the base where it has no other.
@@ -65,7 +45,7 @@ impl<'a> FitCache<'a> {
         Some(fewer)
     }
 
-    fn keep(&mut self, model: &AugmentedModel<'a>) {
+    pub(crate) fn keep(&mut self, model: &AugmentedModel<'a>) {
         if self.fit(&model.candidates).is_none() {
             self.fits.push(Arc::new(model.clone()));
         }

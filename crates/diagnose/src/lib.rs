@@ -13,6 +13,7 @@ mod candidate;
 mod cause;
 mod check;
 mod clock_offsets;
+mod covariate_tests;
 mod covariates;
 mod detectability;
 mod diagnosis;

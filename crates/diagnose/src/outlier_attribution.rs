@@ -207,7 +207,7 @@ impl ErrorResponse {
         let precision = information + scale.powi(-2);
         let mean = score / precision.sqrt();
         let positive = Normal::new(0.0, 1.0).map_or(0.5, |normal| normal.cdf(mean));
-        // 1 where nothing is seen along it.
+        // 1 where nothing is measured along it.
         std::f64::consts::LN_2 - 0.5 * (precision * scale * scale).ln() + 0.5 * mean * mean + positive.ln()
     }
 

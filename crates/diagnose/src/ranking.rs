@@ -40,7 +40,7 @@ pub(crate) fn best_variants(scored: &[Scored]) -> Vec<Entry> {
         if scored.p_value < best.p_value || (scored.p_value == best.p_value && scored.statistic > best.statistic) {
             entry.scored = scored.clone();
         }
-        // A variant that cannot be seen is no trial.
+        // A variant that is not observable is no trial.
         if scored.dimensions > 0 {
             entry.variants += 1;
             if scored.estimates.is_empty() || effect_of(&scored.candidate, &scored.estimates).is_some() {

@@ -131,7 +131,7 @@ pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
         && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA
 }
 
-/// Are a fit's lengths and noise those of a drive?
+/// Are a fit's geometry and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let is_near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;

@@ -2,8 +2,9 @@
 
 use estimation::ModelFit;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
-use crate::augmented_model::{AugmentedModel, cost, count};
+use crate::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
@@ -39,7 +40,18 @@ pub(crate) fn rivals<'a>(
     let close = close_statistic(best);
     let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
-    let mut fits = known.with_each(base, without, index, &best_variants);
+    // Models that each have one of these candidates more, without those that diverge.
+    let mut fit_each = |added: &[Candidate]| {
+        let with = |candidate: &Candidate| {
+            let mut candidates = without.candidates.clone();
+            candidates.insert(index, candidate.clone());
+            known.fit(&candidates).cloned().or_else(|| refit(base, without, candidates))
+        };
+        let models: Vec<AugmentedModel<'a>> = added.par_iter().filter_map(with).collect();
+        models.iter().for_each(|model| known.keep(model));
+        models
+    };
+    let mut fits = fit_each(&best_variants);
     // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
@@ -49,7 +61,7 @@ pub(crate) fn rivals<'a>(
     for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
             contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
-        fits.extend(known.with_each(base, without, index, &next));
+        fits.extend(fit_each(&next));
         contenders.retain(|entry| !can_be(&fits, entry));
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
@@ -62,7 +74,7 @@ pub(crate) fn rivals<'a>(
             let trials = variants.map_or(1, |entry| entry.variants.max(1));
             let likelier = base_cost - cost(&extended.fit, most);
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
-            let (log_odds, explains) = evidence(likelier, directions.as_deref(), trials);
+            let (log_odds, explains) = odds_and_explained(likelier, directions.as_deref(), trials);
             (Name { candidate, log_odds, explains, outdone: false }, extended)
         })
         .collect();
@@ -99,32 +111,35 @@ fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
 }
 
 /// Log odds of a candidate over none, and its log likelihood less what its freedom gains by accident: from
-/// how much likelier it makes the data, its sizes along principal directions, and how many variants were
+/// how much likelier it makes the data, its estimates along principal directions, and how many variants were
 /// tried.
-fn evidence(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
+fn odds_and_explained(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
     let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
     let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
     (log_odds - (trials as f64).ln(), explains)
 }
 
-/// Variances of the other candidates' sizes over the causes of one candidate: how far they move if it has
+/// Variances of the other candidates' estimates over the causes of one candidate: how far they move if it has
 /// another cause, weighed by the causes' odds. For each other candidate of the most probable model, its
-/// sizes in turn.
+/// estimates in turn.
 pub(crate) fn over_names(index: usize, names: &[(Name, AugmentedModel<'_>)]) -> Vec<(Candidate, Vec<f64>)> {
     let Some((top, likeliest)) = names.first() else { return Vec::new() };
     let odds: Vec<f64> = names.iter().map(|(name, _)| relative_odds(name.log_odds, top.log_odds)).collect();
     let variances = |other: usize| {
-        let sizes: Vec<DVector<f64>> = names.iter().map(|(_, model)| model.estimates(other)).collect();
-        (likeliest.candidates[other].clone(), variances_between(&sizes, &odds).as_slice().to_vec())
+        let estimates: Vec<DVector<f64>> = names.iter().map(|(_, model)| model.estimates(other)).collect();
+        (likeliest.candidates[other].clone(), variances_between(&estimates, &odds).as_slice().to_vec())
     };
     (0..likeliest.candidates.len()).filter(|other| *other != index).map(variances).collect()
 }
 
-/// Mean squares of sizes about the first ones, weighed by the odds of the models that have them.
-fn variances_between(sizes: &[DVector<f64>], odds: &[f64]) -> DVector<f64> {
+/// Mean squares of estimates about the first ones, weighed by the odds of the models that have them.
+fn variances_between(estimates: &[DVector<f64>], odds: &[f64]) -> DVector<f64> {
     let all: f64 = odds.iter().sum();
-    let moved = |own: &DVector<f64>| (own - &sizes[0]).map(|by| by * by);
-    sizes.iter().zip(odds).fold(DVector::zeros(sizes[0].len()), |sum, (own, odds)| sum + moved(own) * (odds / all))
+    let moved = |own: &DVector<f64>| (own - &estimates[0]).map(|by| by * by);
+    estimates
+        .iter()
+        .zip(odds)
+        .fold(DVector::zeros(estimates[0].len()), |sum, (own, odds)| sum + moved(own) * (odds / all))
 }
 
 #[cfg(test)]
@@ -161,18 +176,19 @@ mod tests {
     fn odds_are_likelihood_less_freedom_and_trials() {
         // Two directions of no information cost nothing but what they explain: none at size 0. Four
         // variants cost ln 4.
-        let (log_odds, explains) = evidence(10.0, Some(&[(0.0, 0.0), (0.0, 0.0)]), 4);
+        let (log_odds, explains) = odds_and_explained(10.0, Some(&[(0.0, 0.0), (0.0, 0.0)]), 4);
         assert!((log_odds - (10.0 - 4_f64.ln())).abs() < 1e-15);
         // Half of χ² with two degrees of freedom, on average. Rejects a whole one a direction, 8.
         assert_eq!(explains, 9.0);
         // What cannot be tested has no odds, whatever it explains.
-        assert_eq!(evidence(10.0, None, 1), (f64::NEG_INFINITY, 10.0));
+        assert_eq!(odds_and_explained(10.0, None, 1), (f64::NEG_INFINITY, 10.0));
     }
 
     #[test]
     fn sizes_that_differ_between_causes_are_known_less_well() {
-        // Odds 3 : 1, sizes (1, 0) and (3, 0): a quarter of (3 − 1)². Rejects a variance about the mean, 3/4.
-        let sizes = [[1.0, 0.0], [3.0, 0.0]].map(|size| DVector::from_column_slice(&size));
-        assert_eq!(variances_between(&sizes, &[3.0, 1.0]).as_slice(), [1.0, 0.0]);
+        // Odds 3 : 1, estimates (1, 0) and (3, 0): a quarter of (3 − 1)². Rejects a variance about the mean,
+        // 3/4.
+        let estimates = [[1.0, 0.0], [3.0, 0.0]].map(|size| DVector::from_column_slice(&size));
+        assert_eq!(variances_between(&estimates, &[3.0, 1.0]).as_slice(), [1.0, 0.0]);
     }
 }

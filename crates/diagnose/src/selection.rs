@@ -152,8 +152,8 @@ pub(crate) fn search<'a>(
             model = without;
             continue;
         }
-        let evidence: Vec<(f64, f64)> = found.iter().map(|(name, _)| (name.log_odds, name.explains)).collect();
-        let mut kept = is_not_discriminated(&evidence).into_iter();
+        let odds: Vec<(f64, f64)> = found.iter().map(|(name, _)| (name.log_odds, name.explains)).collect();
+        let mut kept = is_not_discriminated(&odds).into_iter();
         found.retain(|_| kept.next().unwrap_or(false));
         names.push(found.iter().map(|(name, _)| name.clone()).collect());
         beside.extend(over_names(index, &found));
@@ -187,7 +187,7 @@ pub(crate) fn search<'a>(
 }
 
 /// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
-/// among the others it is not seen.
+/// among the others it is not detected.
 pub(crate) fn search_ungated<'a>(
     base: &ModelFit<'a>,
     found: &SearchResult<'a>,

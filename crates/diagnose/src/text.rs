@@ -105,7 +105,7 @@ fn basis(finding: &Finding) -> String {
         Basis::FailedTests(failed) => {
             let failed: Vec<String> = failed.iter().map(Check::name).collect();
             format!(
-                "the residuals are not what the model says ({}), and nothing in the catalogue explains it: the cause cannot be told",
+                "the residuals are not what the model says ({}), and nothing in the catalogue explains it: the cause is not determined",
                 failed.join(", ")
             )
         }

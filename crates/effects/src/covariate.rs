@@ -1,7 +1,7 @@
 //! The covariates of terms outside of the catalogue: their names, normalisation and values.
 //!
 //! Both models of [`crate::SparseTerm`] read this one list, and so do scenarios and findings: a name means
-//! the same wherever it stands. How the speeds, the heading or the way come about is each model's own.
+//! the same wherever it stands. How the speeds, the heading or the distance come about is each model's own.
 
 use std::collections::BTreeMap;
 
@@ -214,7 +214,7 @@ impl Covariate {
 
     /// Is it known of a measurement: of the robot's twist and heading then, and of the time?
     #[must_use]
-    pub const fn is_of_a_look(&self) -> bool {
+    pub const fn is_of_a_measurement(&self) -> bool {
         matches!(self, Self::CosHeading | Self::SinHeading | Self::RunTime) || self.is_a_speed()
     }
 

@@ -14,7 +14,7 @@ pub struct Description {
     /// What is wrong where the effect is, in one line for people: "the wheels lose distance in proportion to
     /// their speed".
     pub meaning: &'static str,
-    /// How people are told of it with the sizes that a fit found.
+    /// Its description with the values that a fit found.
     pub summary: Summary,
     /// What excites it.
     pub excitation: Excitation,
@@ -57,7 +57,7 @@ impl Description {
     }
 }
 
-/// How people are told of an effect that was found.
+/// How reports describe an effect that was found.
 #[derive(Clone, Copy)]
 pub enum Summary {
     /// By the finding's own sentence, which says more: what a rewriting undid, or what the checks saw.

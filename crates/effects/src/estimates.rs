@@ -31,12 +31,12 @@ impl<'n> FromIterator<(&'n str, Estimate)> for Estimates<'n> {
 }
 
 impl Estimates<'_> {
-    /// The value of a amplitude.
+    /// The value of an amplitude.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.0.get(name).map(|estimate| estimate.value)
     }
 
-    /// A amplitude times a scale, in the unit shown; a question mark where it is not known.
+    /// An amplitude times a scale, in the unit shown; a question mark where it is not known.
     pub(crate) fn shown(&self, name: &str, scale: f64, unit: &str) -> String {
         self.0.get(name).map_or_else(|| "?".to_owned(), |estimate| estimate.shown(scale, unit))
     }
@@ -60,7 +60,7 @@ impl Estimates<'_> {
         let mut sides: Vec<(f64, String)> = ["left", "right"].into_iter().filter_map(side).collect();
         sides.sort_by(|a, b| b.0.total_cmp(&a.0));
         if sides.is_empty() {
-            return format!("a {what}, which one cannot be told");
+            return format!("a {what}, which one is not determined");
         }
         sides.into_iter().map(|(_, text)| text).collect::<Vec<_>>().join(" and ")
     }
@@ -108,7 +108,7 @@ mod tests {
         let values = [("left_sin", 3e-3), ("left_cos", 4e-3), ("right_sin", 1e-3), ("right_cos", 2e-3)];
         let estimates: Estimates<'_> = values.map(|(name, value)| (name, of(value))).into_iter().collect();
         assert_eq!(estimates.amplitudes("", 1e3, "‰", "radius varies"), "the left radius varies by 5.0 ± 1.2 ‰");
-        assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one cannot be told");
+        assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one is not determined");
         assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.2 mm");
         assert_eq!(estimates.shown("elsewhere", 1e3, "mm"), "?");
     }

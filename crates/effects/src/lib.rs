@@ -99,7 +99,7 @@ macro_rules! contents {
                 }
             }
 
-            /// How data would show the effect; a term outside of the catalogue is its own one shape, or
+            /// How data would show the effect; a term outside of the catalogue is its own one variant, or
             /// `None` where it is not physical.
             #[must_use]
             pub fn hypothesis(&self) -> Option<Hypothesis> {

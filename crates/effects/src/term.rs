@@ -124,13 +124,13 @@ impl SparseTerm {
         }
         let covariates = &sparse.covariates;
         let (what, holds) = if self.channel.is_of_instrument() {
-            ("goes with these alone", covariates.iter().all(Covariate::is_of_a_look))
+            ("goes with these alone", covariates.iter().all(Covariate::is_of_a_measurement))
         } else {
             ("must vanish at standstill and needs one of these", covariates.iter().any(Covariate::vanishes_at_rest))
         };
         if !holds {
             let fits = |covariate: &&Covariate| match self.channel.is_of_instrument() {
-                true => covariate.is_of_a_look(),
+                true => covariate.is_of_a_measurement(),
                 false => covariate.vanishes_at_rest() && (of_wheels || !covariate.is_of_a_wheel()),
             };
             return no_term(format!("{channel} {what}: {}", listed(Covariate::NAMED.iter().filter(fits))));

@@ -8,13 +8,13 @@ use model_term::ModelTerm;
 
 use crate::decimation::Decimated;
 use crate::error::EstimationError;
-use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
 use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
 use crate::optimizer::Solution;
 use crate::pass::pass;
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::{CarriedState, Propagator};
 use crate::records::{MeasuredPose, Segment};
 use crate::settings::{MAX_DECIMATION_NONCENTRALITY, MIN_NOISE_SIGMA};

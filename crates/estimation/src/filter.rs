@@ -5,7 +5,7 @@
 //! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on
 //! the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
-use kinematics::{InstructionSet, Kernel, Pose, Twist, sin_cos, wrap_to_pi};
+use kinematics::{Kernel, Pose, Twist, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -14,14 +14,15 @@ use crate::derivatives::Derivatives;
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{Noise, NoiseComponent};
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
-use crate::propagation::{CachedPropagation, CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
+use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
 use crate::records::{MeasuredPose, Segment, Start};
 use crate::rounding::{FilterState, Rounding};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 
-pub(crate) const NOISES: usize = 4;
+pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,40 +37,6 @@ pub struct InnovationComponent {
     pub z: f64,
     /// That standard deviation: metres, or radians of a heading.
     pub sigma: f64,
-}
-
-/// Whether measurements whose innovation is improbable are rejected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OutlierGate {
-    /// They are.
-    #[default]
-    On,
-    /// Every measurement is taken, however far off.
-    Off,
-}
-
-impl OutlierGate {
-    /// Open for every measurement.
-    pub(crate) const fn of(ungated: bool) -> Self {
-        if ungated { Self::Off } else { Self::On }
-    }
-}
-
-/// What to carry along in a pass.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PassOptions<'p> {
-    pub(crate) noise_score: bool,
-    pub(crate) innovations: bool,
-    /// How the robot moved before each measurement, by the counts; not with propagation that was kept.
-    pub(crate) samples: bool,
-    pub(crate) gate: OutlierGate,
-    /// Record the propagations, for passes at models near this one.
-    pub(crate) keep: bool,
-    /// Propagations recorded by a pass at another model, to be used instead of integrating.
-    pub(crate) by: Option<&'p CachedPropagation>,
-    /// The last columns come in parts of so many, each tested for itself: columns of two parts have no
-    /// products with each other.
-    pub(crate) parts: &'p [usize],
 }
 
 /// Score of the cost by the logarithms of the variances, and its information.
@@ -119,19 +86,58 @@ pub(super) struct Filter<'f, 'a> {
     j: Vec<f64>,
 }
 
-/// The filter of a segment over its propagation intervals, from a start heading that is not measured.
-struct Run<'r, 'f, 'a> {
-    filter: &'r mut Filter<'f, 'a>,
-    propagations: &'r [PropagationInterval],
-    free_heading_rad: f64,
+/// Filters a segment's measurements at the ends of some propagation intervals, from a start heading that is
+/// not measured.
+pub(super) struct FilterRun<'r, 'f, 'a> {
+    pub(super) filter: &'r mut Filter<'f, 'a>,
+    pub(super) propagations: &'r [PropagationInterval],
+    pub(super) free_heading_rad: f64,
 }
 
-impl Kernel for Run<'_, '_, '_> {
+impl Kernel for FilterRun<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        self.filter.run_over(self.propagations, self.free_heading_rad);
+    fn call(self) {
+        let Self { filter, propagations, free_heading_rad } = self;
+        filter.propagator.restart();
+        let Some(first) = propagations.first() else {
+            let start_s = filter.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
+            filter.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
+            let intervals = 0..filter.segment.intervals.len();
+            filter.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
+            return;
+        };
+        filter.propagator.skip(0..first.intervals.start);
+        match filter.segment.start {
+            Start::MeasuredPose => filter.start_at((0, first.from), first.intervals.start, free_heading_rad),
+            Start::Origin => {
+                let start_s = filter.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
+                filter.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
+            }
+        }
+        let mut rejected_in_a_row = 0;
+        for (number, propagation) in propagations.iter().enumerate() {
+            filter.predict(number, propagation);
+            if filter.update(number, propagation) {
+                rejected_in_a_row = 0;
+                continue;
+            }
+            filter.outliers.push(propagation.measurement);
+            rejected_in_a_row += 1;
+            // Without a heading the filter cannot start in the middle of a segment.
+            if rejected_in_a_row >= RESTART_AFTER_OUTLIERS
+                && filter.segment.measurements[propagation.measurement].theta_rad.is_some()
+                && filter.segment.start == Start::MeasuredPose
+            {
+                filter.start_at(
+                    (number + 1, propagation.measurement),
+                    propagation.intervals.end,
+                    filter.pose.theta_rad,
+                );
+                rejected_in_a_row = 0;
+            }
+        }
     }
 }
 
@@ -197,50 +203,6 @@ impl<'f, 'a> Filter<'f, 'a> {
         self,
     ) -> (Sums<'f>, Vec<usize>, Vec<InnovationComponent>, NoiseScore, Option<SegmentCache>) {
         (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.propagations.into_cached())
-    }
-
-    /// Filters the measurements at the ends of some propagation intervals.
-    pub(super) fn run(&mut self, propagations: &[PropagationInterval], free_heading_rad: f64) {
-        // Loops over a dozen columns: eight at a time leave more over than they save.
-        InstructionSet::Avx2.run(Run { filter: self, propagations, free_heading_rad });
-    }
-
-    #[inline(always)]
-    fn run_over(&mut self, propagations: &[PropagationInterval], free_heading_rad: f64) {
-        self.propagator.restart();
-        let Some(first) = propagations.first() else {
-            let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-            self.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
-            let intervals = 0..self.segment.intervals.len();
-            self.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
-            return;
-        };
-        self.propagator.skip(0..first.intervals.start);
-        match self.segment.start {
-            Start::MeasuredPose => self.start_at((0, first.from), first.intervals.start, free_heading_rad),
-            Start::Origin => {
-                let start_s = self.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-                self.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
-            }
-        }
-        let mut rejected_in_a_row = 0;
-        for (number, propagation) in propagations.iter().enumerate() {
-            self.predict(number, propagation);
-            if self.update(number, propagation) {
-                rejected_in_a_row = 0;
-                continue;
-            }
-            self.outliers.push(propagation.measurement);
-            rejected_in_a_row += 1;
-            // Without a heading the filter cannot start in the middle of a segment.
-            if rejected_in_a_row >= RESTART_AFTER_OUTLIERS
-                && self.segment.measurements[propagation.measurement].theta_rad.is_some()
-                && self.segment.start == Start::MeasuredPose
-            {
-                self.start_at((number + 1, propagation.measurement), propagation.intervals.end, self.pose.theta_rad);
-                rejected_in_a_row = 0;
-            }
-        }
     }
 
     /// Variances of a measurement's position and heading: the instrument's, times what its row states of

@@ -25,7 +25,7 @@ pub(crate) struct GroupResponse {
 }
 
 impl GroupResponse {
-    /// The step of the own columns that goes with a step of some others.
+    /// The step of the own columns that follows from a step of some others.
     pub(crate) fn step(&self, columns: &[Column], step: &DVector<f64>) -> DVector<f64> {
         columns
             .iter()

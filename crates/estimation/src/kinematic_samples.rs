@@ -7,13 +7,8 @@
 use kinematics::{Increment, Pose, Side, Wheels};
 
 use crate::model::Model;
+use crate::settings::REVERSAL_M;
 use crate::wheel_angles::WheelInterval;
-
-/// Motion against the direction of travel that counts as a reversal: 1 mm, more than the counts of a
-/// standstill.
-///
-/// Tuned: by hand; no record of what on.
-const REVERSAL_M: f64 = 1e-3;
 
 /// How the robot moved between the measurement before and this one, by the counts.
 #[derive(Debug, Clone, Copy, PartialEq)]

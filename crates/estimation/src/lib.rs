@@ -32,6 +32,7 @@ mod nuisances;
 mod one_step;
 mod optimizer;
 mod pass;
+mod pass_options;
 mod predicted_information;
 mod products;
 mod profile;
@@ -49,7 +50,7 @@ mod wheel_rates;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
-pub use filter::{InnovationComponent, OutlierGate};
+pub use filter::InnovationComponent;
 pub use kinematic_samples::KinematicSample;
 pub use maximum_likelihood::FitSettings;
 pub use model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
@@ -61,6 +62,7 @@ pub use normal_equations::{
 pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
 pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
 pub use pass::Pass;
+pub use pass_options::OutlierGate;
 pub use records::{Records, Segment};
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};

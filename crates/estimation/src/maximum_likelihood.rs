@@ -4,11 +4,11 @@
 use dataset::Session;
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
-use crate::filter::OutlierGate;
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
 use crate::optimizer::ConvergenceCriterion;
+use crate::pass_options::OutlierGate;
 use crate::settings::NOISE_STEP_TOLERANCE;
 
 /// What a fit estimates beside the geometry.

@@ -8,12 +8,12 @@ use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use crate::error::EstimationError;
-use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
 use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::{Records, Segment};
 use crate::settings::{
     MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_RUNS_TO_HOLD_OUT,

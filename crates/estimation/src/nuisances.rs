@@ -5,11 +5,11 @@ use kinematics::Pose;
 use nalgebra::DVector;
 
 use crate::error::EstimationError;
-use crate::filter::OutlierGate;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
 use crate::model_fit::ModelFit;
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Solution;
+use crate::pass_options::OutlierGate;
 use crate::settings::{BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT};
 use crate::thinning::Thinning;
 

@@ -6,11 +6,11 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use crate::acceleration::{Acceleration, StepSize};
 use crate::error::EstimationError;
-use crate::filter::{OutlierGate, PassOptions};
 use crate::model::{Column, Model};
 use crate::noise::{Noise, NoisePrior};
 use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::CachedPropagation;
 use crate::records::{Records, Segment, Start};
 use crate::settings::{

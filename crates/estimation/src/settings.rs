@@ -188,6 +188,10 @@ pub(crate) const SPEED_CHANGE_WINDOW_S: f64 = 0.5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const SPEED_CHANGE_RATIO: f64 = 0.2;
 
+/// Motion against the direction of travel, metres, that counts as a reversal.
+/// Tuned: by hand; above the counts of a standstill.
+pub(crate) const REVERSAL_M: f64 = 1e-3;
+
 // Outliers.
 
 /// Squared Mahalanobis distance of a measurement's innovation above which it is an outlier.
@@ -442,7 +446,7 @@ pub(crate) const SUBSAMPLE_MEASUREMENTS: usize = 1 << 16;
 pub(crate) const MAX_SUBSAMPLE_ROWS: usize = 1 << 19;
 
 /// Contiguous subsamples that the preliminary fit is made of.
-/// Derived: enough to be held out; more would be too short to be thinned, and to determine lengths.
+/// Derived: enough to be held out; more would be too short to be thinned, and to determine the geometry.
 pub(crate) const SUBSAMPLES: usize = 8;
 
 /// Step of a variance, as a share of it, at which the preliminary fit ends before whiteness is judged.

@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 
 use crate::covariances::Covariances;
 use crate::model::Model;
+use crate::noise::NoiseComponent;
 use crate::records::{Records, Segment, Start};
 use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
 
@@ -202,8 +203,6 @@ fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<
 /// Covariance of a propagation interval's motion for unit noises, by the nominal drive: the geometry must not
 /// be estimated by its effect on covariances.
 fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
-    const WHEEL: usize = 0;
-    const TURN: usize = 1;
     let mut noise = Covariances::ZERO;
     let mut theta_rad = 0.0;
     for interval in &segment.intervals[intervals] {
@@ -218,10 +217,10 @@ fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Mod
         for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {
             let by_turn = side / nominal.separation_m;
             let column = Vector3::new(0.5 * (cos - dy_m * by_turn), 0.5 * (sin + dx_m * by_turn), by_turn);
-            noise.add_outer(WHEEL, &column, travel_m.abs());
+            noise.add_outer(NoiseComponent::Wheel as usize, &column, travel_m.abs());
         }
         let column = Vector3::new(-0.5 * dy_m, 0.5 * dx_m, 1.0);
-        noise.add_outer(TURN, &column, turn_rad.abs());
+        noise.add_outer(NoiseComponent::Turn as usize, &column, turn_rad.abs());
         theta_rad += turn_rad;
     }
     noise

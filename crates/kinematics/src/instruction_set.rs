@@ -17,15 +17,9 @@ pub enum InstructionSet {
     Avx512,
 }
 
-/// A loop over columns. To be compiled for each instruction set `run` and all that it calls must be
-/// `#[inline(always)]`.
-pub trait Kernel {
-    /// What the loop returns.
-    type Output;
-
-    /// The loop.
-    fn run(self) -> Self::Output;
-}
+/// A loop over columns, as `pulp` takes it. To be compiled for each instruction set `call` and all that it
+/// calls must be `#[inline(always)]`.
+pub use pulp::NullaryFnOnce as Kernel;
 
 impl InstructionSet {
     /// Those that this machine has, narrowest first.
@@ -77,29 +71,15 @@ impl InstructionSet {
             if self == Self::Avx512
                 && let Some(v4) = pulp::x86::V4::try_new()
             {
-                return v4.vectorize(Compiled(kernel));
+                return v4.vectorize(kernel);
             }
             if self == Self::Avx2
                 && let Some(v3) = pulp::x86::V3::try_new()
             {
-                return v3.vectorize(Compiled(kernel));
+                return v3.vectorize(kernel);
             }
         }
-        kernel.run()
-    }
-}
-
-/// A kernel as `pulp` takes it.
-#[cfg(target_arch = "x86_64")]
-struct Compiled<K>(K);
-
-#[cfg(target_arch = "x86_64")]
-impl<K: Kernel> pulp::NullaryFnOnce for Compiled<K> {
-    type Output = K::Output;
-
-    #[inline(always)]
-    fn call(self) -> K::Output {
-        self.0.run()
+        kernel.call()
     }
 }
 
@@ -113,7 +93,7 @@ mod tests {
         impl Kernel for Answer {
             type Output = u32;
             #[inline(always)]
-            fn run(self) -> u32 {
+            fn call(self) -> u32 {
                 42
             }
         }

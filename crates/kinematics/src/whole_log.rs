@@ -132,7 +132,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
     type Output = DeadReckoning<C>;
 
     #[inline(always)]
-    fn run(mut self) -> DeadReckoning<C> {
+    fn call(mut self) -> DeadReckoning<C> {
         // A group that was begun one by one is ended so.
         let begun = (GROUP - self.state.steps) % GROUP;
         let (first, counts) = split(self.counts, begun);

@@ -133,8 +133,8 @@ pub trait ModelTerm: CopyTerm + Send + Sync {
         let _ = (interval, gradient);
     }
 
-    /// Derivative of the pose that the instrument sees, in the frame of the seen body (x, y, θ), by each
-    /// parameter, at zero size. `gradient` is as above.
+    /// Derivative of the pose that the instrument measures, in the frame of the measured body (x, y, θ), by
+    /// each parameter, at zero size. `gradient` is as above.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         let _ = (measurement, gradient);
     }

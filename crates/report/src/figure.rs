@@ -16,7 +16,8 @@ pub const MAX_COLUMNS: usize = 3;
 ///
 /// let (effort, bias_mm) = (vec![1.0, 3.0, 10.0], vec![2.1, 1.2, 0.4]);
 /// let points = effort.iter().copied().zip(bias_mm).collect();
-/// let panel = Panel::new("Bias", Axis::dimensionless("runs").scale(Scale::Log), Axis::new("bias of the track", "mm"))
+/// let runs = Axis::dimensionless("runs").scale(Scale::Log);
+/// let panel = Panel::new("Bias", runs, Axis::new("bias of the track", "mm"))
 ///     .series(Series::new("umbmark", Marks::Points { points, y_error: Some(vec![0.5, 0.3, 0.2]) }))
 ///     .series(Series::new("no bias", Marks::HorizontalLine { y: 0.0 }));
 /// let figure = Figure::new("More runs, less bias").caption("scenario paper.toml, seed 7").panel(panel);

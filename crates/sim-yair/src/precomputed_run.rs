@@ -17,7 +17,7 @@ use crate::planned_motion::PlannedMotion;
 
 /// What a run does from one standstill to the next.
 #[derive(Debug, Clone)]
-struct PropagationInterval {
+struct RowInterval {
     /// Does it begin a motion, for which effects and sensitivities draw?
     sets_out: bool,
     segments: Vec<RateSegment>,
@@ -28,21 +28,21 @@ struct PropagationInterval {
 /// A precomputed run.
 #[derive(Debug, Clone)]
 pub(crate) struct PrecomputedRun {
-    /// Each leg ends with a row.
-    legs: Vec<PropagationInterval>,
+    /// Each ends with a row.
+    intervals: Vec<RowInterval>,
     /// When, seconds.
     rows_s: Vec<f64>,
 }
 
 impl PrecomputedRun {
-    /// The course of a plan's motions; `None` where one of them has its say only when it comes.
+    /// The run of a plan's motions; `None` where one of them is known only while it is driven.
     pub(crate) fn new(motions: &[PlannedMotion]) -> Option<Self> {
-        let mut legs = vec![PropagationInterval { sets_out: false, segments: Vec::new(), is_read: true }];
+        let mut intervals = vec![RowInterval { sets_out: false, segments: Vec::new(), is_read: true }];
         let (mut t_s, mut rows_s) = (0.0, vec![0.0]);
         for motion in motions {
             let (sets_out, segments) = match motion {
                 PlannedMotion::Measure => {
-                    if let Some(last) = legs.last_mut() {
+                    if let Some(last) = intervals.last_mut() {
                         last.is_read = true;
                     }
                     continue;
@@ -56,13 +56,13 @@ impl PrecomputedRun {
                 return None;
             }
             t_s = ends_s;
-            legs.push(PropagationInterval { sets_out, segments, is_read: false });
+            intervals.push(RowInterval { sets_out, segments, is_read: false });
             rows_s.push(t_s);
         }
-        if let Some(last) = legs.last_mut() {
+        if let Some(last) = intervals.last_mut() {
             last.is_read = true;
         }
-        Some(Self { legs, rows_s })
+        Some(Self { intervals, rows_s })
     }
 
     /// Drives it; the run is empty. Gives the body at its end.
@@ -79,15 +79,15 @@ impl PrecomputedRun {
         let mut drive = ConstantSpeed::new(setup.counts_per_rad, start.counts);
         run.odometry.t_s.extend_from_slice(&self.rows_s);
         let WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { return body };
-        ticks.left.resize(self.legs.len(), 0);
-        ticks.right.resize(self.legs.len(), 0);
+        ticks.left.resize(self.intervals.len(), 0);
+        ticks.right.resize(self.intervals.len(), 0);
         let mut rows = 0;
-        for (leg, due_s) in self.legs.iter().zip(&self.rows_s) {
-            if leg.sets_out {
+        for (interval, due_s) in self.intervals.iter().zip(&self.rows_s) {
+            if interval.sets_out {
                 effects.start_motion();
                 body.start_motion(setup, streams);
             }
-            for &segment in &leg.segments {
+            for &segment in &interval.segments {
                 let motion = drive.whole(segment);
                 let step = body.advance(setup, streams, effects, (segment.duration_s, &motion));
                 drive.count(&step);
@@ -98,7 +98,7 @@ impl PrecomputedRun {
             run.odometry.t_s[rows] = *due_s;
             (ticks.left[rows], ticks.right[rows]) = (readout.ticks.left, readout.ticks.right);
             rows += usize::from(readout.written);
-            if leg.is_read {
+            if interval.is_read {
                 let (t_s, world_from_body) = body.reading(effects, body.t_s);
                 for observer in &mut *observers {
                     observer.read_standing(t_s, world_from_body, &setup.points, &mut run.point_readings);
@@ -124,7 +124,7 @@ mod tests {
     /// Both ways through programs with everything in them, with the paper's effects and with sensitivities
     /// that scatter from motion to motion.
     #[test]
-    fn a_course_gives_the_records_of_a_run_that_asks_its_clock() {
+    fn a_precomputed_run_gives_the_records_of_a_run_that_asks_its_clock() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/paper.toml");
         let paper = Scenario::read(&path).expect("the shipped scenario");
         assert_eq!(paper.engine, Engine::ClosedForm);

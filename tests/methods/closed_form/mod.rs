@@ -319,7 +319,7 @@ fn what_a_method_cannot_use_it_refuses_and_says_what_to_drive() {
     let refusals: [(&dyn Method, Keep, &str); 13] = [
         (&JungChung, |info| info.protocol == Some(Protocol::SquareCw), "squares in both directions"),
         (&JungChung, |info| info.protocol == Some(Protocol::Spin), "squares in both directions"),
-        (&Circular, |info| info.protocol == Some(Protocol::CircleCcw), "the other way round"),
+        (&Circular, |info| info.protocol == Some(Protocol::CircleCcw), "in the other direction too"),
         (&Circular, |info| info.protocol == Some(Protocol::SquareCw), "circles in both directions"),
         (&Ivanjko, |info| info.protocol == Some(Protocol::Straight), "add spins"),
         (&Ivanjko, |info| info.protocol == Some(Protocol::Spin), "drive straight runs"),
@@ -344,7 +344,7 @@ fn what_a_method_cannot_use_it_refuses_and_says_what_to_drive() {
         run.point_readings.retain(|reading| reading.t_s == first_s || reading.t_s == last_s);
     }
     let refusal = Circular.calibrate(&[ends.session_of(circles)]).expect_err("refused").to_string();
-    assert!(refusal.contains("read the pose on the way"), "{refusal}");
+    assert!(refusal.contains("measure the pose along the circle"), "{refusal}");
 }
 
 /// Noise as the paper's (marks read to 0.5 mm and rounded to 1 mm, wheels of 0.5 mm/√m, a base that scatters
@@ -462,8 +462,8 @@ fn as_optiodom(dataset: &Dataset, twice: bool) -> [f64; 3] {
 }
 
 /// Dividing the mean heading by the number of runs once more leaves a fifth of the correction with five runs
-/// a direction: on the paper's robot a base of
-/// 360.6 mm where 351.47 is right (its wheels are 3.28 % larger than nominal). And a term for unequal wheels in the corner is wrong where they are unequal.
+/// a direction: on the paper's robot a base of 360.6 mm where 351.47 is right (its wheels are 3.28 % larger
+/// than nominal). And a term for unequal wheels in the corner is wrong where they are unequal.
 #[test]
 fn jung_chung_divides_once_and_does_not_couple_the_corner() {
     let protocols = [Schedule::Squares { side_m: 4.0, runs_each_way: 5 }];

@@ -267,7 +267,8 @@ fn what_the_covariance_tells_of_the_geometry_is_little() {
     };
     let of_the_paper = gain(&scenario.protocols);
     let of_the_squares = gain(&[Schedule::Squares { side_m: 4.0, runs_each_way: 5 }]);
-    // 1.4e-4 and 4.8e-3: the end of a square turns by 44 rad for its diameter's whole, and the ellipse of its errors with it.
+    // 1.4e-4 and 4.8e-3: the end of a square turns by 44 rad for its diameter's whole, and the ellipse of
+    // its errors with it.
     assert!((1e-5..2e-4).contains(&of_the_paper), "{of_the_paper}");
     assert!((1e-3..6e-3).contains(&of_the_squares), "{of_the_squares}");
 }

@@ -148,11 +148,11 @@ fn paths_that_do_not_show_it_are_refused_and_the_reason_says_what_to_drive() {
         (censi, whole, "whole turns only; add measurements after quarter turns"),
         (censi, one_way, "one arc: add straight runs and spins, or arcs to the other side"),
         (censi, free, "displacement.csv"),
-        (segments, straight, "wheel_separation_m cannot be told"),
-        (segments, spin, "common_scale cannot be told"),
+        (segments, straight, "wheel_separation_m is not observable"),
+        (segments, spin, "common_scale is not observable"),
         (segments, free, "the robot's pose at two instants"),
-        (filter, straight, "wheel_separation_m cannot be told"),
-        (filter, spin, "common_scale cannot be told"),
+        (filter, straight, "wheel_separation_m is not observable"),
+        (filter, spin, "common_scale is not observable"),
         (filter, free, "the robot's pose at two instants"),
     ];
     for (number, (method, keep, why)) in refusals.into_iter().enumerate() {

@@ -104,13 +104,13 @@ impl FisherInformation {
         &self.matrix
     }
 
-    /// The information of who is also told the mean of both diameters, as UMBmark is: its bound says how well
-    /// the rest can be told.
+    /// The information where the mean of both diameters is known too, as UMBmark has it: its bound is that of
+    /// the other parameters.
     #[must_use]
     pub fn given_mean_diameter(&self) -> Self {
         let mean = Vector3::new(0.5, 0.5, 0.0);
-        let told = EXACT_INFORMATION_FACTOR * self.matrix.symmetric_eigenvalues().max();
-        Self { matrix: self.matrix + told * mean * mean.transpose(), ..*self }
+        let exact = EXACT_INFORMATION_FACTOR * self.matrix.symmetric_eigenvalues().max();
+        Self { matrix: self.matrix + exact * mean * mean.transpose(), ..*self }
     }
 
     /// The least variance of an unbiased estimator of `parameter`, in the square of its unit; `None` when
@@ -170,18 +170,18 @@ mod tests {
     }
 
     #[test]
-    fn who_is_told_the_mean_diameter_knows_the_difference_as_well_as_before() {
-        // Both diameters apart, to σ each: their difference to √2 σ, and with the mean each is known to half
+    fn a_known_mean_diameter_leaves_the_bound_of_the_difference() {
+        // Both diameters, to σ each: their difference to √2 σ, and with the mean each is known to half
         // of that.
         let sigma_m = 1e-4_f64;
-        let apart = information(Matrix3::from_diagonal_element(1.0 / (sigma_m * sigma_m)));
-        let told = apart.given_mean_diameter();
-        let left = told.bound_var(Parameter::LeftWheelDiameter).expect("seen").sqrt();
+        let separate = information(Matrix3::from_diagonal_element(1.0 / (sigma_m * sigma_m)));
+        let given_mean = separate.given_mean_diameter();
+        let left = given_mean.bound_var(Parameter::LeftWheelDiameter).expect("seen").sqrt();
         // What the mean keeps of its variance is a millionth.
         assert!((left / (sigma_m / 2_f64.sqrt()) - 1.0).abs() < 2e-6, "{left}");
-        let separation = told.bound_var(Parameter::WheelSeparation).expect("seen").sqrt();
+        let separation = given_mean.bound_var(Parameter::WheelSeparation).expect("seen").sqrt();
         assert!((separation / sigma_m - 1.0).abs() < 1e-9, "{separation}");
-        // Squares do not show the common scale: told the mean, everything is known.
+        // Squares do not show the common scale: with the mean known, everything is.
         let ratio = |a: Vector3<f64>| a * a.transpose() * 1e8;
         let shape =
             ratio(Vector3::new(1.0 / 0.16, -1.0 / 0.16, 0.0)) + ratio(Vector3::new(1.0 / 0.16, 0.0, -1.0 / 0.363));

@@ -114,7 +114,7 @@ pub struct EstimatorResult {
     /// False when the method cannot see the scale common to both wheels: its bias is then that scale's.
     pub common_scale_observable: bool,
     /// Square root of the Cramér–Rao bound: no unbiased method's standard deviation is smaller on this
-    /// protocol. Where the common scale is not observable it is the bound for who is told the mean diameter.
+    /// protocol. Where the common scale is not observable it is the bound for a known mean diameter.
     pub cramer_rao_sigma: Option<f64>,
     /// RMSE² over the Cramér–Rao bound.
     pub cramer_rao_ratio: Option<f64>,

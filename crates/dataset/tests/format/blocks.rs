@@ -93,7 +93,7 @@ fn with_line(file: &Path, number: usize, change: impl Fn(&str) -> String) {
 }
 
 #[test]
-fn a_look_out_of_order_is_found_wherever_it_stands() {
+fn a_measurement_out_of_order_is_found_wherever_it_stands() {
     // Around the marks, which are every 1024 rows, and around the cuts.
     for row in [1, 700, 1023, 1024, 1025, 1500, 2047, 2048, 2049, 3998] {
         let temp = tempfile::tempdir().expect("a temporary folder");

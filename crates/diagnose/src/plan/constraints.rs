@@ -1,4 +1,4 @@
-//! Within what a next experiment is sought: the robot's pace, how it is logged and seen, the floor, the time.
+//! Constraints of a next experiment: the robot's speed, how it is logged and measured, the floor, the time.
 
 use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Point, Pose, Rule};
@@ -20,7 +20,7 @@ pub struct Limits {
     pub top_speed_m_s: Option<f64>,
 }
 
-/// When the instrument looks at a run.
+/// When the instrument measures in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Reading {
     /// At even intervals of so many seconds.

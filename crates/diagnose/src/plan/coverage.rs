@@ -113,8 +113,8 @@ fn detectability_of_all(
         .collect()
 }
 
-/// How many effects are in sight, those half in sight in part.
-fn in_sight(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
+/// How many effects are detectable; one below its limit counts as the fraction that it reaches.
+fn detectable_effects(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
     detectability_of_all(frame, equations, targets)
         .iter()
         .map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0))
@@ -208,7 +208,8 @@ pub(super) fn show(
     let before = total(&model.fit.scan(&mut terms(&all)).runs).ok_or("no run has measurements")?;
     let frame = Frame::of(&model.fit, &all);
     let options = equations_of(&model.fit, &all, setting, manoeuvres);
-    let (mut parts, after, _) = mix(&options, &before, setting, |equations| in_sight(&frame, equations, &targets));
+    let (mut parts, after, _) =
+        mix(&options, &before, setting, |equations| detectable_effects(&frame, equations, &targets));
     let after = pruned(&mut parts, &options, &before, &after, |equations| {
         detected_ids(&detectability_of_all(&frame, equations, &targets))
     });
@@ -317,7 +318,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
     let worth = |equations: &NormalEquations| {
-        in_sight(&frame, equations, &targets) - GEOMETRY_PRECISION_VALUE * spread(&frame, equations)
+        detectable_effects(&frame, equations, &targets) - GEOMETRY_PRECISION_VALUE * spread(&frame, equations)
     };
     let (parts, after, minutes) = mix(&options, &before, &setting, worth);
     if parts.is_empty() {
@@ -325,13 +326,13 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     }
     let (_, covariance) = frame.estimate(&after, &frame.free).ok_or_else(nothing_fits)?;
     let diameter_m = geometry.wheel_diameter_m();
-    let lengths = [
+    let geometry_parameters = [
         ("left_wheel_diameter_m", diameter_m.left),
         ("right_wheel_diameter_m", diameter_m.right),
         ("wheel_separation_m", geometry.wheel_separation_m()),
     ];
-    let relative: Vec<f64> = (0..lengths.len()).map(|k| covariance[(k, k)].sqrt()).collect();
-    let sigmas: BTreeMap<String, f64> = lengths
+    let relative: Vec<f64> = (0..geometry_parameters.len()).map(|k| covariance[(k, k)].sqrt()).collect();
+    let sigmas: BTreeMap<String, f64> = geometry_parameters
         .iter()
         .zip(&relative)
         .filter(|(_, relative)| **relative < UNDETERMINED_GEOMETRY_SIGMA)
@@ -349,11 +350,11 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let not_driven = CATALOGUE.iter().filter_map(|id| Some((*id, conditions(id)?)));
     blind_to.extend(not_driven.map(|(id, how)| Blind {
         id: id.to_owned(),
-        why: format!("it does not go with what is driven: {how}"),
+        why: format!("these motions do not excite it: {how}"),
         smallest_detectable: None,
     }));
     let predicts = shows.iter().map(|detected| (detected.id.clone(), detected.why.clone())).collect();
-    let lengths = if sigmas.len() == relative.len() {
+    let determines = if sigmas.len() == relative.len() {
         format!(
             "determines the wheels' diameters to {:.3} % and {:.3} % and their separation to {:.3} %",
             100.0 * relative[0],
@@ -364,7 +365,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
         "does not determine the three geometry parameters".to_owned()
     };
     let why = format!(
-        "it takes {minutes:.1} min, {lengths}, and {} of {} effects of the catalogue would be detected at a large size, sought {}.",
+        "it takes {minutes:.1} min, {determines}, and {} of {} effects of the catalogue would be detected at a large size, sought {}.",
         shows.len(),
         shows.len() + blind_to.len(),
         setting.within

@@ -172,7 +172,8 @@ impl DiscriminationSearch<'_> {
         with_runs(self.before, &added)
     }
 
-    /// How well so many pairs of runs of each of some kinds tell the worst told of some names.
+    /// The margin by which so many pairs of runs of each of some kinds discriminate the closest of some pairs
+    /// of causes.
     fn margin(&self, names: &[Pair], kinds: &[&Driven], pairs: u32, confidence: Confidence) -> f64 {
         let equations = self.after(kinds, pairs);
         let margin = |pair: &Pair| {

@@ -80,8 +80,8 @@ struct Stretch {
     turn_rad: Wheels<f64>,
 }
 
-/// Drives a program by the nominal robot: the wheel that goes farther drives a trapezoid of speed, the
-/// other one in proportion. Rows come at even intervals, or, where a robot writes none on the way, between
+/// Drives a program by the nominal robot: the wheel that goes farther drives a trapezoid of speed, the other
+/// one in proportion. Rows come at even intervals, or, where a robot writes none along the path, between
 /// motions.
 fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wheels<f64>) -> Option<Log> {
     let geometry = setting.robot.geometry().ok()?;
@@ -174,7 +174,7 @@ impl Trapezoid {
 /// When a run that is not driven yet is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Measurements<'a> {
-    /// As the data's instrument looks.
+    /// As the data's instrument measures.
     AsSoFar,
     /// At the start and at shares of the run's duration.
     At(&'a [f64]),

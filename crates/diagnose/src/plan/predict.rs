@@ -1,9 +1,8 @@
-//! What each name says that the planned runs will show, written down before they are driven.
+//! What each cause predicts of the planned runs, written down before they are driven.
 //!
-//! A name's own sizes and calibration, with the covariance that the data leave them, are driven along the
-//! plan; what is told is where the instrument then sees the robot against dead reckoning with the
-//! calibrated geometry alone, at the instant and in the component at which the names differ most for what is
-//! known.
+//! A cause's own estimates and calibration, with the covariance that the data leave them, are driven along
+//! the plan. The prediction is the measured pose relative to dead reckoning with the calibrated geometry
+//! alone, at the instant and in the component in which the causes differ most for their uncertainty.
 
 use estimation::{Column, EndError, Model, ModelFit, NormalEquations};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -106,7 +105,7 @@ fn phases_at(index: usize) -> impl Iterator<Item = usize> {
     (0..WHEEL_PHASES).map(move |phase| (direction * WHEEL_PHASES + phase) * PREDICTION_INSTANTS + instant)
 }
 
-/// Runs of a part, each seen at its start and at every instant, by direction and phase.
+/// Runs of a part, each measured at its start and at every instant, by direction and phase.
 struct PlannedRun {
     dataset: dataset::Dataset,
     reference: Model,

@@ -245,7 +245,8 @@ pub(super) mod tests {
         Rivals::new(frame, vec![rival_columns(1), rival_columns(2)], before).expect("determined")
     }
 
-    /// Column 0 is the nuisance; names 1 and 2 differ only in the third look, which is not in the old data.
+    /// Column 0 is the nuisance; names 1 and 2 differ only in the third measurement, which is not in the old
+    /// data.
     #[test]
     fn what_another_name_can_say_as_well_tells_nothing() {
         let old = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
@@ -255,8 +256,8 @@ pub(super) mod tests {
         assert!(rivals.estimates.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.estimates);
         let discrimination = rivals.discrimination(&before, (0, 1)).expect("determined");
         assert!(discrimination.sigmas < 1e-3 && discrimination.margin(Confidence::P50) < 0.0, "{discrimination:?}");
-        // One more look sees name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2 at its
-        // best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
+        // One more measurement depends on name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2
+        // at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
         let new = normal_equations(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
         let discrimination = rivals.discrimination(&after, (0, 1)).expect("determined");

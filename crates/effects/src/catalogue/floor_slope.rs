@@ -42,7 +42,7 @@ impl PhysicalEffect for FloorSlope {
     }
 
     fn hypothesis() -> Hypothesis {
-        let by = |way| Variant { fixed: Vec::new(), term: Box::new(Term { way }), at: None };
+        let by = |with_distance| Variant { fixed: Vec::new(), term: Box::new(Term { with_distance }), at: None };
         Hypothesis::Terms(vec![by(false), by(true)])
     }
 
@@ -92,13 +92,13 @@ impl Forward for State {
 #[derive(Clone)]
 struct Term {
     /// With the distance, or else with the time.
-    way: bool,
+    with_distance: bool,
 }
 
 impl ModelTerm for Term {
     /// Plausible: 0.1 % a degree on a floor one degree off, at 0.5 m/s.
     fn parameters(&self) -> &'static [TermParameter] {
-        if self.way {
+        if self.with_distance {
             &[
                 TermParameter { name: "slide_x", unit: "1", prior_sigma: 1e-3 },
                 TermParameter { name: "slide_y", unit: "1", prior_sigma: 1e-3 },
@@ -113,7 +113,7 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let tread_m = 0.5 * (interval.travel_m.left.abs() + interval.travel_m.right.abs());
-        let amount = match self.way {
+        let amount = match self.with_distance {
             true => tread_m,
             false if tread_m > 0.0 => interval.dt_s,
             false => 0.0,

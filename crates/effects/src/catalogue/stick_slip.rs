@@ -146,8 +146,8 @@ impl Term {
             return wound;
         }
         // Forward is where the tread goes: what is wound up the other way unwinds first.
-        let (sense, way) = (travel_m.signum(), travel_m.abs() / TYPICAL_BREAKAWAY_M);
-        let unwound = (sense * wound).min(0.0) + way;
+        let (sense, breakaways) = (travel_m.signum(), travel_m.abs() / TYPICAL_BREAKAWAY_M);
+        let unwound = (sense * wound).min(0.0) + breakaways;
         let wound = (sense * wound).max(0.0);
         if unwound <= 0.0 {
             return sense * unwound;
@@ -208,22 +208,22 @@ mod tests {
         let mut step = specimen_step();
         step.rate_rad_s = Wheels::both(speed_m_s / 0.08);
         let each_m = speed_m_s * step.dt_s;
-        // Ways in breakaways, the last one back.
-        for ways in [&[0.5][..], &[1.0], &[3.0], &[8.0], &[3.0, -1.0], &[3.0, -4.0]] {
+        // Distances in breakaways, the last one back.
+        for distances in [&[0.5][..], &[1.0], &[3.0], &[8.0], &[3.0, -1.0], &[3.0, -4.0]] {
             let term = Term::new(stick_speed_m_s);
             let expected =
-                ways.iter().fold(0.0, |wound, way| term.next(wound, way * breakaway_m, way.signum() * speed_m_s));
+                distances.iter().fold(0.0, |wound, distance| term.next(wound, distance * breakaway_m, distance.signum() * speed_m_s));
             let mut wound = Vec::new();
             for run in 0..2000 {
                 let mut state = StickSlip { stick_speed_m_s, breakaway_m }.forward().expect("acts on the floor");
                 state.seed_run(Address { seed: 3, point: 0, trial: 0, run }.stream(StreamName::new("test")));
                 let mut behind_m = 0.0;
-                for way in ways {
-                    for _ in 0..(way.abs() * breakaway_m / each_m).round() as usize {
+                for distance in distances {
+                    for _ in 0..(distance.abs() * breakaway_m / each_m).round() as usize {
                         let mut step = step;
-                        step.travel_m = Wheels::both(each_m * way.signum());
+                        step.travel_m = Wheels::both(each_m * distance.signum());
                         state.floor(&mut step);
-                        behind_m += each_m * way.signum() - step.travel_m.left;
+                        behind_m += each_m * distance.signum() - step.travel_m.left;
                     }
                 }
                 wound.push(behind_m / breakaway_m);
@@ -231,7 +231,7 @@ mod tests {
             let mean = wound.iter().sum::<f64>() / 2000.0;
             // The exponential is off by a tenth of a breakaway or so; half of the mean wind-up would be off
             // by 0.33, and its sign by 1.3.
-            assert!((mean - expected).abs() < 0.15, "{ways:?}: {mean} {expected}");
+            assert!((mean - expected).abs() < 0.15, "{distances:?}: {mean} {expected}");
         }
         assert_eq!(Term::new(0.02).next(0.5, 1e-3, 0.03), 0.0, "what is fast has let go");
     }

@@ -69,9 +69,9 @@ impl Forward for State {
     }
 }
 
-/// The instants of whatever saw the robot from outside.
-fn seen_s(run: &Run) -> impl Iterator<Item = f64> {
-    let ends = run.displacements.iter().flat_map(|seen| [seen.t0_s, seen.t1_s]);
+/// The instants of all that was measured from outside.
+fn measured_s(run: &Run) -> impl Iterator<Item = f64> {
+    let ends = run.displacements.iter().flat_map(|displacement| [displacement.t0_s, displacement.t1_s]);
     let poses = run.truth.iter().map(|sample| sample.t_s);
     let points = run.point_readings.iter().map(|reading| reading.t_s);
     poses.chain(points).chain(ends).chain(run.wheel_reference.iter().map(|speed| speed.t_s))
@@ -82,7 +82,7 @@ fn span_ratio(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
         let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
         let (first_s, last_s) =
-            seen_s(run).fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t_s| (first.min(t_s), last.max(t_s)));
+            measured_s(run).fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t_s| (first.min(t_s), last.max(t_s)));
         (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
     };
     median(dataset.runs.iter().filter_map(ratio).collect())
@@ -130,8 +130,9 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         run.truth.iter_mut().for_each(|sample| sample.t_s *= factor);
         run.point_readings.iter_mut().for_each(|reading| reading.t_s *= factor);
         run.wheel_reference.iter_mut().for_each(|speed| speed.t_s *= factor);
-        for seen in &mut run.displacements {
-            (seen.t0_s, seen.t1_s) = (seen.t0_s * factor, seen.t1_s * factor);
+        for displacement in &mut run.displacements {
+            displacement.t0_s *= factor;
+            displacement.t1_s *= factor;
         }
     }
     let mut forms = [(log, factor, "the log's"), (measurements, factor.recip(), "the instrument's")];

@@ -99,7 +99,7 @@ mod tests {
     use kinematics::Pose;
 
     #[test]
-    fn errors_have_the_stated_size_and_memory_however_often_one_looks() {
+    fn errors_have_the_stated_size_and_memory_however_often_it_measures() {
         let effect = TruthCorrelatedNoise { sigma_xy_m: 0.01, sigma_theta_rad: 0.02, tau_s: 2.0 };
         for measurements in [1_u32, 8] {
             let (n, mut squares, mut products, mut thetas) = (4000_u32, 0.0, 0.0, 0.0);

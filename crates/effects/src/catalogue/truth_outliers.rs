@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stated_share_of_sightings_jumps_by_the_stated_sizes() {
+    fn the_stated_share_of_measurements_jumps_by_the_stated_sizes() {
         let effect = TruthOutliers { probability: 0.2, jump_m: 0.03, jump_rad: 0.1 };
         let n = 40_000;
         let all = mahalanobis_distance(effect, n);
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_undone_in_the_next_sighting() {
+    fn a_jump_is_undone_in_the_next_measurement() {
         let all = mahalanobis_distance(TruthOutliers { probability: 0.1, jump_m: 0.03, jump_rad: 0.0 }, 200);
         let jumped = |pose: &Pose| *pose != Pose::IDENTITY;
         assert!(all.windows(2).any(|pair| jumped(&pair[0]) && !jumped(&pair[1])));

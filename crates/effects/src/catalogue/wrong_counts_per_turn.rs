@@ -1,4 +1,4 @@
-//! `wrong_counts_per_turn`: a counter makes another number of counts of a turn than the robot believes.
+//! `wrong_counts_per_turn`: a counter makes another number of counts of a turn than the dataset states.
 //!
 //! Model: logged = factor × counts: two or four of one edge, a gear left out, radians for turns, millimetres
 //! for inches.
@@ -79,7 +79,7 @@ impl PhysicalEffect for WrongCountsPerTurn {
                 ..RecordFault::WITH_A_TRACE
             },
             benchmark: Benchmark::of_fault(|_, stream| vec![("factor", [0.25, 0.5, 2.0, 4.0][stream.below(4)])]),
-            ..Description::of("a wheel turn makes another number of counts than the robot believes")
+            ..Description::of("a wheel turn makes another number of counts than the dataset states")
         }
     }
 
@@ -128,20 +128,20 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
         Some([0, 1].map(|k| from[k] + share * (to[k] - from[k])))
     };
     let mut found = [Vec::new(), Vec::new()];
-    for seen in seen(run) {
+    for poses in measured_poses(run) {
         let mut anchors: [Option<(Pose, [f64; 2])>; 2] = [None; 2];
-        for (t_s, seen) in seen {
+        for (t_s, pose) in poses {
             let Some(counted) = at(t_s) else { continue };
             for k in 0..2 {
                 let Some((anchor, start)) = anchors[k] else {
-                    anchors[k] = Some((seen, counted));
+                    anchors[k] = Some((pose, counted));
                     continue;
                 };
                 let moved =
-                    [(seen.x_m - anchor.x_m).hypot(seen.y_m - anchor.y_m), (seen.theta_rad - anchor.theta_rad).abs()];
+                    [(pose.x_m - anchor.x_m).hypot(pose.y_m - anchor.y_m), (pose.theta_rad - anchor.theta_rad).abs()];
                 if moved[k] > MIN_COMPARED_MOTION[k] {
                     found[k].push((counted[k] - start[k]).abs() / moved[k]);
-                    anchors[k] = Some((seen, counted));
+                    anchors[k] = Some((pose, counted));
                 }
             }
         }
@@ -149,9 +149,9 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
     Some(found)
 }
 
-/// What the instrument saw, in stretches that hang together: its poses, or displacements that follow each
-/// other, each from the first one's start.
-fn seen(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
+/// What the instrument measured, in stretches that hang together: its poses, or displacements that follow
+/// each other, each from the first one's start.
+fn measured_poses(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
     let displacements = &run.run().displacements;
     if displacements.is_empty() {
         return vec![run.observed_poses()];
@@ -179,8 +179,8 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
         let Some(found) = ratios(dataset, run) else { continue };
         all.iter_mut().zip(found).for_each(|(all, found)| all.extend(found));
     }
-    let [ways, turns] = all.map(median);
-    let factor = ways.or(turns).filter(|factor| *factor > 0.0 && factor.is_finite())?;
+    let [distances, turns] = all.map(median);
+    let factor = distances.or(turns).filter(|factor| *factor > 0.0 && factor.is_finite())?;
     (factor.ln().abs() > MIN_DEPARTURE.ln_1p()).then_some(factor)
 }
 
@@ -188,9 +188,9 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
 /// turn, and may lead back.
 const MIN_MEASUREMENTS: usize = 4;
 
-/// Whether the runs are seen at their ends alone.
-fn is_seen_at_ends(dataset: &Dataset) -> bool {
-    let measurements = |run: &RunView<'_>| seen(run).iter().map(Vec::len).sum::<usize>();
+/// Whether the runs are measured at their ends alone.
+fn is_measured_at_ends(dataset: &Dataset) -> bool {
+    let measurements = |run: &RunView<'_>| measured_poses(run).iter().map(Vec::len).sum::<usize>();
     let session = dataset.session();
     let (runs, measurements) = session
         .runs
@@ -204,14 +204,14 @@ fn is_seen_at_ends(dataset: &Dataset) -> bool {
 /// The factors that may be: that of the distances that were measured and, where hardly any was, all that
 /// people err by.
 fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
-    let of_ways = estimate(dataset).map(|estimate| {
+    let of_distances = estimate(dataset).map(|estimate| {
         let off = |factor: f64| (estimate / factor).ln().abs();
         let nearest = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
         nearest.filter(|(factor, _)| off(*factor) < FACTOR_TOLERANCE).copied().unwrap_or((estimate, "a gear?"))
     });
-    let all = if is_seen_at_ends(dataset) { &FACTORS[..] } else { &[] };
-    let others = all.iter().copied().filter(|known| Some(*known) != of_ways);
-    of_ways.into_iter().chain(others).collect()
+    let all = if is_measured_at_ends(dataset) { &FACTORS[..] } else { &[] };
+    let others = all.iter().copied().filter(|known| Some(*known) != of_distances);
+    of_distances.into_iter().chain(others).collect()
 }
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {

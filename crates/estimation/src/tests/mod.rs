@@ -4,9 +4,9 @@ use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNo
 use kinematics::{Increment, Pose, Wheels};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 
-use crate::filter::{OutlierGate, PassOptions};
 use crate::normal_equations::total;
 use crate::pass::pass;
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 

@@ -9,7 +9,7 @@
 use kinematics::{Count, DriveGeometry, GeometryError, OdometryCovariance, Pose, WheelNoise, Wheels, wrap_to_pi};
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
-use super::noise::{Expected, HEADING, NoiseFilter, POSITION, Variances, WHEELS};
+use super::noise::{Expected, NoiseFilter, NoiseSource, Variances};
 use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
 use crate::settings::{SETTLED_FACTOR_SIGMA, SETTLED_MOVE_SIGMA};
 
@@ -304,7 +304,10 @@ impl<C: Count> AugmentedFilter<C> {
 
     fn whole(&self, spread: &[Matrix6<f64>; 4]) -> Matrix6<f64> {
         let variances: &Variances = self.noise.variances();
-        spread[0] + spread[1] * variances[WHEELS] + spread[2] * variances[POSITION] + spread[3] * variances[HEADING]
+        spread[0]
+            + spread[1] * variances[NoiseSource::Wheels as usize]
+            + spread[2] * variances[NoiseSource::Position as usize]
+            + spread[3] * variances[NoiseSource::Heading as usize]
     }
 
     /// ∂(state now)/∂(state at the last measurement).

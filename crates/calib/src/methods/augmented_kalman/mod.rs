@@ -24,7 +24,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use filter::{AugmentedFilter, PoseInnovation, Settling};
 pub use follow::{Followed, settled_at};
-pub use noise::{NoiseFilter, Variances};
+pub use noise::{NoiseFilter, NoiseSource, Variances};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
@@ -158,7 +158,7 @@ impl Method for AugmentedKalman {
     }
 
     fn about(&self) -> &'static str {
-        "any path with straights and turns, seen as poses: a Kalman filter of pose and factors, with its noise estimated"
+        "any path with straights and turns, measured as poses: a Kalman filter of pose and factors, with its noise estimated"
     }
 
     /// Martinelli's robot wandered; straights and spins show all three factors.

@@ -4,24 +4,27 @@
 //! Here they are the products of the first filter's innovations ν: at given gains their mean S = C + Σ q_i
 //! D_i is linear in the variances q, exactly, because the covariance in Joseph's form is; the first filter
 //! carries C and D along. q is a constant state measured through νν', whose scatter for normal errors gives
-//! the weights: information Λ_ij = ½ tr(S⁻¹D_i S⁻¹D_j) and its share of evidence ½ tr(S⁻¹D_i S⁻¹(νν' − C)) of
-//! each measurement. This is Fisher scoring on the likelihood of the innovations (Mehra 1970), one
-//! measurement at a time.
+//! the weights: information Λ_ij = ½ tr(S⁻¹D_i S⁻¹D_j) and its share of the information vector ½ tr(S⁻¹D_i
+//! S⁻¹(νν' − C)) of each measurement. This is Fisher scoring on the likelihood of the innovations (Mehra
+//! 1970), one measurement at a time.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::settings::{MAX_NOISE_FACTOR, MAX_NOISE_STEP, NOISE_PRIOR_MEASUREMENTS};
 
-/// Noise variances, of which there are three: the wheels' (m, variance of travel a metre), the instrument's
-/// position (m²) and heading (rad²).
+/// Noise variances in the order of [`NoiseSource`].
 pub type Variances = Vector3<f64>;
 
-/// The wheels' noise is the first of [`Variances`].
-pub(super) const WHEELS: usize = 0;
-/// The instrument's position is the second.
-pub(super) const POSITION: usize = 1;
-/// The instrument's heading is the third.
-pub(super) const HEADING: usize = 2;
+/// What a noise variance is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// The wheels: variance of travel a metre, m.
+    Wheels,
+    /// The instrument's position, m².
+    Position,
+    /// The instrument's heading, rad².
+    Heading,
+}
 
 /// Estimate of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +34,7 @@ pub struct NoiseFilter {
     known: [bool; 3],
     adapting: bool,
     information: Matrix3<f64>,
-    evidence: Vector3<f64>,
+    information_vector: Vector3<f64>,
     gradient: Vector3<f64>,
     log_likelihood: f64,
 }
@@ -61,7 +64,7 @@ impl NoiseFilter {
             known,
             adapting: true,
             information: Matrix3::zeros(),
-            evidence: Vector3::zeros(),
+            information_vector: Vector3::zeros(),
             gradient: Vector3::zeros(),
             log_likelihood: 0.0,
         }
@@ -91,9 +94,9 @@ impl NoiseFilter {
             for j in 0..3 {
                 let information = 0.5 * (weights[i] * weights[j]).trace();
                 self.information[(i, j)] += information;
-                self.evidence[i] += information * self.variances[j];
+                self.information_vector[i] += information * self.variances[j];
             }
-            self.evidence[i] += 0.5 * (weights[i] * surprise).trace();
+            self.information_vector[i] += 0.5 * (weights[i] * surprise).trace();
         }
         self.log_likelihood -= 0.5 * (mean.determinant().ln() + innovation.dot(&(inverse * innovation)));
         if self.adapting {
@@ -105,24 +108,24 @@ impl NoiseFilter {
     fn solve(&mut self) {
         let mut held = self.known;
         loop {
-            let (mut information, mut evidence) = (self.information, self.evidence);
+            let (mut information, mut information_vector) = (self.information, self.information_vector);
             for i in 0..3 {
                 let prior = 0.5 * NOISE_PRIOR_MEASUREMENTS / (self.guess[i] * self.guess[i]);
                 information[(i, i)] += prior;
-                evidence[i] += prior * self.guess[i];
+                information_vector[i] += prior * self.guess[i];
             }
             for i in (0..3).filter(|i| held[*i]) {
                 for j in (0..3).filter(|j| !held[*j]) {
-                    evidence[j] -= information[(j, i)] * self.variances[i];
+                    information_vector[j] -= information[(j, i)] * self.variances[i];
                     information[(j, i)] = 0.0;
                     information[(i, j)] = 0.0;
                 }
                 information.set_row(i, &nalgebra::RowVector3::zeros());
                 information.set_column(i, &Vector3::zeros());
                 information[(i, i)] = 1.0;
-                evidence[i] = self.variances[i];
+                information_vector[i] = self.variances[i];
             }
-            let Some(variances) = information.lu().solve(&evidence) else { return };
+            let Some(variances) = information.lu().solve(&information_vector) else { return };
             let outside = |i: usize| {
                 let (least, most) = (self.guess[i] / MAX_NOISE_FACTOR, self.guess[i] * MAX_NOISE_FACTOR);
                 (!held[i] && !(least..=most).contains(&variances[i])).then(|| variances[i].clamp(least, most))
@@ -298,7 +301,7 @@ mod tests {
     fn what_is_known_stays_and_what_is_absent_goes_to_the_border() {
         let measurements = measurements();
         let found = scored(&measurements, [false, true, false]);
-        assert_eq!(found.variances()[POSITION], 1e-6);
+        assert_eq!(found.variances()[NoiseSource::Position as usize], 1e-6);
         // Innovations without any scatter: every variance ends where its range does, and none is negative.
         let mut filter = guess();
         measurements.iter().for_each(|(_, expected)| filter.measurement(&Vector3::zeros(), expected));
