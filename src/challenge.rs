@@ -30,8 +30,8 @@ pub(crate) struct Arguments {
     /// Write the datasets of --case into this folder, one folder a session.
     #[arg(long, value_name = "DIR", requires = "case")]
     out: Option<PathBuf>,
-    /// Compare with a stored campaign; exit 1 when any guarded share got worse. Nulls and single effects
-    /// alone are driven.
+    /// Compare with a stored campaign; exit 1 when any kind of failure got more frequent. Driven are
+    /// nulls, and the single effects of every second block of twenty.
     #[arg(long, value_name = "BASELINE", conflicts_with = "case")]
     check: Option<PathBuf>,
     /// Write the baseline of --check anew.
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let result = challenge(arguments.seed, arguments.cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     terminal.remark(&format!("{} cases in {:.1} s", result.cases.len(), started.elapsed().as_secs_f64()));
-    let now = DiagnosisBaseline::of(arguments.seed, arguments.cases, &result.measures, &result.cases);
+    let now = DiagnosisBaseline::of(arguments.seed, arguments.cases, &result.cases);
     let check = baseline.map(|baseline| baseline.check(&now));
     show(&result, terminal)?;
     terminal.document(&Document { result: &result, check: check.as_ref() })?;
@@ -87,31 +87,29 @@ struct Document<'a> {
 
 /// Says what the comparison with the baseline gave.
 fn conclude(check: &DiagnosisCheck, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let mut rows = table(&["guarded", "was", "is", "p"], 1);
+    let mut rows = table(&["failures", "was", "is", "new", "mended", "p"], 1);
+    let of = |(failures, of): (usize, usize)| format!("{failures} of {of}");
+    let number = |cases: &Option<Vec<u64>>| cases.as_ref().map_or("–".to_owned(), |cases| cases.len().to_string());
     for guarded in &check.guarded {
-        rows.add_row([
-            guarded.is.what.clone(),
-            format!("{} of {}", guarded.was.count, guarded.was.of),
-            format!("{} of {}", guarded.is.count, guarded.is.of),
-            format!("{:.2e}", guarded.p_value),
-        ]);
+        let p_value = format!("{:.2e}", guarded.p_value);
+        let counts = [of(guarded.was), of(guarded.is), number(&guarded.new_failures), number(&guarded.mended), p_value];
+        rows.add_row([guarded.what.clone()].into_iter().chain(counts));
     }
     terminal.say(&rows.to_string())?;
     let worse: Vec<String> = check
         .worse()
         .iter()
         .map(|guarded| {
-            let (is, was) = (&guarded.is, &guarded.was);
-            let p_value = guarded.p_value;
-            format!(
-                "{}: {} of {}, where the baseline has {} of {} (p = {p_value:.1e})",
-                is.what, is.count, is.of, was.count, was.of
-            )
+            let (is, was, p_value) = (of(guarded.is), of(guarded.was), guarded.p_value);
+            let such_as = guarded.new_failures.iter().flatten().take(3).map(u64::to_string).collect::<Vec<_>>();
+            let such_as =
+                if such_as.is_empty() { String::new() } else { format!(", such as cases {}", such_as.join(", ")) };
+            format!("{}: {is}, where the baseline has {was} (p = {p_value:.1e}){such_as}", guarded.what)
         })
         .collect();
     if worse.is_empty() {
         terminal.say(&format!(
-            "diagnosis: {} shares compared, none worse at p < {:.4} (false-alarm budget {})",
+            "diagnosis: {} kinds of failure compared, none more frequent at p < {:.4} (false-alarm budget {})",
             check.guarded.len(),
             check.level,
             check.false_alarm_budget

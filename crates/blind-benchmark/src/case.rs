@@ -55,6 +55,16 @@ impl CaseKind {
     }
 }
 
+/// Whether a case is of those that a baseline guards: the nulls, which are quick, and the single effects of
+/// every second block.
+pub(crate) const fn is_guarded(number: u64) -> bool {
+    match CaseKind::of(number).0 {
+        CaseKind::Null => true,
+        CaseKind::Single => (number / BLOCK).is_multiple_of(2),
+        CaseKind::Pair | CaseKind::LeftOut => false,
+    }
+}
+
 /// A case ready to be diagnosed.
 pub(crate) struct Case {
     seed: u64,

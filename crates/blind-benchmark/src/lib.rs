@@ -139,8 +139,7 @@ pub fn challenge(
 ) -> Result<ChallengeResult, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
-    let is_asked =
-        |number: &u64| scope == Scope::Whole || matches!(CaseKind::of(*number).0, CaseKind::Null | CaseKind::Single);
+    let is_asked = |number: &u64| scope == Scope::Whole || case::is_guarded(*number);
     let one = |number| {
         let result = case_in(scope, seed, number);
         done();

@@ -8,7 +8,7 @@ use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
 use super::measure_value::{Measure, share};
 use super::oracle_view::OracleView;
-use super::power_ratio::{power, resolved_means};
+use super::power_ratio::{power, resolved_mean};
 use super::result::{CaseResult, Planned, Reported};
 
 fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> (usize, usize) {
@@ -120,11 +120,24 @@ pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) 
 /// A single effect counts as plain at this many detection limits, the bar on the power's ratio.
 const PLAIN_RATIO: f64 = 1.6;
 
+/// Whether a case hides a single mean that the encoder resolves and that must be detected.
+pub(crate) fn is_plain(case: &CaseResult) -> bool {
+    resolved_mean(case).is_some_and(|ratio| ratio >= PLAIN_RATIO)
+}
+
 fn detected(cases: &[CaseResult]) -> Measure {
-    let plain: Vec<&CaseResult> =
-        resolved_means(cases).filter(|(_, ratio)| *ratio >= PLAIN_RATIO).map(|(case, _)| case).collect();
-    let hit = |case: &&CaseResult| case.findings().next().is_some();
-    share("detected", "effects of 1.6 limits and more that are detected", count(plain.iter(), hit), 0.9, false)
+    let hit = |case: &CaseResult| case.findings().next().is_some();
+    let plain = cases.iter().filter(|case| is_plain(case));
+    share("detected", "effects of 1.6 limits and more that are detected", count(plain, hit), 0.9, false)
+}
+
+/// Whether the right name is first, of a detected single effect without an alias.
+pub(crate) fn is_first_name_right(case: &CaseResult) -> Option<bool> {
+    let hidden = case.hidden.first().filter(|hidden| case.case_kind == CaseKind::Single && !is_aliased(hidden))?;
+    match naming_outcome(hidden, case.findings().next()) {
+        NamingOutcome::Undetected => None,
+        outcome => Some(outcome == NamingOutcome::First),
+    }
 }
 
 /// Robots drawn for a single mean whose encoder does not resolve it: those that were drawn again, and those

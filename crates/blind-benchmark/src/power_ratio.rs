@@ -8,12 +8,10 @@ use super::instrument::NoiseClass;
 use super::measure_value::Measure;
 use super::result::CaseResult;
 
-/// Single means that the encoder resolves, each with its ratio.
-pub(crate) fn resolved_means(cases: &[CaseResult]) -> impl Iterator<Item = (&CaseResult, f64)> {
-    cases.iter().filter(|case| case.case_kind == CaseKind::Single).filter_map(|case| {
-        let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean && hidden.is_resolved())?;
-        Some((case, hidden.ratio?))
-    })
+/// The ratio of a single mean that the encoder resolves.
+pub(crate) fn resolved_mean(case: &CaseResult) -> Option<f64> {
+    let hidden = case.hidden.first().filter(|_| case.case_kind == CaseKind::Single)?;
+    hidden.ratio.filter(|_| hidden.kind == EffectKind::Mean && hidden.is_resolved())
 }
 
 /// Draws of the cases again, with replacement, for the limit of the power's ratio.
@@ -23,10 +21,8 @@ const BOOTSTRAPS: usize = 400;
 /// of detection over size crosses 0.9.
 pub(crate) fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let hit = |case: &CaseResult| f64::from(u8::from(case.findings().next().is_some()));
-    let mut points: Vec<(f64, f64)> = resolved_means(cases)
-        .filter(|(case, _)| case.noise == NoiseClass::White)
-        .map(|(case, ratio)| (ratio, hit(case)))
-        .collect();
+    let white = cases.iter().filter(|case| case.noise == NoiseClass::White);
+    let mut points: Vec<(f64, f64)> = white.filter_map(|case| Some((resolved_mean(case)?, hit(case)))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let value = crossing(&points, 0.9);
     let mut draw = Draw::of(seed, u64::MAX, "bootstrap", 0);

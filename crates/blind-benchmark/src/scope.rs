@@ -5,6 +5,6 @@
 pub enum Scope {
     /// All of them, with planned runs and gains.
     Whole,
-    /// Nulls and single effects, and what is said of them: all that a baseline guards.
+    /// Nulls, the single effects of every second block, and what is said of them: all that a baseline guards.
     Guarded,
 }
