@@ -24,6 +24,10 @@ sweep:
 accuracy:
     .ci/run accuracy
 
+# Does diagnosis raise no more false findings, find as much and name it as rightly as it did?
+diagnosis:
+    .ci/run diagnosis
+
 # The library's documentation, warnings as errors
 doc:
     .ci/run doc

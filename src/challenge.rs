@@ -1,12 +1,16 @@
-//! `yair challenge [--cases N] [--seed S] [--case K [--out DIR]]`
+//! `yair challenge [--cases N] [--seed S] [--case K [--out DIR]] [--check BASELINE [--update]]`
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use blind_benchmark::{CaseResult, ChallengeResult, Measure, challenge, challenge_case, challenge_datasets};
+use blind_benchmark::{
+    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge, challenge_case,
+    challenge_datasets,
+};
 use clap::Args;
 use dataset::Existing;
+use serde::Serialize;
 
 use crate::terminal::{Failure, Terminal, cell, table};
 
@@ -26,6 +30,13 @@ pub(crate) struct Arguments {
     /// Write the datasets of --case into this folder, one folder a session.
     #[arg(long, value_name = "DIR", requires = "case")]
     out: Option<PathBuf>,
+    /// Compare with a stored campaign; exit 1 when any kind of failure got more frequent. Driven are
+    /// nulls, and the single effects of every second block of twenty.
+    #[arg(long, value_name = "BASELINE", conflicts_with = "case")]
+    check: Option<PathBuf>,
+    /// Write the baseline of --check anew.
+    #[arg(long, requires = "check")]
+    update: bool,
     /// Threads; 0 = one a core. The result does not depend on it.
     #[arg(long, value_name = "J", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
     jobs: u16,
@@ -41,14 +52,71 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(number) = arguments.case {
         return one(arguments, number, terminal);
     }
+    // Whatever can go wrong at the end is looked at before the cases.
+    let baseline = match &arguments.check {
+        Some(path) if !arguments.update => Some(DiagnosisBaseline::read(path)?),
+        _ => None,
+    };
     let bar = terminal.progress(arguments.cases, "cases");
     let started = Instant::now();
-    let result = challenge(arguments.seed, arguments.cases, arguments.jobs.into(), &|| bar.inc(1))?;
+    let scope = if arguments.check.is_some() { Scope::Guarded } else { Scope::Whole };
+    let result = challenge(arguments.seed, arguments.cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
     bar.finish_and_clear();
+    terminal.remark(&format!("{} cases in {:.1} s", result.cases.len(), started.elapsed().as_secs_f64()));
+    let now = DiagnosisBaseline::of(arguments.seed, arguments.cases, &result.cases);
+    let check = baseline.map(|baseline| baseline.check(&now));
     show(&result, terminal)?;
-    terminal.document(&result)?;
-    terminal.remark(&format!("{} cases in {:.1} s", arguments.cases, started.elapsed().as_secs_f64()));
-    Ok(ExitCode::SUCCESS)
+    terminal.document(&Document { result: &result, check: check.as_ref() })?;
+    if let Some(path) = arguments.check.as_ref().filter(|_| arguments.update) {
+        let mut bytes = serde_json::to_vec_pretty(&now)?;
+        bytes.push(b'\n');
+        atomic_file::write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        terminal.remark(&format!("baseline {} is written", path.display()));
+    }
+    check.map_or(Ok(ExitCode::SUCCESS), |check| conclude(&check, terminal))
+}
+
+/// A campaign's document with what a check adds.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    result: &'a ChallengeResult,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<&'a DiagnosisCheck>,
+}
+
+/// Says what the comparison with the baseline gave.
+fn conclude(check: &DiagnosisCheck, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let mut rows = table(&["failures", "was", "is", "new", "mended", "p"], 1);
+    let of = |(failures, of): (usize, usize)| format!("{failures} of {of}");
+    let number = |cases: &Option<Vec<u64>>| cases.as_ref().map_or("–".to_owned(), |cases| cases.len().to_string());
+    for guarded in &check.guarded {
+        let p_value = format!("{:.2e}", guarded.p_value);
+        let counts = [of(guarded.was), of(guarded.is), number(&guarded.new_failures), number(&guarded.mended), p_value];
+        rows.add_row([guarded.what.clone()].into_iter().chain(counts));
+    }
+    terminal.say(&rows.to_string())?;
+    let worse: Vec<String> = check
+        .worse()
+        .iter()
+        .map(|guarded| {
+            let (is, was, p_value) = (of(guarded.is), of(guarded.was), guarded.p_value);
+            let such_as = guarded.new_failures.iter().flatten().take(3).map(u64::to_string).collect::<Vec<_>>();
+            let such_as =
+                if such_as.is_empty() { String::new() } else { format!(", such as cases {}", such_as.join(", ")) };
+            format!("{}: {is}, where the baseline has {was} (p = {p_value:.1e}){such_as}", guarded.what)
+        })
+        .collect();
+    if worse.is_empty() {
+        terminal.say(&format!(
+            "diagnosis: {} kinds of failure compared, none more frequent at p < {:.4} (false-alarm budget {})",
+            check.guarded.len(),
+            check.level,
+            check.false_alarm_budget
+        ))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    Err(format!("diagnosis got worse: {}", worse.join("; ")).into())
 }
 
 fn one(arguments: &Arguments, number: u64, terminal: &Terminal) -> Result<ExitCode, Failure> {
@@ -77,6 +145,18 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!(
         "case {}: {:?}, {:?} paths, {:?} truth, {:?} noise; {sessions} sessions, {runs} runs, {measurements} measurements",
         result.case, result.case_kind, result.paths, result.truth, result.noise
+    ))?;
+    let drawn = &result.drawn;
+    terminal.say(&format!(
+        "wheelbase {:.0} mm, {:.0} ticks a turn ({:.3} mm), {:.0} rows/s, stamps {:?}, {:.1} measurements/s of {:.1} mm, {:?} wheels",
+        1e3 * drawn.wheel_separation_m,
+        drawn.ticks_per_turn,
+        1e3 * drawn.tick_m,
+        drawn.log_rate_hz,
+        result.strata.stamps,
+        drawn.truth_rate_hz,
+        1e3 * drawn.sigma_xy_m,
+        result.strata.wheels
     ))?;
     for hidden in &result.hidden {
         let sizes: Vec<String> = hidden.values.iter().map(|(name, size)| format!("{name} = {size:.3e}")).collect();
@@ -124,9 +204,38 @@ fn show_case(result: &CaseResult, terminal: &Terminal) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The shares of a stratum that a person reads; --json has all, each with its interval.
+const SHOWN_IN_STRATA: [(&str, &str); 5] = [
+    ("detected", "detected"),
+    ("first_name", "first name"),
+    ("set_holds", "set holds"),
+    ("left_out", "left out"),
+    ("coverage_low", "covers"),
+];
+
+fn show_strata(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
+    let mut headers = vec!["stratum", "level", "nulls with a finding", "95 % interval"];
+    headers.extend(SHOWN_IN_STRATA.map(|(_, header)| header));
+    let mut rows = table(&headers, 2);
+    for stratum in &result.strata {
+        let measure = |id: &str| stratum.measures.iter().find(|measure| measure.id == id && measure.of > 0);
+        let share = |id: &str| {
+            let of = |measure: &Measure| measure.count.map(|count| format!("{count}/{}", measure.of));
+            measure(id).and_then(of).unwrap_or_else(|| "–".to_owned())
+        };
+        let interval = measure("null_findings").and_then(|measure| measure.interval);
+        let interval = interval
+            .map_or_else(|| "–".to_owned(), |[low, high]| format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high));
+        let names = [stratum.stratum.clone(), stratum.level.clone(), share("null_findings"), interval];
+        rows.add_row(names.into_iter().chain(SHOWN_IN_STRATA.map(|(id, _)| share(id))));
+    }
+    terminal.say("by stratum, with Clopper and Pearson's two-sided interval:")?;
+    terminal.say(&rows.to_string())
+}
+
 fn show(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
     let mut rows = table(&["measure", "value", "95 % limit", "bar", "of", "met"], 1);
-    for measure in &result.measures {
+    for measure in result.measures.iter().filter(|measure| measure.of > 0) {
         let Measure { what, value, limit, of, bar, at_most, met, .. } = measure;
         let sense = if *at_most { "≤" } else { "≥" };
         rows.add_row([
@@ -139,6 +248,7 @@ fn show(result: &ChallengeResult, terminal: &Terminal) -> Result<(), Failure> {
         ]);
     }
     terminal.say(&rows.to_string())?;
+    show_strata(result, terminal)?;
     // What went wrong, the most frequent first.
     let mut wrong: Vec<_> =
         result.confusions.iter().filter(|confusion| confusion.hidden != confusion.reported).collect();

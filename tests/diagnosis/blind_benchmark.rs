@@ -49,7 +49,7 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
     let white = || cases.iter().filter(|case| case.noise == NoiseClass::White);
     let share = alpha / 3.0;
     let (alarms, nulls) =
-        count(white().filter(|case| case.case_kind == CaseKind::Null), |case| !case.reported.is_empty());
+        count(white().filter(|case| case.case_kind == CaseKind::Null), |case| case.findings().next().is_some());
     let plain = || {
         white().filter(|case| {
             let shows = |ratio: Option<f64>| ratio.is_some_and(|ratio| ratio > CLEAR_RATIO);
@@ -57,13 +57,13 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
                 && case.hidden.iter().all(|own| own.kind == EffectKind::Mean && shows(own.ratio))
         })
     };
-    let (detected, singles) = count(plain(), |case| !case.reported.is_empty());
+    let (detected, singles) = count(plain(), |case| case.findings().next().is_some());
     let named = |case: &CaseResult| {
         case.hidden
             .iter()
-            .all(|hidden| case.reported.first().is_some_and(|reported| reported.names.contains(&hidden.id)))
+            .all(|hidden| case.findings().next().is_some_and(|reported| reported.names.contains(&hidden.id)))
     };
-    let (named, reported) = count(plain().filter(|case| !case.reported.is_empty()), named);
+    let (named, reported) = count(plain().filter(|case| case.findings().next().is_some()), named);
     println!(
         "seed {seed}: {alarms} alarms in {nulls} nulls, {detected} of {singles} detected, {named} of {reported} named"
     );

@@ -1,15 +1,16 @@
 //! One case: a random robot, what is hidden in it, what it brings home, and what the oracle knows. Addressed
 //! by seed and number alone.
 
-use dataset::{Dataset, Provenance, Run};
-use effects::{Needs, StreamName};
+use dataset::Dataset;
+use effects::Needs;
 use kinematics::DriveGeometry;
-use motion_programs::Platform;
-use scenario::Scenario;
-use sim_yair::SimulatedRobot;
 
-use super::draw::Draw;
-use super::hidden::{ActingEffect, EffectKind, Hidden, hideable};
+use super::conditions::Conditions;
+#[cfg(test)]
+use super::conditions::Stamps;
+use super::draw::{CaseDraws, Draw};
+use super::drive::{DriveContext, HELD_OUT_RUN, PLANNED, drive, mean_square_motion};
+use super::hidden::{EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
 use super::oracle::{Detectability, TrueNoise};
 use super::power::DISCRIMINATION_LEVEL;
@@ -54,11 +55,22 @@ impl CaseKind {
     }
 }
 
+/// Whether a case is of those that a baseline guards: the nulls, which are quick, and the single effects of
+/// every second block.
+pub(crate) const fn is_guarded(number: u64) -> bool {
+    match CaseKind::of(number).0 {
+        CaseKind::Null => true,
+        CaseKind::Single => (number / BLOCK).is_multiple_of(2),
+        CaseKind::Pair | CaseKind::LeftOut => false,
+    }
+}
+
 /// A case ready to be diagnosed.
 pub(crate) struct Case {
     seed: u64,
     number: u64,
     pub(crate) case_kind: CaseKind,
+    pub(crate) conditions: Conditions,
     pub(crate) robot: RandomRobot,
     pub(crate) instrument_model: InstrumentModel,
     pub(crate) hidden: Vec<Hidden>,
@@ -72,6 +84,17 @@ pub(crate) struct Case {
     /// What a calibration without the effects would find, without noise.
     pub(crate) best_drive: Option<estimation::Model>,
     pub(crate) noise: TrueNoise,
+    /// Robots that were drawn before whose encoder does not resolve what is hidden.
+    pub(crate) unresolved_robots: usize,
+}
+
+/// What came of a robot that was drawn for a case.
+enum Attempt {
+    Ready(Box<Case>),
+    /// Its paths do not show what is hidden.
+    Unseen,
+    /// They would, but for the rounding of its encoder.
+    Unresolved,
 }
 
 /// Sizes over the detection limit: of singles, and of pairs, which ask for names and not for power.
@@ -79,10 +102,6 @@ const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
 const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
 /// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
 const MAX_RATIO_ERROR: f64 = 1.5;
-/// Where the held-out log's draws are, away from the sessions'.
-const HELD_OUT_RUN: u32 = 16;
-/// Where those of planned runs are.
-const PLANNED: u32 = 8;
 /// Steps in which a scale is sought.
 const MAX_STEPS: usize = 5;
 /// Another form of which the hypothesis takes up less is another effect: the forms of
@@ -91,81 +110,18 @@ const MIN_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;
 
-/// The sessions of a robot with hidden effects, with noise or without.
-fn drive(
-    plans: &[SessionPlan],
-    case: &DriveContext<'_>,
-    hidden: &[&Hidden],
-    noisy: bool,
-    first_point: u32,
-) -> Result<Vec<Dataset>, ChallengeError> {
-    let ids: Vec<&str> = hidden.iter().map(|hidden| hidden.id).collect();
-    (first_point..).zip(plans).map(|(point, plan)| drive_session(plan, case, hidden, &ids, noisy, point)).collect()
-}
-
-/// What the drives of one case share.
-struct DriveContext<'c> {
-    seed: u64,
-    number: u64,
-    robot: &'c RandomRobot,
-    instrument_model: &'c InstrumentModel,
-}
-
-fn drive_session(
-    plan: &SessionPlan,
-    case: &DriveContext<'_>,
-    hidden: &[&Hidden],
-    ids: &[&str],
-    noisy: bool,
-    point: u32,
-) -> Result<Dataset, ChallengeError> {
-    let mut scenario: Scenario = plan.scenario.clone();
-    if !noisy {
-        scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
-    }
-    scenario.effects.extend(case.robot.harmless(ids));
-    // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of
-    // what the oracle sees.
-    if noisy && point < HELD_OUT_RUN {
-        scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
-    }
-    let mut more = Vec::new();
-    for hidden in hidden {
-        match hidden.act() {
-            Some(ActingEffect::Catalogue(effect)) => scenario.effects.push(effect),
-            Some(ActingEffect::Other(forward)) => more.push((hidden.id, forward)),
-            None => {}
-        }
-    }
-    let mut robot = SimulatedRobot::with_more_effects(&scenario, case.seed, case.number, more)?.at_point(point);
-    let mut runs = Vec::with_capacity(plan.programs.len());
-    for (number, program) in (0_u32..).zip(&plan.programs) {
-        let mut run = Run::default();
-        robot.drive_into(program, &mut run)?;
-        // Each run's measurements have draws of their own.
-        let address = effects::Address { seed: case.seed, point, trial: case.number, run: number };
-        let mut draw = Draw(address.stream(StreamName::new("challenge looks")));
-        case.instrument_model.measurement(&mut run, noisy.then_some(&mut draw));
-        runs.push(run);
-    }
-    Ok(Dataset {
-        provenance: Provenance::default(),
-        robot: robot.robot(),
-        truth_noise: case.instrument_model.stated(),
-        points: Vec::new(),
-        runs,
-    })
-}
-
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
     pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
         let (case_kind, index) = CaseKind::of(number);
+        let mut unresolved_robots = 0;
         for attempt in 0..ATTEMPTS {
             // Two that show on the same paths must be met; which, is drawn anew.
             let ids = Self::ids(seed, number, case_kind, index, if case_kind == CaseKind::Pair { attempt } else { 0 });
-            if let Some(case) = Self::attempt(seed, number, case_kind, &ids, attempt)? {
-                return Ok(Ok(case));
+            match Self::attempt(seed, number, case_kind, &ids, attempt)? {
+                Attempt::Ready(case) => return Ok(Ok(Self { unresolved_robots, ..*case })),
+                Attempt::Unresolved => unresolved_robots += 1,
+                Attempt::Unseen => {}
             }
         }
         Ok(Err(Self::ids(seed, number, case_kind, index, 0).first().copied().unwrap_or("")))
@@ -210,34 +166,47 @@ impl Case {
         case_kind: CaseKind,
         ids: &[&'static str],
         attempt: u64,
-    ) -> Result<Option<Self>, ChallengeError> {
-        let mut draw = Draw::of(seed, number, "robot", attempt);
+    ) -> Result<Attempt, ChallengeError> {
+        let draws = CaseDraws { seed, case: number, attempt };
         let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
-        let robot = RandomRobot::draw(&mut draw, needs)?;
-        let instrument_model = InstrumentModel::draw(&mut draw);
+        let conditions = Conditions::draw(draws, needs, ids);
+        let instrument_model = InstrumentModel::draw(draws, &conditions);
+        let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, needs)?;
+        let mut draw = draws.of("hidden");
         let mut hidden = Vec::new();
         for id in ids {
-            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(None) };
+            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(Attempt::Unseen) };
             hidden.push(effect);
         }
-        let measurement = DriveContext { seed, number, robot: &robot, instrument_model: &instrument_model };
+        let measurement =
+            DriveContext { seed, number, conditions: &conditions, robot: &robot, instrument_model: &instrument_model };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
-        let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-        let noise = TrueNoise { wheel_var_per_m: wheel * wheel, measurement_var: instrument_model.variances() };
         let ratios = if case_kind == CaseKind::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
-        let mut detectability = Vec::new();
+        let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
+        let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            let seen = |effect: &Hidden| -> Result<Option<Detectability>, ChallengeError> {
+            let seen = |effect: &Hidden, noise: TrueNoise| -> Result<Option<Detectability>, ChallengeError> {
                 let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
                 Ok(Detectability::of(&exact, &plain, &truth, noise))
             };
-            match scale(effect, &mut draw, ratios, seen)? {
+            match scale(effect, &mut draw, ratios, |effect| seen(effect, noise))? {
                 Chosen::Gross => detectability.push(None),
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
-                Chosen::Unseen => return Ok(None),
+                Chosen::Unseen => {
+                    return Ok(match seen(effect, noise.without_rounding()) {
+                        Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, noise) => Attempt::Unresolved,
+                        _ => Attempt::Unseen,
+                    });
+                }
             }
+            rounding_shares.push(match detectability.last() {
+                Some(Some(found)) if noise.has_rounding() => seen(effect, noise.without_rounding())?.map(|unrounded| {
+                    1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
+                }),
+                _ => None,
+            });
         }
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
@@ -249,7 +218,10 @@ impl Case {
         let oracle = hidden
             .iter()
             .enumerate()
-            .map(|(k, effect)| view(effect, k, &detectability, both.as_ref(), &hidden))
+            .map(|(k, effect)| OracleView {
+                rounding_share: rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean),
+                ..view(effect, k, &detectability, both.as_ref(), &hidden)
+            })
             .collect();
         let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));
         let best_drive = best.map(Detectability::best_drive);
@@ -264,10 +236,11 @@ impl Case {
         {
             held_out_random.extend(log(&[effect])?.map(|log| (index, log)));
         }
-        Ok(Some(Self {
+        Ok(Attempt::Ready(Box::new(Self {
             seed,
             number,
             case_kind,
+            conditions,
             instrument_model,
             hidden,
             oracle,
@@ -276,8 +249,9 @@ impl Case {
             held_out_random,
             best_drive,
             noise,
+            unresolved_robots: 0,
             robot,
-        }))
+        })))
     }
 
     /// The robot with what it hides drives some more, with noise, and what the oracle then knows of its only
@@ -288,6 +262,7 @@ impl Case {
         let measurement = DriveContext {
             seed: self.seed,
             number: self.number,
+            conditions: &self.conditions,
             robot: &self.robot,
             instrument_model: &self.instrument_model,
         };
@@ -378,10 +353,17 @@ fn scale(
     if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
 }
 
+/// Whether an effect at its scale would show, were it not for the rounding.
+fn is_unresolved(effect: &Hidden, unrounded: &Detectability, noise: TrueNoise) -> bool {
+    let largest = size_ratio(effect, unrounded) * effect.most / effect.scale;
+    noise.has_rounding() && effect.kind == EffectKind::Mean && largest > 1.0
+}
+
 /// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
 #[cfg(test)]
 pub(crate) struct Trial {
     seed: u64,
+    conditions: Conditions,
     robot: RandomRobot,
     instrument_model: InstrumentModel,
     hidden: Hidden,
@@ -396,21 +378,32 @@ impl Trial {
     /// The first robot that shows the effect, in its catalogue's form, under white noise and many
     /// measurements.
     pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, ChallengeError> {
-        for attempt in 0..50 {
-            let mut draw = Draw::of(seed, 0, "trial", attempt);
-            let robot = RandomRobot::draw(&mut draw, Hidden::needs(id))?;
-            let instrument_model = InstrumentModel::draw(&mut draw);
-            let Some(mut hidden) = Hidden::draw(id, &robot, &mut draw) else { continue };
+        for attempt in 0..200 {
+            let draws = CaseDraws { seed, case: 0, attempt };
+            let conditions = Conditions::draw(draws, Hidden::needs(id), &[id]);
+            let instrument_model = InstrumentModel::draw(draws, &conditions);
+            let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, Hidden::needs(id))?;
+            let Some(mut hidden) = Hidden::draw(id, &robot, &mut draws.of("hidden")) else { continue };
             let plainly = instrument_model.class == super::instrument::NoiseClass::White
-                && instrument_model.kind == super::instrument::TruthKind::Dense;
+                && instrument_model.kind == super::instrument::TruthKind::Dense
+                && conditions.stamps == Stamps::Exact
+                && conditions.lost_row_share + conditions.clock_drift.abs() == 0.0;
             if !plainly || hidden.other_form {
                 continue;
             }
             let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
-            let wheel = robot.sessions[0].scenario.noise.wheel_sigma_m_per_sqrt_m;
-            let noise = TrueNoise { wheel_var_per_m: wheel * wheel, measurement_var: instrument_model.variances() };
-            let measurement = DriveContext { seed, number: 0, robot: &robot, instrument_model: &instrument_model };
+            let measurement = DriveContext {
+                seed,
+                number: 0,
+                conditions: &conditions,
+                robot: &robot,
+                instrument_model: &instrument_model,
+            };
             let plain = drive(&robot.sessions, &measurement, &[], false, 0)?;
+            let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
+            if noise.has_rounding() {
+                continue;
+            }
             let mut noncentrality = 0.0;
             for _ in 0..4 {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
@@ -422,15 +415,25 @@ impl Trial {
                 }
                 hidden.scale /= off;
             }
-            return Ok(Some(Self { seed, robot, instrument_model, hidden, noise, truth, plain, noncentrality }));
+            return Ok(Some(Self {
+                seed,
+                conditions,
+                robot,
+                instrument_model,
+                hidden,
+                noise,
+                truth,
+                plain,
+                noncentrality,
+            }));
         }
         Ok(None)
     }
 
     /// The oracle's statistic on a drive with noise of its own, with the effect or without.
     pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
-        let Self { seed, robot, instrument_model, .. } = self;
-        let measurement = DriveContext { seed: *seed, number, robot, instrument_model };
+        let Self { seed, conditions, robot, instrument_model, .. } = self;
+        let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
         let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise);

@@ -2,6 +2,22 @@
 
 use effects::{Address, Stream, StreamName};
 
+/// Where the draws of one attempt at a case are: each matter has a stream of its own, so that a new matter
+/// disturbs no other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CaseDraws {
+    pub(crate) seed: u64,
+    pub(crate) case: u64,
+    pub(crate) attempt: u64,
+}
+
+impl CaseDraws {
+    /// The draws of one matter.
+    pub(crate) fn of(self, what: &str) -> Draw {
+        Draw::of(self.seed, self.case, what, self.attempt)
+    }
+}
+
 /// A stream with the draws that a case is made of.
 #[derive(Debug, Clone)]
 pub(crate) struct Draw(pub(crate) Stream);

@@ -13,6 +13,14 @@ pub enum ChallengeError {
     /// A case cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// A baseline cannot be read, or is none.
+    #[error("{path}: {why}")]
+    Baseline {
+        /// The file.
+        path: String,
+        /// Why.
+        why: String,
+    },
     /// The threads cannot be started.
     #[error("cannot start {jobs} threads: {why}")]
     Threads {

@@ -1,14 +1,16 @@
 //! What the outside instrument shows of a run: which measurements, and their errors.
 //!
-//! The simulator's instrument measures without error; here its measurements are chosen (dense, sparse, the
-//! ends alone, or displacements between two of them) and disturbed: white, heavy-tailed (Student's t with
-//! three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white noise).
+//! The simulator's instrument measures without error; here its measurements are chosen (poses, positions
+//! alone, the ends alone, or displacements between two of them) and disturbed: white, heavy-tailed (Student's
+//! t with three degrees of freedom), or correlated in time (a first-order Gauss–Markov process beside white
+//! noise). It measures at the instants of rows, or at instants of its own between them.
 
 use dataset::{Displacement, Run, TruthNoise, TruthSample};
-use effects::{CATALOGUE, DroppedSamples, Effect, Sign, hypothesis};
+use effects::{DroppedSamples, Effect};
 use kinematics::Pose;
 
-use super::draw::Draw;
+use super::conditions::{Conditions, Stamps};
+use super::draw::{CaseDraws, Draw};
 
 /// What the measurements are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -18,6 +20,8 @@ pub enum TruthKind {
     Dense,
     /// A pose every second or two.
     Sparse,
+    /// Positions alone.
+    Positions,
     /// The first and the last pose of every run.
     Endpoints,
     /// Displacements between measurements, as scan matching gives them.
@@ -34,26 +38,11 @@ pub enum NoiseClass {
     HeavyTailed,
     /// Errors that last.
     Correlated,
-    /// Independent normal errors; 2 % of the log's rows are lost.
+    /// Independent normal errors; 2 % of the log's rows are lost with their counts.
     Dropouts,
 }
 
 impl NoiseClass {
-    /// Findings that are right in this class whatever is hidden.
-    #[must_use]
-    pub fn right_answers(self) -> Vec<&'static str> {
-        let with_sign = |sign: Sign| {
-            let shows = |id: &&str| hypothesis(id).is_some_and(|hypothesis| hypothesis.signs().contains(&sign));
-            CATALOGUE.iter().copied().filter(shows).collect()
-        };
-        match self {
-            Self::White => Vec::new(),
-            Self::HeavyTailed => with_sign(Sign::IsolatedErrors),
-            Self::Correlated => with_sign(Sign::AutocorrelatedErrors),
-            Self::Dropouts => self.effect().iter().map(Effect::id).collect(),
-        }
-    }
-
     /// What the log loses in this class, as an effect.
     pub(crate) const fn effect(self) -> Option<Effect> {
         match self {
@@ -63,18 +52,31 @@ impl NoiseClass {
     }
 }
 
-/// Share of the log's rows that are lost where some are.
+/// Share of the log's rows that are lost with their counts where some are.
 const LOST_ROW_SHARE: f64 = 0.02;
+/// Measurements a second where the ends of runs alone are taken.
+const RATE_AT_ENDS_HZ: f64 = 20.0;
+/// Fastest instrument, measurements a second.
+const MAX_RATE_HZ: f64 = 50.0;
+/// The first and the last pose are taken as long after the log's first row and before its last: stamps that
+/// are late, or by another clock, do not put them outside.
+const FROM_ENDS_S: f64 = 0.4;
+/// With fewer runs their ends determine no geometry.
+const MIN_RUNS_WITH_ENDS: u32 = 6;
+/// Time between measurements at the ends of runs, for errors that last, seconds.
+const BETWEEN_ENDS_S: f64 = 10.0;
 
 /// How the robot of a case is looked at.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InstrumentModel {
     pub(crate) kind: TruthKind,
     pub(crate) class: NoiseClass,
-    /// Every so many measurements of the simulated instrument.
-    every: usize,
-    sigma_xy_m: f64,
-    sigma_theta_rad: f64,
+    /// Measurements of the simulated instrument a second.
+    pub(crate) rate_hz: f64,
+    /// Whether every measurement is at the instant of a row.
+    pub(crate) on_rows: bool,
+    pub(crate) sigma_xy_m: f64,
+    pub(crate) sigma_theta_rad: f64,
     /// Errors that last: their standard deviation over that of the white ones, and for how long, seconds.
     lasting: (f64, f64),
     /// What the dataset states of its noise, over the truth; 0 for nothing.
@@ -82,34 +84,47 @@ pub(crate) struct InstrumentModel {
 }
 
 impl InstrumentModel {
-    pub(crate) fn draw(draw: &mut Draw) -> Self {
+    pub(crate) fn draw(draws: CaseDraws, conditions: &Conditions) -> Self {
+        let mut draw = draws.of("truth kind");
         let kind = match draw.below(10) {
             0..=3 => TruthKind::Dense,
-            4..=5 => TruthKind::Sparse,
-            6..=7 => TruthKind::Endpoints,
+            4 => TruthKind::Sparse,
+            5..=6 => TruthKind::Positions,
+            7 => TruthKind::Endpoints,
             _ => TruthKind::Relative,
         };
-        let every = match kind {
-            TruthKind::Dense => 2,
-            TruthKind::Sparse => 20 + draw.below(20),
-            TruthKind::Endpoints => usize::MAX,
-            TruthKind::Relative => 10,
+        // One log has two ends, and a few runs little more: they determine nothing.
+        let kind =
+            if kind == TruthKind::Endpoints && conditions.runs < MIN_RUNS_WITH_ENDS { TruthKind::Sparse } else { kind };
+        let mut rate = draws.of("truth rate");
+        let wanted_hz = match kind {
+            TruthKind::Dense | TruthKind::Positions => rate.log_uniform(2.0, MAX_RATE_HZ),
+            TruthKind::Sparse => rate.log_uniform(0.5, 2.0),
+            TruthKind::Relative => rate.log_uniform(1.0, 10.0),
+            TruthKind::Endpoints => RATE_AT_ENDS_HZ,
         };
-        let class = match draw.below(10) {
+        let can_be_on_rows = kind != TruthKind::Endpoints && !matches!(conditions.stamps, Stamps::Irregular { .. });
+        let on_rows = rate.chance(0.5) && can_be_on_rows;
+        let every = (conditions.log_rate_hz / wanted_hz).round().max((conditions.log_rate_hz / MAX_RATE_HZ).ceil());
+        let mut noise = draws.of("truth noise");
+        let class = match noise.below(10) {
             0..=5 => NoiseClass::White,
             6 => NoiseClass::HeavyTailed,
             7..=8 => NoiseClass::Correlated,
             _ => NoiseClass::Dropouts,
         };
         // Right, twice or half the truth, or not stated at all.
-        let stated = [1.0, 1.0, 2.0, 0.5, 0.0][draw.below(5)];
+        let stated = [1.0, 1.0, 2.0, 0.5, 0.0][noise.below(5)];
+        let sigma_xy_m = noise.log_uniform(2e-4, 1e-2);
         Self {
             kind,
             class,
-            every,
-            sigma_xy_m: draw.log_uniform(2e-4, 2e-3),
-            sigma_theta_rad: draw.log_uniform(3e-4, 3e-3),
-            lasting: (draw.uniform(0.5, 2.0), draw.log_uniform(0.3, 3.0)),
+            rate_hz: if on_rows { conditions.log_rate_hz / every.max(1.0) } else { wanted_hz },
+            on_rows,
+            sigma_xy_m,
+            // Two marks so far apart, metres, or a scan of walls so far away.
+            sigma_theta_rad: sigma_xy_m / noise.log_uniform(0.15, 1.5),
+            lasting: (noise.uniform(0.5, 2.0), noise.log_uniform(0.3, 3.0)),
             stated,
         }
     }
@@ -124,7 +139,7 @@ impl InstrumentModel {
     /// errors that last grow by (1 + ρ)/(1 − ρ), ρ being the correlation from measurement to measurement.
     pub(crate) fn variances(&self) -> [f64; 2] {
         let factor = if self.class == NoiseClass::Correlated {
-            let between_s = self.every.min(200) as f64 / super::robot::RATE_HZ;
+            let between_s = if self.kind == TruthKind::Endpoints { BETWEEN_ENDS_S } else { 1.0 / self.rate_hz };
             let rho = (-between_s / self.lasting.1).exp();
             1.0 + self.lasting.0.powi(2) * (1.0 + rho) / (1.0 - rho)
         } else {
@@ -134,19 +149,21 @@ impl InstrumentModel {
     }
 
     /// Which measurements of a run are taken.
-    fn taken(&self, measurements: usize) -> Vec<usize> {
-        let Some(last) = measurements.checked_sub(1) else { return Vec::new() };
-        let mut taken: Vec<usize> = (0..measurements).step_by(self.every.min(measurements.max(1))).collect();
-        if taken.last() != Some(&last) && self.kind != TruthKind::Dense {
-            taken.push(last);
+    fn taken(&self, run: &Run) -> Vec<usize> {
+        let all = 0..run.truth.len();
+        if self.kind != TruthKind::Endpoints {
+            return all.collect();
         }
-        taken
+        let end_s = run.odometry.t_s.last().copied().unwrap_or(0.0) - FROM_ENDS_S;
+        let first = all.clone().find(|k| run.truth[*k].t_s >= FROM_ENDS_S);
+        let last = all.rev().find(|k| run.truth[*k].t_s <= end_s);
+        first.into_iter().chain(last.filter(|last| Some(*last) != first)).collect()
     }
 
     /// Replaces the noise-free measurements of a run by what is recorded of them; without draws, still
     /// without error.
     pub(crate) fn measurement(&self, run: &mut Run, draw: Option<&mut Draw>) {
-        let taken = self.taken(run.truth.len());
+        let taken = self.taken(run);
         let exact: Vec<(f64, Pose)> = taken
             .into_iter()
             .map(|measurement| {
@@ -177,7 +194,8 @@ impl InstrumentModel {
                 .into_iter()
                 .map(|(t_s, pose)| {
                     let [x_m, y_m, theta_rad] = errors.next(t_s);
-                    TruthSample::new(t_s, pose.x_m + x_m, pose.y_m + y_m, Some(pose.theta_rad + theta_rad))
+                    let heading_rad = (self.kind != TruthKind::Positions).then_some(pose.theta_rad + theta_rad);
+                    TruthSample::new(t_s, pose.x_m + x_m, pose.y_m + y_m, heading_rad)
                 })
                 .collect();
         }

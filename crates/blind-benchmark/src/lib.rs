@@ -9,19 +9,29 @@
 //! discriminate. Blocks of twenty cases hold seven nulls, seven single effects, two pairs and four effects
 //! that are left out of the catalogue in turn.
 
+mod baseline;
 mod case;
+mod conditions;
 mod draw;
+mod drive;
 mod error;
+mod exempt;
 mod hidden;
 mod instrument;
+mod log_model;
 mod measure;
+mod measure_value;
 mod oracle;
 mod oracle_view;
 mod planned;
 mod power;
+mod power_ratio;
 mod result;
+mod ripple;
 mod robot;
+mod scope;
 mod score;
+mod strata;
 #[cfg(test)]
 mod tests;
 
@@ -31,14 +41,18 @@ use rayon::prelude::*;
 
 use case::Case;
 
+pub use baseline::{DiagnosisBaseline, DiagnosisCheck, FALSE_ALARM_BUDGET, Guard, Guarded};
 pub use case::CaseKind;
 pub use error::ChallengeError;
+pub use exempt::{EXEMPT, Exemption};
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};
-pub use measure::Measure;
+pub use measure_value::Measure;
 pub use oracle_view::OracleView;
 pub use result::{CaseResult, Planned, Reported};
 pub use robot::PathFamily;
+pub use scope::Scope;
+pub use strata::{DrawnConditions, Strata};
 
 /// What comes of a campaign.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -47,12 +61,27 @@ pub struct ChallengeResult {
     pub seed: u64,
     /// Every measure against its bar.
     pub measures: Vec<Measure>,
+    /// The same in every level of every stratum.
+    pub strata: Vec<StratumMeasures>,
     /// What was hidden, what was said, and how often.
     pub confusions: Vec<Confusion>,
     /// Effects that no robot drawn for them showed: how often.
     pub never_shown: BTreeMap<String, usize>,
     /// Every case.
     pub cases: Vec<CaseResult>,
+}
+
+/// The measures over the cases of one level of a stratum.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StratumMeasures {
+    /// The stratum, by its key in a case's JSON.
+    pub stratum: String,
+    /// The level.
+    pub level: String,
+    /// How many cases are of it.
+    pub cases: usize,
+    /// Every measure; the bar on nulls with a finding is that of a stratum.
+    pub measures: Vec<Measure>,
 }
 
 /// What was said of what.
@@ -78,8 +107,12 @@ pub struct Confusion {
 /// # Errors
 /// [`ChallengeError`] when it cannot be simulated.
 pub fn challenge_case(seed: u64, number: u64) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
+    case_in(Scope::Whole, seed, number)
+}
+
+fn case_in(scope: Scope, seed: u64, number: u64) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
     match Case::draw(seed, number)? {
-        Ok(case) => Ok(Ok(score::score(number, &case)?)),
+        Ok(case) => Ok(Ok(score::score(number, &case, scope)?)),
         Err(id) => Ok(Err(id)),
     }
 }
@@ -92,25 +125,28 @@ pub fn challenge_datasets(seed: u64, number: u64) -> Result<Vec<dataset::Dataset
     Ok(Case::draw(seed, number)?.map(|case| case.datasets).unwrap_or_default())
 }
 
-/// Drives all cases on so many threads, 0 for one a core, and scores them; `done` is called after each.
+/// Drives the cases of a scope on so many threads, 0 for one a core, and scores them; `done` is called after
+/// each.
 ///
 /// # Errors
 /// [`ChallengeError`] when a case cannot be simulated, or the threads cannot be started.
 pub fn challenge(
     seed: u64,
     cases: u64,
+    scope: Scope,
     jobs: usize,
     done: &(dyn Fn() + Sync),
 ) -> Result<ChallengeResult, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
+    let is_asked = |number: &u64| scope == Scope::Whole || case::is_guarded(*number);
     let one = |number| {
-        let result = challenge_case(seed, number);
+        let result = case_in(scope, seed, number);
         done();
         result
     };
     let results: Vec<Result<CaseResult, &'static str>> =
-        pool.install(|| (0..cases).into_par_iter().map(one).collect::<Result<_, _>>())?;
+        pool.install(|| (0..cases).into_par_iter().filter(is_asked).map(one).collect::<Result<_, _>>())?;
     let (mut scored, mut never_shown) = (Vec::new(), BTreeMap::new());
     for result in results {
         match result {
@@ -119,7 +155,24 @@ pub fn challenge(
         }
     }
     let measures = measure::measures(seed, &scored);
-    Ok(ChallengeResult { seed, measures, confusions: confusions(&scored), never_shown, cases: scored })
+    let strata = by_stratum(seed, &scored);
+    Ok(ChallengeResult { seed, measures, strata, confusions: confusions(&scored), never_shown, cases: scored })
+}
+
+fn by_stratum(seed: u64, cases: &[CaseResult]) -> Vec<StratumMeasures> {
+    let mut levels: BTreeMap<(String, String), Vec<CaseResult>> = BTreeMap::new();
+    for case in cases {
+        for level in case.levels() {
+            levels.entry(level).or_default().push(case.clone());
+        }
+    }
+    let of_level = |((stratum, level), cases): ((String, String), Vec<CaseResult>)| StratumMeasures {
+        stratum,
+        level,
+        cases: cases.len(),
+        measures: measure::measures_with(seed, &cases, measure::NULLS_IN_A_STRATUM),
+    };
+    levels.into_iter().map(of_level).collect()
 }
 
 fn confusions(cases: &[CaseResult]) -> Vec<Confusion> {

@@ -4,41 +4,12 @@
 use std::collections::BTreeMap;
 
 use super::case::CaseKind;
-use super::draw::Draw;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
+use super::measure_value::{Measure, share};
 use super::oracle_view::OracleView;
-use super::power::limits;
+use super::power_ratio::{power, resolved_mean};
 use super::result::{CaseResult, Planned, Reported};
-
-/// One measure against its bar.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Measure {
-    /// A word for scripts.
-    pub id: &'static str,
-    /// What is measured, for people.
-    pub what: &'static str,
-    /// The value; `None` where no case tells.
-    pub value: Option<f64>,
-    /// Its one-sided 95 % limit on the side of the bar.
-    pub limit: Option<f64>,
-    /// Over how many cases or findings.
-    pub of: usize,
-    /// The bar.
-    pub bar: f64,
-    /// Whether the limit must not be above the bar, or not below.
-    pub at_most: bool,
-    /// Whether the limit clears the bar; `None` for measures that are shown only.
-    pub met: Option<bool>,
-}
-
-fn share(id: &'static str, what: &'static str, (k, n): (usize, usize), bar: f64, at_most: bool) -> Measure {
-    let (low, high) = limits(k, n);
-    let limit = if at_most { high } else { low };
-    let value = (n > 0).then(|| k as f64 / n as f64);
-    let met = if at_most { limit <= bar } else { limit >= bar };
-    Measure { id, what, value, limit: value.map(|_| limit), of: n, bar, at_most, met: value.map(|_| met) }
-}
 
 fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> (usize, usize) {
     all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
@@ -84,11 +55,20 @@ fn is_aliased(hidden: &OracleView) -> bool {
     }
 }
 
-/// All measures.
+/// Bar on nulls with a finding over all cases, and in each stratum.
+const NULLS_OVERALL: f64 = 0.05;
+pub(crate) const NULLS_IN_A_STRATUM: f64 = 0.08;
+
+/// All measures, with the bar on nulls with a finding.
 pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
+    measures_with(seed, cases, NULLS_OVERALL)
+}
+
+pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) -> Vec<Measure> {
     let of = |case_kind: CaseKind| cases.iter().filter(move |case| case.case_kind == case_kind);
     let alarm = |case: &CaseResult| case.findings().next().is_some();
     let mut measures = vec![
+        share("null_findings", "nulls with a finding", count(of(CaseKind::Null), alarm), bar_of_nulls, true),
         share(
             "false_alarms",
             "nulls with a false positive",
@@ -111,6 +91,8 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
             false,
         ),
         power(seed, cases),
+        Measure { met: None, ..detected(cases) },
+        unresolved(cases),
     ];
     measures.extend(names(cases));
     measures.extend(resolved(cases));
@@ -133,6 +115,46 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
     ));
     measures.extend(probabilities(cases));
     measures
+}
+
+/// A single effect counts as plain at this many detection limits, the bar on the power's ratio.
+const PLAIN_RATIO: f64 = 1.6;
+
+/// Whether a case hides a single mean that the encoder resolves and that must be detected.
+pub(crate) fn is_plain(case: &CaseResult) -> bool {
+    resolved_mean(case).is_some_and(|ratio| ratio >= PLAIN_RATIO)
+}
+
+fn detected(cases: &[CaseResult]) -> Measure {
+    let hit = |case: &CaseResult| case.findings().next().is_some();
+    let plain = cases.iter().filter(|case| is_plain(case));
+    share("detected", "effects of 1.6 limits and more that are detected", count(plain, hit), 0.9, false)
+}
+
+/// Whether the right name is first, of a detected single effect without an alias.
+pub(crate) fn is_first_name_right(case: &CaseResult) -> Option<bool> {
+    let hidden = case.hidden.first().filter(|hidden| case.case_kind == CaseKind::Single && !is_aliased(hidden))?;
+    match naming_outcome(hidden, case.findings().next()) {
+        NamingOutcome::Undetected => None,
+        outcome => Some(outcome == NamingOutcome::First),
+    }
+}
+
+/// Robots drawn for a single mean whose encoder does not resolve it: those that were drawn again, and those
+/// whose rounding takes nearly all of what there is to see.
+fn unresolved(cases: &[CaseResult]) -> Measure {
+    let of_means = |case: &&CaseResult| {
+        case.case_kind == CaseKind::Single && case.hidden.first().is_some_and(|hidden| hidden.kind == EffectKind::Mean)
+    };
+    let (mut k, mut n) = (0, 0);
+    for case in cases.iter().filter(of_means) {
+        let is_resolved = case.hidden.iter().all(OracleView::is_resolved);
+        k += case.unresolved_robots + usize::from(!is_resolved);
+        n += case.unresolved_robots + 1;
+    }
+    let measure =
+        share("unresolved", "robots whose encoder does not resolve the effect (shown only)", (k, n), 1.0, true);
+    Measure { met: None, ..measure }
 }
 
 fn names(cases: &[CaseResult]) -> Vec<Measure> {
@@ -222,7 +244,7 @@ fn ratio_of_sums(id: &'static str, what: &'static str, pairs: &[(f64, f64)], bar
         if at_most { value + 1.645 * error } else { value - 1.645 * error }
     });
     let met = limit.map(|limit| if at_most { limit <= bar } else { limit >= bar });
-    Measure { id, what, value, limit, of: pairs.len(), bar, at_most, met }
+    Measure { id, what, value, limit, interval: None, count: None, of: pairs.len(), bar, at_most, met }
 }
 
 fn left_out(cases: &[CaseResult]) -> Vec<Measure> {
@@ -331,6 +353,8 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
             what: "stated probabilities: expected calibration error",
             value: error,
             limit: None,
+            interval: None,
+            count: None,
             of: findings.len(),
             bar: 0.05,
             at_most: true,
@@ -341,77 +365,9 @@ fn probabilities(cases: &[CaseResult]) -> Vec<Measure> {
     ]
 }
 
-/// Draws of the cases again, with replacement, for the limit of the power's ratio.
-const BOOTSTRAPS: usize = 400;
-
-/// The size, in detection limits, from which on nine of ten cases are detected: where the best monotone curve
-/// of detection over size crosses 0.9.
-fn power(seed: u64, cases: &[CaseResult]) -> Measure {
-    let mut points: Vec<(f64, f64)> = cases
-        .iter()
-        .filter(|case| case.case_kind == CaseKind::Single && case.noise == NoiseClass::White)
-        .filter_map(|case| {
-            let hidden = case.hidden.first().filter(|hidden| hidden.kind == EffectKind::Mean)?;
-            Some((hidden.ratio?, f64::from(u8::from(case.findings().next().is_some()))))
-        })
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let value = crossing(&points, 0.9);
-    let mut draw = Draw::of(seed, u64::MAX, "bootstrap", 0);
-    let mut again: Vec<f64> = (0..BOOTSTRAPS)
-        .map(|_| {
-            let mut drawn: Vec<(f64, f64)> = (0..points.len()).map(|_| points[draw.below(points.len())]).collect();
-            drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
-            crossing(&drawn, 0.9).unwrap_or(f64::INFINITY)
-        })
-        .collect();
-    again.sort_by(f64::total_cmp);
-    let limit = again[BOOTSTRAPS * 95 / 100];
-    Measure {
-        id: "power_ratio",
-        what: "effect size with 90 % power over the oracle's",
-        value,
-        limit: Some(limit).filter(|limit| limit.is_finite()),
-        of: points.len(),
-        bar: 1.6,
-        at_most: true,
-        met: (!points.is_empty()).then_some(limit <= 1.6),
-    }
-}
-
-/// Where a monotone fit (pool adjacent violators; Ayer et al. 1955) of (size, 0 or 1), sorted by size, first
-/// reaches a level.
-fn crossing(points: &[(f64, f64)], level: f64) -> Option<f64> {
-    // Blocks: first size, sum, number.
-    let mut blocks: Vec<(f64, f64, f64)> = Vec::new();
-    for (size, hit) in points {
-        blocks.push((*size, *hit, 1.0));
-        while let [.., a, b] = blocks[..]
-            && a.1 / a.2 >= b.1 / b.2
-        {
-            blocks.pop();
-            blocks.pop();
-            blocks.push((a.0, a.1 + b.1, a.2 + b.2));
-        }
-    }
-    blocks.iter().find(|(_, sum, n)| sum / n >= level).map(|(size, _, _)| *size)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_monotone_curve_crosses_where_it_should() {
-        let step: Vec<(f64, f64)> = (0..100).map(|k| (f64::from(k), f64::from(u8::from(k >= 40)))).collect();
-        assert_eq!(crossing(&step, 0.9), Some(40.0));
-        // One miss far up: the block above it still has more than nine of ten, the one it is pooled with as
-        // well.
-        let mut missed = step.clone();
-        missed[80].1 = 0.0;
-        assert_eq!(crossing(&missed, 0.9), Some(40.0));
-        assert_eq!(crossing(&[(1.0, 0.0)], 0.9), None);
-    }
 
     #[test]
     fn a_ratio_of_sums_knows_its_error() {

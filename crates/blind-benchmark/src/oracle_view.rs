@@ -29,6 +29,19 @@ pub struct OracleView {
     pub rivals: Vec<(String, f64)>,
     /// The other names that this test does not tell from it with power 0.9.
     pub aliases: Vec<String>,
+    /// Share of the noncentrality that the rounding of the counts takes; `None` where rounding does not
+    /// matter, and of what is no mean.
+    pub rounding_share: Option<f64>,
+}
+
+/// An encoder that takes so much of an effect's noncentrality does not resolve it.
+const UNRESOLVED_SHARE: f64 = 0.9;
+
+impl OracleView {
+    /// Whether the encoder resolves the effect.
+    pub(crate) fn is_resolved(&self) -> bool {
+        self.rounding_share.is_none_or(|share| share < UNRESOLVED_SHARE)
+    }
 }
 
 /// Whether an effect's signature is random in part: where in its gap a wheel was left, which fraction of a
@@ -83,6 +96,7 @@ pub(crate) fn view(
         form_share: None,
         rivals: Vec::new(),
         aliases: Vec::new(),
+        rounding_share: None,
     };
     let Some(own) = detectability[index].as_ref() else { return view };
     if effect.kind == EffectKind::Mean {

@@ -17,6 +17,16 @@ use super::result::{CaseResult, Planned, Reported, reported};
 use super::robot::{SessionPlan, programs_of};
 use crate::error::ChallengeError;
 
+/// Where so many rows or measurements would be recorded, nothing more is driven: that is not affordable.
+const MAX_ROWS: f64 = 20_000.0;
+const MAX_MEASUREMENTS: f64 = 6_000.0;
+
+/// Whether a case's log and instrument are slow enough for what plans drive.
+fn is_affordable(case: &Case) -> bool {
+    let planned_s = 60.0 * MINUTES;
+    planned_s * case.conditions.log_rate_hz <= MAX_ROWS && planned_s * case.instrument_model.rate_hz <= MAX_MEASUREMENTS
+}
+
 /// Drives as planned, where names were found together and the right one is among them.
 pub(crate) fn planned(
     case: &Case,
@@ -24,6 +34,9 @@ pub(crate) fn planned(
     next: Option<&NextExperiment>,
 ) -> Result<Option<Planned>, ChallengeError> {
     let [hidden] = &case.oracle[..] else { return Ok(None) };
+    if !is_affordable(case) {
+        return Ok(None);
+    }
     let among = |reported: &&Reported| {
         reported.names.contains(&hidden.id) && reported.names.iter().filter(|name| *name != "unlisted").count() > 1
     };

@@ -41,10 +41,20 @@ pub(crate) fn detection_limit(freedom: usize) -> f64 {
 
 /// One-sided 95 % limits of a share, lower and upper (Clopper–Pearson).
 pub(crate) fn limits(successes: usize, of: usize) -> (f64, f64) {
+    clopper_pearson(successes, of, 0.05)
+}
+
+/// The two-sided 95 % interval of a share (Clopper–Pearson).
+pub(crate) fn two_sided(successes: usize, of: usize) -> (f64, f64) {
+    clopper_pearson(successes, of, 0.025)
+}
+
+/// Limits of a share, each with so much probability beyond it.
+fn clopper_pearson(successes: usize, of: usize, beyond: f64) -> (f64, f64) {
     let (k, n) = (successes as f64, of as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
-    let low = if successes == 0 { 0.0 } else { quantile(k, n - k + 1.0, 0.05) };
-    let high = if successes >= of { 1.0 } else { quantile(k + 1.0, n - k, 0.95) };
+    let low = if successes == 0 { 0.0 } else { quantile(k, n - k + 1.0, beyond) };
+    let high = if successes >= of { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - beyond) };
     (low, high)
 }
 
@@ -68,6 +78,9 @@ mod tests {
         assert!(low == 0.0 && (high - (1.0 - 0.05_f64.powf(0.01))).abs() < 1e-9, "{high}");
         let (low, high) = limits(100, 100);
         assert!(high == 1.0 && (low - 0.05_f64.powf(0.01)).abs() < 1e-9, "{low}");
+        // Two-sided 10 of 100: 4.90 to 17.62 %.
+        let (low, high) = two_sided(10, 100);
+        assert!((low - 0.0490).abs() < 5e-5 && (high - 0.1762).abs() < 5e-5, "{low} {high}");
         let (low, high) = limits(10, 100);
         assert!(low < 0.1 && high > 0.1 && (high - 0.1638).abs() < 5e-4 && (low - 0.0553).abs() < 5e-4, "{low} {high}");
     }

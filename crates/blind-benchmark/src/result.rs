@@ -3,10 +3,12 @@
 use diagnose::Document;
 
 use super::case::{Case, CaseKind};
+use super::exempt::right_findings;
 use super::hidden::EffectKind;
 use super::instrument::{NoiseClass, TruthKind};
 use super::oracle_view::OracleView;
 use super::robot::PathFamily;
+use super::strata::{DrawnConditions, Strata};
 
 /// One finding, as far as it is scored.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -20,6 +22,8 @@ pub struct Reported {
     /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 %
     /// interval holds the truth.
     pub covered: Vec<bool>,
+    /// The same estimates' errors over their stated standard deviations.
+    pub errors: Vec<f64>,
     /// Its sentence.
     pub sentence: String,
 }
@@ -38,6 +42,12 @@ pub struct CaseResult {
     pub truth: TruthKind,
     /// What the measurements err by.
     pub noise: NoiseClass,
+    /// What the robot and its records are like.
+    pub strata: Strata,
+    /// The numbers behind the strata.
+    pub drawn: DrawnConditions,
+    /// Robots that were drawn before this one whose encoder does not resolve what is hidden.
+    pub unresolved_robots: usize,
     /// Sessions, runs and measurements.
     pub counts: [usize; 3],
     /// What was hidden, as the oracle sees it.
@@ -58,13 +68,36 @@ pub struct CaseResult {
 }
 
 impl CaseResult {
-    /// The findings that are not right anyway because of what the measurements err by.
-    pub(crate) fn findings(&self) -> impl Iterator<Item = &Reported> {
-        let right = self.noise.right_answers();
+    /// Whether no finding is right in the case's conditions but for what is hidden.
+    pub(crate) fn has_ordinary_records(&self) -> bool {
+        right_findings(self.noise, &self.strata).next().is_none()
+    }
+
+    /// The findings that are not right anyway in the case's conditions.
+    pub fn findings(&self) -> impl Iterator<Item = &Reported> {
+        let right: Vec<&str> = right_findings(self.noise, &self.strata).collect();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
         self.reported
             .iter()
             .filter(move |reported| !reported.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
+    }
+
+    /// Every stratum with the case's level, by the words of JSON; paths, truth and noise among them.
+    pub(crate) fn levels(&self) -> Vec<(String, String)> {
+        let mut levels: Vec<(String, String)> = Vec::new();
+        if let Ok(serde_json::Value::Object(strata)) = serde_json::to_value(self.strata) {
+            levels
+                .extend(strata.into_iter().filter_map(|(stratum, level)| Some((stratum, level.as_str()?.to_owned()))));
+        }
+        let words = [
+            ("paths", serde_json::to_value(self.paths)),
+            ("truth", serde_json::to_value(self.truth)),
+            ("noise", serde_json::to_value(self.noise)),
+        ];
+        for (stratum, level) in words {
+            levels.extend(level.ok().and_then(|level| Some((stratum.to_owned(), level.as_str()?.to_owned()))));
+        }
+        levels
     }
 
     /// What was said of it, in short.
@@ -111,13 +144,13 @@ pub(crate) fn reported(document: &Document, case: &Case) -> Vec<Reported> {
         .map(|finding| {
             let hidden = case.hidden.iter().find(|hidden| hidden.id == finding.id);
             let exact = hidden.filter(|hidden| hidden.kind == EffectKind::Mean && !hidden.other_form);
-            let covered = exact.map_or_else(Vec::new, |hidden| {
+            let errors: Vec<f64> = exact.map_or_else(Vec::new, |hidden| {
                 hidden
                     .values()
                     .iter()
                     .filter_map(|(name, truth)| {
                         let value = finding.parameters.get(*name)?;
-                        Some((value.value - truth).abs() < 1.96 * value.sigma?)
+                        Some((value.value - truth) / value.sigma?)
                     })
                     .collect()
             });
@@ -125,7 +158,8 @@ pub(crate) fn reported(document: &Document, case: &Case) -> Vec<Reported> {
                 names: finding.names.clone(),
                 probability: finding.probability,
                 z: finding.z,
-                covered,
+                covered: errors.iter().map(|error| error.abs() < 1.96).collect(),
+                errors,
                 sentence: finding.sentence.clone(),
             }
         })

@@ -11,10 +11,12 @@ use super::hidden::{EffectKind, kind_of};
 use super::oracle::{misfit, misfit_of_form};
 use super::planned::planned;
 use super::result::{CaseResult, reported};
+use super::strata::strata;
 use crate::error::ChallengeError;
+use crate::scope::Scope;
 
 /// Diagnoses a case and scores it.
-pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeError> {
+pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult, ChallengeError> {
     let without = match case.case_kind {
         CaseKind::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
         _ => Vec::new(),
@@ -29,12 +31,16 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
             .map(|run| run.truth.len() + run.displacements.len())
             .sum(),
     ];
+    let (strata, drawn) = strata(case);
     let mut result = CaseResult {
         case: number,
         case_kind: case.case_kind,
         paths: case.robot.family,
         truth: case.instrument_model.kind,
         noise: case.instrument_model.class,
+        strata,
+        drawn,
+        unresolved_robots: case.unresolved_robots,
         counts,
         hidden: case.oracle.clone(),
         reported: Vec::new(),
@@ -51,6 +57,9 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
             result.failed_checks = failed.map(|check| check.name.clone()).collect();
             result.extended = !diagnosis.found.terms().is_empty();
             debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.reported.is_empty());
+            if scope == Scope::Guarded {
+                return Ok(result);
+            }
             result.gain = gain(case, Some(&diagnosis))?;
             if case.case_kind == CaseKind::Single {
                 result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
@@ -58,7 +67,7 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
         }
         Err(error) => {
             result.refused = Some(error.to_string());
-            result.gain = gain(case, None)?;
+            result.gain = if scope == Scope::Whole { gain(case, None)? } else { None };
         }
     }
     Ok(result)
@@ -67,13 +76,14 @@ pub(crate) fn score(number: u64, case: &Case) -> Result<CaseResult, ChallengeErr
 /// What the tool's model gains on the held-out log over the best calibration without the effect, and what the
 /// true terms gain there: all of it but the random part of an effect, which nobody can know before. Looks
 /// without error: on average over their errors the log score differs by these. Only means gain. A tool that
-/// says nothing gains nothing: its own base is not held against it.
+/// says nothing gains nothing: its own base is not held against it. The held-out log has one clock and true
+/// stamps, so that a model which rightly has a latency or a drift would lose there: such cases gain nothing.
 fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, ChallengeError> {
     let mean = case.oracle.iter().all(|hidden| kind_of(&hidden.id) == Some(EffectKind::Mean));
     let (Some((held_out, plain)), Some(best), Some(truth)) = (&case.held_out, &case.best_drive, case.truth()) else {
         return Ok(None);
     };
-    if case.oracle.is_empty() || !mean {
+    if case.oracle.is_empty() || !mean || case.conditions.has_clock_offset() {
         return Ok(None);
     }
     let held_out = std::slice::from_ref(held_out);

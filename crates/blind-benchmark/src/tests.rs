@@ -45,8 +45,8 @@ fn the_oracle_has_the_power_that_it_states() {
 
 #[test]
 fn a_case_stands_by_itself() {
-    let whole = challenge(3, 8, 2, &|| ()).expect("simulates");
-    let alone = challenge(3, 8, 1, &|| ()).expect("simulates");
+    let whole = challenge(3, 8, Scope::Whole, 2, &|| ()).expect("simulates");
+    let alone = challenge(3, 8, Scope::Whole, 1, &|| ()).expect("simulates");
     let text = |result: &ChallengeResult| serde_json::to_string(result).expect("has a JSON form");
     assert_eq!(text(&whole), text(&alone));
     let last = whole.cases.last().expect("cases");

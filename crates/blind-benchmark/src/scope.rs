@@ -1,0 +1,10 @@
+//! Which cases of a campaign are driven.
+
+/// Which cases of a campaign are driven, and how far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// All of them, with planned runs and gains.
+    Whole,
+    /// Nulls, the single effects of every second block, and what is said of them: all that a baseline guards.
+    Guarded,
+}
