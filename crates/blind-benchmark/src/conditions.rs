@@ -3,10 +3,10 @@
 //! turn, how long is driven and in how many runs.
 //!
 //! Every matter is drawn from a stream of its own name. Where a condition is what a finding would rightly
-//! name ([`crate::exempt`]) and that finding is what the case hides, the condition is left out: the hidden
+//! name ([`effects::EXEMPT`]) and that finding is what the case hides, the condition is left out: the hidden
 //! size could not be told from the ordinary one.
 
-use effects::Needs;
+use effects::{Needs, OrdinaryCondition};
 
 use super::draw::CaseDraws;
 
@@ -101,7 +101,7 @@ impl Conditions {
             },
             clock_drift: {
                 let mut drift = draws.of("clock drift");
-                let drifts = drift.chance(0.25) && !hidden.contains(&"clock_rate");
+                let drifts = drift.chance(0.25) && !is_hidden(OrdinaryCondition::DriftingClocks, hidden);
                 if drifts { drift.uniform(-MAX_CLOCK_DRIFT, MAX_CLOCK_DRIFT) } else { 0.0 }
             },
             wheel_sigma_m_per_sqrt_m: if wheels.chance(0.15) { 0.0 } else { wheels.log_uniform(3e-5, 2e-3) },
@@ -144,6 +144,11 @@ impl Conditions {
     }
 }
 
+/// Whether what would rightly be named in a condition is what the case hides.
+fn is_hidden(condition: OrdinaryCondition, hidden: &[&str]) -> bool {
+    condition.right_findings().any(|id| hidden.contains(&id))
+}
+
 fn stamps(draws: CaseDraws, needs: Needs, hidden: &[&str], interval_s: f64) -> Stamps {
     let mut draw = draws.of("stamps");
     let class = draw.below(10);
@@ -151,12 +156,11 @@ fn stamps(draws: CaseDraws, needs: Needs, hidden: &[&str], interval_s: f64) -> S
     let irregular = Stamps::Irregular { jitter_s: draw.uniform(0.001, 0.008).min(most_s) };
     let jittering = Stamps::Jittering { sigma_s: draw.log_uniform(3e-4, 5e-3).min(most_s) };
     let received = Stamps::Received { mean_s: draw.log_uniform(0.005, 0.05) };
-    let is_hidden = |id| hidden.contains(&id);
     match class {
         _ if needs.jitter => irregular,
         0..=1 => irregular,
-        2..=3 if !is_hidden("interval_error") => jittering,
-        4 if !is_hidden("interval_error") && !is_hidden("truth_latency") => received,
+        2..=3 if !is_hidden(OrdinaryCondition::JitteringStamps, hidden) => jittering,
+        4 if !is_hidden(OrdinaryCondition::ReceivedStamps, hidden) => received,
         _ => Stamps::Exact,
     }
 }

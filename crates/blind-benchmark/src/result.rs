@@ -1,9 +1,9 @@
 //! What came of a case: what was found, and what the planned run made of it.
 
 use diagnose::Document;
+use effects::OrdinaryCondition;
 
 use super::case::{Case, CaseKind};
-use super::exempt::right_findings;
 use super::hidden::EffectKind;
 use super::instrument::{NoiseClass, TruthKind};
 use super::oracle_view::OracleView;
@@ -68,14 +68,19 @@ pub struct CaseResult {
 }
 
 impl CaseResult {
+    /// Findings that are right in the case's conditions.
+    fn right_findings(&self) -> Vec<&'static str> {
+        self.strata.ordinary_conditions(self.noise).flat_map(OrdinaryCondition::right_findings).collect()
+    }
+
     /// Whether no finding is right in the case's conditions but for what is hidden.
     pub(crate) fn has_ordinary_records(&self) -> bool {
-        right_findings(self.noise, &self.strata).next().is_none()
+        self.right_findings().is_empty()
     }
 
     /// The findings that are not right anyway in the case's conditions.
     pub fn findings(&self) -> impl Iterator<Item = &Reported> {
-        let right: Vec<&str> = right_findings(self.noise, &self.strata).collect();
+        let right = self.right_findings();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
         self.reported
             .iter()

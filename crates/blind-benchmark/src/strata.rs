@@ -1,9 +1,11 @@
 //! Strata: what a case's robot and records are like, in few levels each, so that every measure can be told
 //! for each of them. The numbers that were drawn stand beside.
 
+use effects::OrdinaryCondition;
+
 use super::case::Case;
 use super::conditions::{Conditions, Stamps};
-use super::instrument::{InstrumentModel, TruthKind};
+use super::instrument::{InstrumentModel, NoiseClass, TruthKind};
 
 /// The levels of one stratum.
 macro_rules! levels {
@@ -103,7 +105,7 @@ levels! {
     /// Measurements a second.
     TruthRateLevel {
         /// At the ends of runs alone.
-        Ends,
+        AtEnds,
         /// Fewer than two.
         Below2Hz,
         /// 2 to 10.
@@ -117,11 +119,11 @@ levels! {
     /// What the measured positions err by.
     TruthNoiseLevel {
         /// 0.2 to 1 mm.
-        Fine,
+        Low,
         /// 1 to 3 mm.
         Medium,
         /// 3 to 10 mm.
-        Coarse,
+        High,
     }
 }
 
@@ -238,6 +240,25 @@ pub struct DrawnConditions {
     pub rows: usize,
 }
 
+impl Strata {
+    /// Conditions that a finding may rightly name.
+    pub(crate) fn ordinary_conditions(&self, noise: NoiseClass) -> impl Iterator<Item = OrdinaryCondition> {
+        let noise = match noise {
+            NoiseClass::White => None,
+            NoiseClass::HeavyTailed => Some(OrdinaryCondition::HeavyTailedErrors),
+            NoiseClass::Correlated => Some(OrdinaryCondition::AutocorrelatedErrors),
+            NoiseClass::Dropouts => Some(OrdinaryCondition::RowsLostWithCounts),
+        };
+        let stamps = match self.stamps {
+            StampLevel::Exact | StampLevel::Irregular => None,
+            StampLevel::Jittering => Some(OrdinaryCondition::JitteringStamps),
+            StampLevel::Received => Some(OrdinaryCondition::ReceivedStamps),
+        };
+        let clock = (self.clock == ClockLevel::Drifting).then_some(OrdinaryCondition::DriftingClocks);
+        [noise, stamps, clock].into_iter().flatten()
+    }
+}
+
 /// The first level whose limit a number is below, or the last one.
 fn level<L: Copy, const N: usize>(value: f64, limits: [(f64, L); N], beyond: L) -> L {
     limits.iter().find(|(limit, _)| value < *limit).map_or(beyond, |(_, level)| *level)
@@ -275,7 +296,7 @@ pub(crate) fn strata(case: &Case) -> (Strata, DrawnConditions) {
             false => TruthPlace::BetweenRows,
         },
         truth_rate: if is_at_ends {
-            TruthRateLevel::Ends
+            TruthRateLevel::AtEnds
         } else {
             level(
                 instrument_model.rate_hz,
@@ -285,8 +306,8 @@ pub(crate) fn strata(case: &Case) -> (Strata, DrawnConditions) {
         },
         truth_noise: level(
             instrument_model.sigma_xy_m,
-            [(1e-3, TruthNoiseLevel::Fine), (3e-3, TruthNoiseLevel::Medium)],
-            TruthNoiseLevel::Coarse,
+            [(1e-3, TruthNoiseLevel::Low), (3e-3, TruthNoiseLevel::Medium)],
+            TruthNoiseLevel::High,
         ),
         runs: match runs().count() {
             0..=1 => RunsLevel::OneLog,
