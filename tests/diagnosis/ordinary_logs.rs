@@ -7,6 +7,7 @@
 
 use diagnose::{Document, Options, diagnose};
 use rayon::prelude::*;
+use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::plain_robot::{PlainRobot, Reports, Stamps};
 
@@ -27,9 +28,6 @@ fn shown(document: &Document) -> Vec<String> {
         });
         format!("{}{term} z {:.1}", finding.names.join("|"), finding.z)
     });
-    let candidates = document.candidates.iter().take(if std::env::var("YAIR_DEBUG").is_ok() { 6 } else { 0 });
-    let candidates = candidates.map(|of| format!("{} z {:.1} odds {:.0} {:?}", of.id, of.z, of.log_odds, of.refused));
-    let found = found.chain(candidates);
     let failed = document.checks.iter().filter(|check| !check.passes);
     found.chain(failed.map(|check| format!("check {} p {:.1e}", check.name, check.p_value))).collect()
 }
@@ -37,7 +35,7 @@ fn shown(document: &Document) -> Vec<String> {
 /// Robots of each kind, and the first seed.
 fn robots() -> (u64, u64) {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
-    (number("YAIR_ROBOTS").unwrap_or(2), number("YAIR_SEED").unwrap_or(500))
+    (number("YAIR_ROBOTS").unwrap_or(1), number("YAIR_SEED").unwrap_or(500))
 }
 
 type Change = fn(&mut PlainRobot);
@@ -64,7 +62,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &["interval_error"],
     ),
     ("20 Hz, truth between rows", |of| (of.odometry_hz, of.truth_between_rows) = (20.0, 0.5), &[]),
-    ("ends of runs", |of| of.reports = Reports::Ends, &[]),
+    ("ends of runs", |of| of.reports = Reports::FirstAndLast, &[]),
     ("positions", |of| of.reports = Reports::Positions, &[]),
     ("truth at 50 Hz", |of| of.truth_hz = 50.0, &[]),
     ("truth at 1 Hz", |of| of.truth_hz = 1.0, &[]),
@@ -82,48 +80,38 @@ fn kinds() -> impl Iterator<Item = &'static (&'static str, Change, &'static [&'s
     KINDS.iter().filter(move |(name, ..)| name.contains(&of))
 }
 
-#[test]
-fn nothing_is_found_where_nothing_is_wrong() {
+/// The diagnoses of robots with a change each, seed by seed.
+fn diagnosed_all<T: Sync>(changes: &[(T, Change)]) -> Vec<(&T, u64, Result<Document, String>)> {
     let (robots, first) = robots();
-    let mut with_findings = 0;
-    let mut all = 0;
-    for (kind, change, exempt) in kinds() {
-        let of = |seed: u64| {
+    let seeds = |(what, change)| (first..first + robots).map(move |seed| (what, change, seed));
+    let all: Vec<(&T, Change, u64)> = changes.iter().map(|(what, change)| (what, *change)).flat_map(seeds).collect();
+    all.into_par_iter()
+        .map(|(what, change, seed)| {
             let mut robot = PlainRobot::ordinary(seed);
             change(&mut robot);
-            (seed, diagnosed(&robot))
-        };
-        let found: Vec<_> = (first..first + robots).into_par_iter().map(of).collect();
-        let mut wrong = 0;
-        for (seed, document) in &found {
-            let is_wrong = match document {
-                Ok(document) => document.findings.iter().any(|finding| !exempt.contains(&finding.names[0].as_str())),
-                Err(_) => true,
-            };
-            wrong += u64::from(is_wrong);
-            if is_wrong || document.as_ref().is_ok_and(|document| !document.findings.is_empty()) {
-                let shown = document.as_ref().map_or_else(|error| vec![error.clone()], shown);
-                println!("  {kind}, seed {seed}: {}", shown.join("; "));
-            }
-        }
-        println!("{kind}: {wrong} of {robots}");
-        (with_findings, all) = (with_findings + wrong, all + robots);
-    }
-    println!("{with_findings} of {all} nulls have a finding");
+            (what, seed, diagnosed(&robot))
+        })
+        .collect()
 }
 
-/// Writes the datasets of the kinds asked for below the folder YAIR_KEEP, to be looked at.
 #[test]
-fn datasets_are_kept_where_asked() {
-    let Some(folder) = std::env::var_os("YAIR_KEEP").map(std::path::PathBuf::from) else { return };
-    let (robots, first) = robots();
-    for (kind, change, _) in kinds() {
-        for seed in first..first + robots {
-            let mut robot = PlainRobot::ordinary(seed);
-            change(&mut robot);
-            robot.write(&folder.join(kind.replace(' ', "_")).join(seed.to_string()));
-        }
+fn nothing_is_found_where_nothing_is_wrong() {
+    let kinds: Vec<_> = kinds().map(|(kind, change, exempt)| ((*kind, *exempt), *change)).collect();
+    let (mut with_findings, mut all) = (0, 0);
+    for ((kind, exempt), seed, found) in diagnosed_all(&kinds) {
+        let is_wrong = found.as_ref().map_or(true, |document| {
+            document.findings.iter().any(|finding| !exempt.contains(&finding.names[0].as_str()))
+        });
+        let shown = found.as_ref().map_or_else(|error| vec![error.clone()], shown);
+        println!("{} {kind}, seed {seed}: {}", if is_wrong { "WRONG" } else { "right" }, shown.join("; "));
+        (with_findings, all) = (with_findings + u64::from(is_wrong), all + 1);
     }
+    println!("{with_findings} of {all} nulls have a wrong finding");
+    // At 5 % family-wise, more than this many have a chance below 1e-3. Rejects rates from single rows: all
+    // logs of coarse encoders have a finding.
+    let binomial = Binomial::new(0.05, all).expect("a rate");
+    let bound = (0..all).find(|count| binomial.sf(*count) < 1e-3).unwrap_or(all);
+    assert!(with_findings <= bound, "{with_findings} of {all}");
 }
 
 /// What is wrong with a robot or its log, and the name that is right.
@@ -144,25 +132,20 @@ const FAULTS: &[(&str, Change, &str)] = &[
 
 #[test]
 fn what_is_wrong_is_named_and_nothing_else() {
-    let (robots, first) = robots();
     let of_kind = std::env::var("YAIR_KIND").unwrap_or_default();
+    let faults = FAULTS.iter().filter(|(fault, ..)| fault.contains(&of_kind));
+    let faults: Vec<_> = faults.map(|(fault, change, id)| ((*fault, *id), *change)).collect();
     let mut complaints = Vec::new();
-    for (fault, change, id) in FAULTS.iter().filter(|(fault, ..)| fault.contains(&of_kind)) {
-        let of = |seed: u64| {
-            let mut robot = PlainRobot::ordinary(seed);
-            change(&mut robot);
-            (seed, diagnosed(&robot))
-        };
-        let found: Vec<_> = (first..first + robots).into_par_iter().map(of).collect();
-        for (seed, document) in &found {
-            let is_right = document
-                .as_ref()
-                .is_ok_and(|document| matches!(&document.findings[..], [finding] if finding.names[0] == *id));
-            let shown = document.as_ref().map_or_else(|error| vec![error.clone()], shown);
-            println!("{} {fault}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
-            if !is_right {
-                complaints.push(format!("{fault}, seed {seed}"));
-            }
+    for ((fault, id), seed, found) in diagnosed_all(&faults) {
+        let is_right = found.as_ref().is_ok_and(|document| {
+            // A fault of one run is that run's.
+            matches!(&document.findings[..], [finding] if finding.names[0] == *id
+                && finding.runs.is_some() == fault.contains("one run"))
+        });
+        let shown = found.as_ref().map_or_else(|error| vec![error.clone()], shown);
+        println!("{} {fault}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
+        if !is_right {
+            complaints.push(format!("{fault}, seed {seed}"));
         }
     }
     assert!(complaints.is_empty(), "{complaints:#?}");

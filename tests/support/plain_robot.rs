@@ -16,7 +16,7 @@ pub(crate) enum Reports {
     Poses,
     Positions,
     /// The first and the last pose of each run.
-    Ends,
+    FirstAndLast,
 }
 
 /// Errors of the stamps of odometry rows.
@@ -25,8 +25,8 @@ pub(crate) enum Stamps {
     Exact,
     /// Normal, of this standard deviation, seconds.
     Jitter(f64),
-    /// A row is stamped when it is received: later by an exponential delay of this mean, seconds, in the order
-    /// of the rows.
+    /// A row is stamped when it is received: later by an exponential delay of this mean, seconds, in the
+    /// order of the rows.
     Received(f64),
 }
 
@@ -95,11 +95,11 @@ impl PlainRobot {
         let (mut odometry, mut truth) = (String::from("run,t_s,left_ticks,right_ticks\n"), String::new());
         truth.push_str("run,t_s,x_m,y_m,theta_rad\n");
         let mut described = String::new();
-        let programs: Vec<(&str, Vec<Leg>)> = programs(&mut draws).into_iter().take(self.runs).collect();
-        let runs: Vec<(String, &str, Vec<Leg>)> = if self.joined {
+        let programs: Vec<(&str, Vec<Part>)> = programs(&mut draws).into_iter().take(self.runs).collect();
+        let runs: Vec<(String, &str, Vec<Part>)> = if self.joined {
             vec![("all".to_owned(), "free", programs.iter().flat_map(|(_, legs)| legs.iter().copied()).collect())]
         } else {
-            let of = |(number, (protocol, legs)): (usize, &(&'static str, Vec<Leg>))| {
+            let of = |(number, (protocol, legs)): (usize, &(&'static str, Vec<Part>))| {
                 (format!("{number:03}_{protocol}"), *protocol, legs.clone())
             };
             programs.iter().enumerate().map(of).collect()
@@ -156,7 +156,7 @@ impl PlainRobot {
         let rows = (1000.0 / self.odometry_hz).round() as usize;
         let last = path.samples.len() - 1;
         let steps: Vec<usize> = match self.reports {
-            Reports::Ends => vec![0, last / rows * rows],
+            Reports::FirstAndLast => vec![0, last / rows * rows],
             _ => (0..path.samples.len()).step_by(every).map(|step| step + between).filter(|s| *s <= last).collect(),
         };
         let off_s = self.latency_s + self.late_run.filter(|(run, _)| *run == number).map_or(0.0, |(_, off_s)| off_s);
@@ -173,7 +173,7 @@ impl PlainRobot {
 
 /// A part of a drive: top speed and yaw rate, and how long it takes at these.
 #[derive(Debug, Clone, Copy)]
-struct Leg {
+struct Part {
     v_m_s: f64,
     omega_rad_s: f64,
     for_s: f64,
@@ -183,16 +183,16 @@ struct Leg {
 
 const SPEEDS: [f64; 3] = [0.15, 0.3, 0.45];
 
-fn straight(length_m: f64, v_m_s: f64) -> Leg {
-    Leg { v_m_s, omega_rad_s: 0.0, for_s: length_m / v_m_s.abs(), rest_s: 0.4 }
+fn straight(length_m: f64, v_m_s: f64) -> Part {
+    Part { v_m_s, omega_rad_s: 0.0, for_s: length_m / v_m_s.abs(), rest_s: 0.4 }
 }
 
-fn spin(turn_rad: f64, omega_rad_s: f64) -> Leg {
-    Leg { v_m_s: 0.0, omega_rad_s: omega_rad_s * turn_rad.signum(), for_s: turn_rad.abs() / omega_rad_s, rest_s: 0.4 }
+fn spin(turn_rad: f64, omega_rad_s: f64) -> Part {
+    Part { v_m_s: 0.0, omega_rad_s: omega_rad_s * turn_rad.signum(), for_s: turn_rad.abs() / omega_rad_s, rest_s: 0.4 }
 }
 
 /// Six straights, four spins, four squares, four circles and three free drives, mixed.
-fn programs(draws: &mut Draws) -> Vec<(&'static str, Vec<Leg>)> {
+fn programs(draws: &mut Draws) -> Vec<(&'static str, Vec<Part>)> {
     let straights = (0..6).map(|k| ("straight", vec![straight(2.0, SPEEDS[k % 3]), straight(2.0, -SPEEDS[k % 3])]));
     let spins = (0..4).map(|k| {
         let turn_rad = if k % 2 == 0 { 2.0 * TAU } else { -2.0 * TAU };
@@ -205,19 +205,19 @@ fn programs(draws: &mut Draws) -> Vec<(&'static str, Vec<Leg>)> {
     let circles = (0..4).map(|k| {
         let (name, side) = if k % 2 == 0 { ("circle_ccw", 1.0) } else { ("circle_cw", -1.0) };
         let v_m_s = SPEEDS[1 + k / 2];
-        let leg = Leg { v_m_s, omega_rad_s: side * v_m_s / 0.7, for_s: 2.0 * TAU * 0.7 / v_m_s, rest_s: 0.4 };
+        let leg = Part { v_m_s, omega_rad_s: side * v_m_s / 0.7, for_s: 2.0 * TAU * 0.7 / v_m_s, rest_s: 0.4 };
         (name, vec![leg])
     });
-    let groups: [Vec<(&str, Vec<Leg>)>; 4] =
+    let groups: [Vec<(&str, Vec<Part>)>; 4] =
         [straights.collect(), spins.collect(), squares.collect(), circles.collect()];
     let mut free = (0..3).map(|_| {
-        let leg = |_| Leg {
+        let leg = |_| Part {
             v_m_s: 0.1 + 0.4 * draws.uniform(),
             omega_rad_s: 1.2 * (2.0 * draws.uniform() - 1.0),
             for_s: 1.0 + 2.0 * draws.uniform(),
             rest_s: 0.0,
         };
-        ("free", (0..12).map(leg).collect::<Vec<Leg>>())
+        ("free", (0..12).map(leg).collect::<Vec<Part>>())
     });
     let mut groups = groups.map(Vec::into_iter);
     let mut all = Vec::new();
@@ -248,7 +248,7 @@ impl World {
     /// Drives the legs with limited accelerations; half a second of standing at both ends.
     fn drive(
         &mut self,
-        legs: &[Leg],
+        legs: &[Part],
         robot: &PlainRobot,
         (base_m, radius_m, phase_rad): (f64, [f64; 2], f64),
         draws: &mut Draws,
@@ -257,7 +257,7 @@ impl World {
         const LIMITS: [f64; 2] = [0.6, 2.5];
         let mut samples = vec![Sample { at: self.at, wheels_rad: self.wheels_rad }];
         let mut now = [0.0, 0.0];
-        let rest = |for_s| Leg { v_m_s: 0.0, omega_rad_s: 0.0, for_s, rest_s: 0.0 };
+        let rest = |for_s| Part { v_m_s: 0.0, omega_rad_s: 0.0, for_s, rest_s: 0.0 };
         let mut parts = vec![rest(0.5)];
         for leg in legs {
             parts.push(*leg);

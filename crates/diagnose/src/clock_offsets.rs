@@ -1,11 +1,11 @@
 //! Clocks of instrument and robot that are far apart: of all runs, or of one among many.
 //!
-//! Before anything is fitted: turns and distances between successive poses, against those of the counts between
-//! the same instants a time τ earlier. With n pairs and sums of squares S_θ and S_d of the differences, the profile
-//! log likelihood is −n/2 (ln S_θ + ln S_d); it needs no start pose, no path and no more than nominal wheels. An
-//! offset of all runs is taken off before the fit. A run with an offset of its own is left out: it would be
-//! explained by whatever term it pays best.
-//! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
+//! Before anything is fitted: turns and distances between successive poses, against those of the counts
+//! between the same instants a time τ earlier. With n pairs and sums of squares S_θ and S_d of the
+//! differences, the profile log likelihood is −n/2 (ln S_θ + ln S_d); it needs no start pose, no path and no
+//! more than nominal wheels. An offset of all runs is taken off before the fit. A run with an offset of its
+//! own is left out: it would be explained by whatever term it pays best. Reference: Knapp & Carter 1976 (time
+//! delay by maximum likelihood).
 
 use dataset::{Dataset, RunView};
 use estimation::WheelAngleInterpolator;
@@ -192,7 +192,8 @@ mod tests {
 
     use super::*;
 
-    /// Runs of twenty seconds that speed up, slow down and turn, whose poses are of so long before their stamps.
+    /// Runs of twenty seconds that speed up, slow down and turn, whose poses are of so long before their
+    /// stamps.
     fn driven(offsets_s: &[f64]) -> Dataset {
         let wheels_at =
             |t_s: f64| Wheels { left: 4.0 * t_s - 2.0 * (0.9 * t_s).cos(), right: 4.0 * t_s + 1.5 * (1.3 * t_s).sin() };

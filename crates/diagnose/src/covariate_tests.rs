@@ -1,4 +1,5 @@
-//! Score tests of what residuals may depend on: products of covariates on every channel, beside what the model has.
+//! Score tests of what residuals may depend on: products of covariates on every channel, beside what the
+//! model has.
 
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;

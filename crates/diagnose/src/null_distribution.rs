@@ -1,9 +1,9 @@
-//! Distributions of tests where encoders are coarse: from the runs simulated once more by the fitted model, their
-//! counts rounded anew ([`ModelFit::resimulated`]).
+//! Distributions of tests where encoders are coarse: from the runs simulated once more by the fitted model,
+//! their counts rounded anew ([`ModelFit::resimulated`]).
 //!
-//! A test whose p-value is p by formula has z = Φ⁻¹(1 − p), standard normal if the formula holds. Over simulated
-//! runs its mean and standard deviation say how far it does not, and z is judged by these. A score test's
-//! statistic, χ² by formula, is inflated by a factor where errors last; it is judged over that factor.
+//! A test whose p-value is p by formula has z = Φ⁻¹(1 − p), standard normal if the formula holds. Over
+//! simulated runs its mean and standard deviation say how far it does not, and z is judged by these. A score
+//! test's statistic, χ² by formula, is inflated by a factor where errors last; it is judged over that factor.
 
 use estimation::ModelFit;
 use rayon::prelude::*;
@@ -73,8 +73,8 @@ pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(
     (left(coefficient, coefficient_mean), left(sigmas, sigmas_mean) / variance.sqrt().max(1.0))
 }
 
-/// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0 and
-/// 1, by formula.
+/// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0
+/// and 1, by formula.
 fn judged(z: f64, simulated: &[f64]) -> f64 {
     let count = simulated.len() as f64;
     let mean = simulated.iter().sum::<f64>() / count;

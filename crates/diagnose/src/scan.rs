@@ -71,8 +71,8 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
     most + (sum / f64::from(PRIOR_SCALES)).ln()
 }
 
-/// The statistic of candidates that are tested as a whole, over the directions that are detectable, and how many
-/// these are.
+/// The statistic of candidates that are tested as a whole, over the directions that are detectable, and how
+/// many these are.
 pub(crate) fn detectable_statistic(own: &[Candidate], projected: &Projected) -> (f64, usize) {
     let Projected { information, gradient, .. } = projected;
     let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();

@@ -1,8 +1,8 @@
 //! Records with longer intervals, for covariates that hardly change from one row of a fast log to the next.
 //!
 //! Between two measurements at 10 Hz a log at 100 Hz has ten rows. A covariate that varies within tenths of a
-//! second may be evaluated for five of them together. How far the rows together go across the arc of their sum is
-//! kept.
+//! second may be evaluated for five of them together. How far the rows together go across the arc of their
+//! sum is kept.
 
 use kinematics::Wheels;
 

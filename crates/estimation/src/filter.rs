@@ -13,7 +13,7 @@ use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
-use crate::noise::{Noise, NoiseComponent};
+use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
@@ -21,8 +21,6 @@ use crate::records::{MeasuredPose, Segment, Start};
 use crate::rounding::{FilterState, Rounding};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
-
-pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -279,8 +277,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.rounding.start([xy, theta]);
     }
 
-    /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion in
-    /// between is that of the middle.
+    /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion
+    /// in between is that of the middle.
     #[inline(always)]
     fn twists_before(&self, after: usize, t_s: f64, twist: Twist) -> [Twist; 2] {
         let late_s = self.instrument.latency_s;

@@ -25,6 +25,9 @@ impl NoiseComponent {
     pub const ALL: [Self; 4] = [Self::Wheel, Self::Turn, Self::MeasurementPosition, Self::MeasurementHeading];
 }
 
+/// How many variances there are.
+pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
+
 /// Values of the four variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {

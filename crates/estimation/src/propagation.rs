@@ -310,7 +310,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
                     of_terms.theta_rad += size * gradient.theta_rad;
                 }
             }
-            // One arc of counts and terms together: where terms undo what stamps jitter by, their squares count.
+            // One arc of counts and terms together: where terms undo what stamps jitter by, their squares
+            // count.
             let distance_m = of_counts.distance_m + of_terms.x_m;
             let turn_rad = of_counts.turn_rad + of_terms.theta_rad;
             let across_m = self.model.across_m(interval);
@@ -364,8 +365,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
         moved
     }
 
-    /// Goes over intervals before the first measurement that is taken: wheels turn and terms remember, as where a run
-    /// is cut into blocks or its measurements are thinned.
+    /// Goes over intervals before the first measurement that is taken: wheels turn and terms remember, as
+    /// where a run is cut into blocks or its measurements are thinned.
     pub(crate) fn skip(&mut self, intervals: Range<usize>) {
         if !matches!(self.propagations, PropagationSource::Cached(..)) {
             let _ = self.dead_reckon(Pose::IDENTITY, intervals);

@@ -115,8 +115,8 @@ impl Segment<'_> {
         self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
     }
 
-    /// Rates of the wheels at an instant near the end of some intervals, rad/s; beyond the first and the last,
-    /// those there.
+    /// Rates of the wheels at an instant near the end of some intervals, rad/s; beyond the first and the
+    /// last, those there.
     pub(crate) fn rate_at(&self, after: usize, t_s: f64) -> Wheels<f64> {
         let mut at = after.min(self.intervals.len());
         while at > 0 && self.intervals[at - 1].t_s > t_s {

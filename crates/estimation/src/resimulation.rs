@@ -1,9 +1,9 @@
-//! The same runs once more, as the fitted model would have them: the path smoothed, its counts rounded anew with
-//! phases by chance, its measurements made by the model with noise of the fitted sizes.
+//! The same runs once more, as the fitted model would have them: the path smoothed, its counts rounded anew
+//! with phases by chance, its measurements made by the model with noise of the fitted sizes.
 //!
 //! Where encoders are coarse, errors of rounding are neither normal nor independent: on a straight whose rows
-//! have whole numbers of counts, the error stays. No formula says what whiteness, kurtosis or a score are then;
-//! their values on such runs do (parametric bootstrap; Efron & Tibshirani 1993, chapter 6).
+//! have whole numbers of counts, the error stays. No formula says what whiteness, kurtosis or a score are
+//! then; their values on such runs do (parametric bootstrap; Efron & Tibshirani 1993, chapter 6).
 
 use std::sync::Arc;
 
@@ -34,8 +34,8 @@ impl ModelFit<'_> {
         })
     }
 
-    /// The runs once more, by the values found, with the pass at them. `number` addresses the draws; `terms` are
-    /// those of the fit.
+    /// The runs once more, by the values found, with the pass at them. `number` addresses the draws; `terms`
+    /// are those of the fit.
     #[must_use]
     pub fn resimulated(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
         let mut records = (*self.records).clone();

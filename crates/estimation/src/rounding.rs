@@ -1,10 +1,10 @@
 //! The rounding of cumulative counts in the filter.
 //!
-//! A count c is off by up to half of a count, e. Dead reckoning from counts follows z = x + J e, the pose that
-//! the counts say, without noise of rounding; the instrument sees x = z − J e. While no count changes, e stays
-//! the same; each new count brings a new one. The filter therefore carries z, and for as long as the counts
-//! stand it carries x instead: x is entered with P + Q, Q = J diag(q²/12) Jᵀ, measured as often as there are
-//! measurements, and what these say of it is handed back to z when a wheel turns on,
+//! A count c is off by up to half of a count, e. Dead reckoning from counts follows z = x + J e, the pose
+//! that the counts say, without noise of rounding; the instrument sees x = z − J e. While no count changes, e
+//! stays the same; each new count brings a new one. The filter therefore carries z, and for as long as the
+//! counts stand it carries x instead: x is entered with P + Q, Q = J diag(q²/12) Jᵀ, measured as often as
+//! there are measurements, and what these say of it is handed back to z when a wheel turns on,
 //!
 //! z⁺ = z + K (x⁺ − x), P⁺ = P − K (P + Q − P_x) Kᵀ, K = P (P + Q)⁻¹,
 //!
@@ -16,8 +16,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
-use crate::filter::NOISES;
 use crate::model::Model;
+use crate::noise::NOISES;
 use crate::settings::MIN_ROUNDING_VARIANCE_RATIO;
 
 /// The filter's state, with its derivatives.
@@ -40,8 +40,8 @@ enum Carries {
     SinceMeasurement { pose: Pose, covariance: Matrix3<f64>, by_noise: [[f64; NOISES]; 3] },
 }
 
-/// What the rounding of both wheels' counts makes of a pose: variances along (m²) and of the heading (rad²), and
-/// their covariance.
+/// What the rounding of both wheels' counts makes of a pose: variances along (m²) and of the heading (rad²),
+/// and their covariance.
 pub(crate) fn rounding_variances(quantum_rad: Wheels<f64>, model: &Model) -> [f64; 3] {
     let variance_m2 = quantum_rad.zip_with(model.m_per_rad, |rad, m_per_rad| (rad * m_per_rad).powi(2) / 12.0);
     let (Wheels { left, right }, separation_m) = (variance_m2, model.separation_m);

@@ -1,10 +1,10 @@
 //! The regular beat behind the stamps of a log, and how late each stamp is against it.
 //!
-//! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows have
-//! numbers on the beat: one more from row to row, more where rows were lost, none where a row came by itself. A
-//! lost row shifts all later stamps against the count of rows for good; a late one shifts itself, and what waited
-//! behind it. Times over numbers then have a local line, as a clock need not keep one beat all day, and a stamp is
-//! late by what it is above it.
+//! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows
+//! have numbers on the beat: one more from row to row, more where rows were lost, none where a row came by
+//! itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts itself,
+//! and what waited behind it. Times over numbers then have a local line, as a clock need not keep one beat
+//! all day, and a stamp is late by what it is above it.
 
 use crate::settings::{BEAT_LINE_ROWS, BEAT_ROUNDS, BEAT_SHIFT_ROWS, MIN_BEAT_ROWS, MIN_ODD_GAP, MIN_SHIFT};
 
@@ -141,8 +141,8 @@ mod tests {
             let z: f64 = StandardNormal.sample(draws);
             2e-3 * z
         };
-        // The line through 500 rows is off by 2 ms/√500 on average, by twice that at the ends of a run. Rejects a
-        // beat that rows farther off than 0.45 of it miss: 2.4 % of rows are off by 5 ms and more.
+        // The line through 500 rows is off by 2 ms/√500 on average, by twice that at the ends of a run.
+        // Rejects a beat that rows farther off than 0.45 of it miss: 2.4 % of rows are off by 5 ms and more.
         assert!(off_s(&stamps(3000, 0.0, normal)) < 2e-4, "{}", off_s(&stamps(3000, 0.0, normal)));
         assert!(off_s(&stamps(3000, 0.03, |_| 0.0)) < 1e-9, "rows that are lost are not late");
         assert!(off_s(&stamps(3000, 0.0, |_| 0.0)) < 1e-12);

@@ -105,8 +105,8 @@ pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 
 /// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
 pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
 
-/// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is taken
-/// from its own counts.
+/// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is
+/// taken from its own counts.
 /// Budgeted: 3 % of the speed; the square of it biases terms by a thousandth.
 pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
 
@@ -119,7 +119,8 @@ pub(crate) const GAP_RATIO: f64 = 2.5;
 pub(crate) const MIN_BEAT_ROWS: usize = 24;
 
 /// Rows to either side whose line is the beat.
-/// Budgeted: 500 rows know it to a twentieth of what stamps jitter by; in five seconds a clock keeps its beat.
+/// Budgeted: 500 rows know it to a twentieth of what stamps
+/// jitter by; in five seconds a clock keeps its beat.
 pub(crate) const BEAT_LINE_ROWS: usize = 250;
 
 /// Rows to either side of an odd gap, whose promptest tell whether rows were lost in it.
@@ -130,13 +131,14 @@ pub(crate) const BEAT_SHIFT_ROWS: usize = 24;
 /// Budgeted: the second mends what lost rows do to the first.
 pub(crate) const BEAT_ROUNDS: usize = 3;
 
-/// Departure of a gap from the beat, as a share of it, from which on rows may have been lost in it, or have come by
-/// themselves.
+/// Departure of a gap from the beat, as a share of it, from which on rows may have been lost in it, or have
+/// come by themselves.
 /// Derived: a lost row makes it 1, less what both ends jitter by.
 pub(crate) const MIN_ODD_GAP: f64 = 0.4;
 
 /// Shift of the promptest rows after a gap against those before, as a share of the beat, that lost rows make.
-/// Derived: a lost row makes it 1; the promptest of 24 rows that jitter by a fifth of the beat differ by 0.13.
+/// Derived: a lost row makes it 1; the promptest of 24 rows that jitter by a fifth of the beat differ by
+/// 0.13.
 pub(crate) const MIN_SHIFT: f64 = 0.65;
 
 /// Longest row within which the wheels' rates change steadily, seconds.
@@ -163,9 +165,10 @@ pub(crate) const MIN_GRID_STEPS: usize = 100;
 /// Budgeted: chance has a tenth of them within a twentieth.
 pub(crate) const MIN_GRID_FRACTION: f64 = 0.98;
 
-/// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of tests are
-/// found by simulation.
-/// Budgeted: below it, a statistic's variance is off by a twentieth of its excess at the most.
+/// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of tests
+/// are found by simulation.
+/// Budgeted: below it, a statistic's variance is off by a twentieth of its excess at
+/// the most.
 pub(crate) const MIN_RESIMULATED_VARIANCE_RATIO: f64 = 0.05;
 
 /// Acceleration, m/s², by which a robot that stands between two counts may set off or stop.

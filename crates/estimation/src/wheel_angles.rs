@@ -1,10 +1,10 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
-//! An outside instrument has a clock of its own. Between two rows of the log the wheels' angles follow a cubic
-//! of the angles and rates at both (Hermite), as wheels speed up within a row; every method that compares the
-//! wheels with such measurements integrates the same motion. A log whose rows jitter begins a little after its
-//! run does: half of an interval before the first row and after the last, the speeds of the interval there go
-//! on.
+//! An outside instrument has a clock of its own. Between two rows of the log the wheels' angles follow a
+//! cubic of the angles and rates at both (Hermite), as wheels speed up within a row; every method that
+//! compares the wheels with such measurements integrates the same motion. A log whose rows jitter begins a
+//! little after its run does: half of an interval before the first row and after the last, the speeds of the
+//! interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
@@ -28,8 +28,9 @@ pub(crate) struct WheelInterval {
     pub(crate) rate_rad_s: Wheels<f64>,
     /// Rates at the start and at the end.
     pub(crate) rate_at_ends_rad_s: [Wheels<f64>; 2],
-    /// What makes the centre go across the arc of its wheels' turns: (w_R Δr_L − w_L Δr_R) T/12 for turns w and rates
-    /// that change by Δr, rad². It is (ω Δv − v Δω) T²/12 of the robot, the second term of Magnus 1954.
+    /// What makes the centre go across the arc of its wheels' turns: (w_R Δr_L − w_L Δr_R) T/12 for turns w
+    /// and rates that change by Δr, rad². It is (ω Δv − v Δω) T²/12 of the robot, the second term of Magnus
+    /// 1954.
     pub(crate) bend_rad2: f64,
     /// No count comes in it, nor near it.
     pub(crate) stands: bool,
@@ -186,8 +187,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         if !(0.0..=1.0).contains(&share) || !self.rates.are_joined(self.t_s, row) {
             return Some(even);
         }
-        // What the rates at both ends are beyond the mean rate, as angles over the row. A wheel that turns one
-        // way does not turn back in between (Fritsch & Carlson 1980).
+        // What the rates at both ends are beyond the mean rate, as angles over the row. A wheel that turns
+        // one way does not turn back in between (Fritsch & Carlson 1980).
         let turned = end.zip_with(start, |end, start| end - start);
         let beyond = |rate: Wheels<f64>| {
             rate.zip_with(turned, |rate, turned| {

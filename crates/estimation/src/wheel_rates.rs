@@ -32,8 +32,8 @@ pub(crate) struct WheelRates {
 }
 
 impl WheelRates {
-    /// The rates of a run, whose stamps are so late against a regular beat. `quantum_rad` is what a count stands for,
-    /// where counts were recorded.
+    /// The rates of a run, whose stamps are so late against a regular beat. `quantum_rad` is what a count
+    /// stands for, where counts were recorded.
     pub(crate) fn of(
         (t_s, late_s): (&[f64], &[f64]),
         turn_rad: &Wheels<Vec<f64>>,
@@ -43,8 +43,8 @@ impl WheelRates {
     ) -> Self {
         let jitter_s = stamp_jitter_s(t_s);
         let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
-        // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due, and is
-        // off by no more than the stamps, one way or the other.
+        // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due,
+        // and is off by no more than the stamps, one way or the other.
         let due_s: Vec<f64>;
         let t_s = if jitter_s > MAX_EXACT_JITTER * row_s {
             due_s = t_s.iter().zip(late_s).map(|(t_s, late_s)| t_s - late_s).collect();
@@ -96,8 +96,8 @@ impl WheelRates {
         Self { at_rows_rad_s: Wheels { left, right }, row_by_row, quantum_rad, starts, counted, count_s }
     }
 
-    /// Comes no count in a part of a row's interval, nor within the time that a robot which sets off gently takes
-    /// for one?
+    /// Comes no count in a part of a row's interval, nor within the time that a robot which sets off gently
+    /// takes for one?
     pub(crate) fn stands(&self, rows_s: &[f64], [from_s, to_s]: [f64; 2], row: usize) -> bool {
         let Some(count_s) = self.count_s else { return false };
         let next = self.counted.partition_point(|counted| *counted <= row);
@@ -106,8 +106,8 @@ impl WheelRates {
         before <= from_s - count_s && after >= to_s + count_s
     }
 
-    /// Do the wheels' rates change steadily between a row and the next? Not over a gap, nor over rows that are
-    /// longer than it takes a robot to speed up.
+    /// Do the wheels' rates change steadily between a row and the next? Not over a gap, nor over rows that
+    /// are longer than it takes a robot to speed up.
     pub(crate) fn are_joined(&self, t_s: &[f64], row: usize) -> bool {
         let is_short = t_s.get(row + 1).is_some_and(|next_s| next_s - t_s[row] <= MAX_STEADY_ROW_S);
         is_short && self.starts.binary_search(&(row + 1)).is_err()
@@ -119,9 +119,9 @@ impl WheelRates {
     }
 }
 
-/// What a count of recorded angles stands for, where nearly all steps are multiples of one angle: a driver that
-/// turns counts into angles leaves them rounded. 0 where they are not. The greatest common divisor by Euclid,
-/// up to the rounding of the file's numbers.
+/// What a count of recorded angles stands for, where nearly all steps are multiples of one angle: a driver
+/// that turns counts into angles leaves them rounded. 0 where they are not. The greatest common divisor by
+/// Euclid, up to the rounding of the file's numbers.
 pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
     let steps = || angle_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > QUANTUM_TOLERANCE);
     let divisor = |mut a: f64, mut b: f64| {
@@ -211,8 +211,8 @@ fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-/// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not have, by
-/// their median, so that lost rows do not count.
+/// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not
+/// have, by their median, so that lost rows do not count.
 #[must_use]
 pub fn stamp_jitter_s(t_s: &[f64]) -> f64 {
     let second = |three: &[f64]| (three[2] - 2.0 * three[1] + three[0]).abs();
@@ -290,8 +290,8 @@ mod tests {
             let exact = |t_s: f64| 3.0 + 1.65 * (1.1 * t_s).sin();
             let errors = (50..750).map(|row| found.at_row(row).left - exact(0.01 * row as f64));
             let noise = mean(errors.map(|error| error * error));
-            // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A tenth
-            // of it, for both wheels. Rejects a window of one row at 0.05 rad, with a noise of 1.0.
+            // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A
+            // tenth of it, for both wheels. Rejects a window of one row at 0.05 rad, with a noise of 1.0.
             assert!(noise < 0.1 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
             assert_eq!(found.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
         }

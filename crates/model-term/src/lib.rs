@@ -19,14 +19,14 @@ pub struct Interval<'r> {
     /// Start and end of the logged interval of which it is a part, or the whole: a measurement between two
     /// rows cuts it.
     pub row_s: [f64; 2],
-    /// How late the stamps at its start and its end are against the regular beat of the log's rows, seconds; between
-    /// two rows, in proportion.
+    /// How late the stamps at its start and its end are against the regular beat of the log's rows, seconds;
+    /// between two rows, in proportion.
     pub late_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,
-    /// Mean speed of each wheel's contact, m/s: what covariates are made of. Where counts are coarse it is that
-    /// of several rows around, so that the rounding of this row's counts, which the residuals have too, is not
-    /// in it.
+    /// Mean speed of each wheel's contact, m/s: what covariates are made of. Where counts are coarse it is
+    /// that of several rows around, so that the rounding of this row's counts, which the residuals have too,
+    /// is not in it.
     pub speed_m_s: Wheels<f64>,
     /// Speed of each wheel's contact at the start and at the end, m/s, from as many rows before as after.
     pub speed_at_ends_m_s: [Wheels<f64>; 2],

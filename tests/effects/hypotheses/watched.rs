@@ -141,8 +141,8 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let mut measurement = 1;
         let rows = rows(run, ticks_per_rev);
         let travel_of = |row: &Row| row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
-        // Between two rows the speed is that of the rows around: of one to either side, or of four where stamps are
-        // irregular; at the ends of the log, of as many as there are.
+        // Between two rows the speed is that of the rows around: of one to either side, or of four where
+        // stamps are irregular; at the ends of the log, of as many as there are.
         let mean_s = rows.iter().map(|row| row.dt_s).sum::<f64>() / rows.len() as f64;
         let odd = rows.iter().filter(|row| (row.dt_s / mean_s - 1.0).abs() > 0.05).count();
         let is_even = 10 * odd < rows.len();

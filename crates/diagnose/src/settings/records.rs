@@ -29,9 +29,10 @@ pub(crate) const MIN_CLOCK_SIGMAS: f64 = 6.0;
 /// Convention: as for corrections of the records.
 pub(crate) const MIN_CLOCK_GAIN: f64 = 20.0;
 
-/// Fraction. Share of the turns and distances between poses that counts leave unexplained where their clock is
-/// right; of counts that leave more, nothing is said.
-/// Budgeted: swapped wheels leave four times what there is.
+/// Fraction. Share of the turns and distances between poses that counts leave unexplained where their clock
+/// is right; of counts that leave more, nothing is said.
+/// Budgeted: swapped wheels leave four times what there
+/// is.
 pub(crate) const MAX_CLOCK_UNEXPLAINED: f64 = 0.5;
 
 /// Radians. Turns between poses below this, root mean square, are noise of headings.

@@ -1,10 +1,12 @@
 //! Tests of the residuals, noise effects, large errors, and binned residuals.
 
 /// Number. Simulations that give the distribution of a test where encoders are coarse.
-/// Budgeted: an inflation is known to a third, and a p-value of 1e-4 by Student's t needs z = 4.7 in place of 3.7.
+/// Budgeted: an inflation
+/// is known to a third, and a p-value of 1e-4 by Student's t needs z = 4.7 in place of 3.7.
 pub(crate) const RESIMULATIONS: u64 = 20;
 
-/// Probability. Score tests with a smaller p-value by formula are judged by simulation where encoders are coarse.
+/// Probability. Score tests with a smaller p-value by formula are judged by simulation where encoders are
+/// coarse.
 /// Budgeted: what has a larger one fails no test at 1 %.
 pub(crate) const RESIMULATED_LEVEL: f64 = 0.01;
 

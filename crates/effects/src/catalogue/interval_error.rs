@@ -102,8 +102,8 @@ impl Forward for State {
     }
 }
 
-/// What irregular stamps make of a run's rows: counts that were read before their stamp are short by the speed
-/// times how late it is.
+/// What irregular stamps make of a run's rows: counts that were read before their stamp are short by the
+/// speed times how late it is.
 #[derive(Clone)]
 struct Term;
 

@@ -73,7 +73,8 @@ impl Forward for State {
     }
 }
 
-/// The motion since the instant that a late measurement is of, over the delay: its twist where there is none yet.
+/// The motion since the instant that a late measurement is of, over the delay: its twist where there is none
+/// yet.
 #[derive(Clone, Default)]
 struct Term {
     delay_s: f64,
@@ -177,7 +178,8 @@ mod tests {
 
     #[test]
     fn a_large_delay_goes_back_over_what_the_robot_did() {
-        // Speeding up at 1 m/s² for a second, in rows of 40 ms: 0.1 s before t = 1 s it was 0.1 − 0.1²/2 m back.
+        // Speeding up at 1 m/s² for a second, in rows of 40 ms: 0.1 s before t = 1 s it was 0.1 − 0.1²/2 m
+        // back.
         let (run, mut term) = (RunInfo::default(), Term::default());
         term.linearize_at(&[0.1]);
         let mut gradient = [Pose::IDENTITY];

@@ -157,8 +157,8 @@ fn parts_have_all_products_but_those_with_each_other() {
         for column in 0..common + 4 {
             let is_cross = row.min(column) >= common && (row - common) / 2 != (column - common) / 2;
             let expected = if is_cross { 0.0 } else { all.information[(row, column)] };
-            // Columns are summed four at a time, in other groups: rounding, 1e-16 of two dozen terms. Rejects a
-            // product that one of them lacks.
+            // Columns are summed four at a time, in other groups: rounding, 1e-16 of two dozen terms. Rejects
+            // a product that one of them lacks.
             let off = grouping.information[(row, column)] - expected;
             assert!(off.abs() <= 1e-14 * expected.abs(), "{row} {column}: {off} of {expected}");
             assert!(!is_cross || all.information[(row, column)] != 0.0, "{row} {column}: nothing to leave out");
@@ -360,8 +360,8 @@ fn a_block_of_a_run_knows_the_phases_of_its_wheels() {
         fit.in_blocks(&mut [Box::new(PhaseTerm)], blocks)
     };
     let (blocks, alone) = (of(&whole, 2), of(&second, 1));
-    // The products of the phase with all but the latency, which goes by rates on both sides of the cut: to rounding.
-    // Rejects phases that begin with the run's in each block.
+    // The products of the phase with all but the latency, which goes by rates on both sides of the cut: to
+    // rounding. Rejects phases that begin with the run's in each block.
     let phase = Column::Term(0).index();
     for column in (0..=phase).filter(|column| *column != Column::Latency.index()) {
         let [whole, cut] = [&blocks[1], &alone[0]].map(|of| of.information[(phase, column)]);

@@ -74,7 +74,8 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
 }
 
 /// Counts stand while a robot is measured n times: what that says of the pose that its counts stand for is no
-/// better than a count. By hand: P = Q = R = 1, n = 2: P − P²/(P + Q + R/n) = 0.6, and z⁺ = ȳ·P/(P + Q + R/n).
+/// better than a count. By hand: P = Q = R = 1, n = 2: P − P²/(P + Q + R/n) = 0.6, and z⁺ = ȳ·P/(P + Q +
+/// R/n).
 #[test]
 fn a_standstill_does_not_average_rounding_out() {
     use crate::covariances::{Covariance, Covariances};
