@@ -1,5 +1,5 @@
 //! The regression on diagnosis: a campaign's failures against stored ones, with a stated budget of false
-//! alarms.
+//! positives.
 //!
 //! Guarded are nulls with a finding, nulls with a failed check, plain effects that are not detected, wrong
 //! names first, and intervals that do not cover. The budget is divided by their number (Bonferroni).

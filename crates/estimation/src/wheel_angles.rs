@@ -1,10 +1,9 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
-//! An outside instrument has a clock of its own. Between two rows of the log the wheels' angles follow a
-//! cubic of the angles and rates at both (Hermite), as wheels speed up within a row; every method that
-//! compares the wheels with such measurements integrates the same motion. A log whose rows jitter begins a
-//! little after its run does: half of an interval before the first row and after the last, the speeds of the
-//! interval there go on.
+//! An outside instrument has a clock of its own. Between two rows of the log the wheels speed up as they do
+//! from row to row, steadily; every method that compares the wheels with such measurements integrates the same
+//! motion. A log whose rows jitter begins a little after its run does: half of an interval before the first row
+//! and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
@@ -184,21 +183,30 @@ impl<'a> WheelAngleInterpolator<'a> {
         let share = since_s / length_s;
         let (start, end) = (self.row_rad(row), self.row_rad(row + 1));
         let even = start.zip_with(end, |start, end| start + share * (end - start));
-        if !(0.0..=1.0).contains(&share) || !self.rates.are_joined(self.t_s, row) {
+        if !(0.0..=1.0).contains(&share) {
             return Some(even);
         }
-        // What the rates at both ends are beyond the mean rate, as angles over the row. A wheel that turns
-        // one way does not turn back in between (Fritsch & Carlson 1980).
-        let turned = end.zip_with(start, |end, start| end - start);
-        let beyond = |rate: Wheels<f64>| {
-            rate.zip_with(turned, |rate, turned| {
-                (rate * length_s).clamp(f64::min(3.0 * turned, 0.0), f64::max(3.0 * turned, 0.0)) - turned
-            })
+        let half_rad = -0.5 * length_s * length_s * share * (1.0 - share);
+        Some(even.zip_with(self.acceleration_rad_s2(row), |even, acceleration| even + half_rad * acceleration))
+    }
+
+    /// How the wheels speed up steadily within a row, rad/s²: by the rates of the rows before and after, whichever
+    /// says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979). 0 where single
+    /// rows do not say their rates, and in rows so long that a robot does several things in them.
+    fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
+        let none = Wheels::both(0.0);
+        let is_inner = row > 0 && row + 2 < self.t_s.len();
+        if !(self.rates.row_by_row && is_inner && (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row))) {
+            return none;
+        }
+        let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
+        let by = |from: usize, to: usize| {
+            let passed_s = middle_s(to) - middle_s(from);
+            self.row_rate(to).zip_with(self.row_rate(from), |to, from| (to - from) / passed_s)
         };
-        let bent = beyond(self.rates.at_row(row)).zip_with(beyond(self.rates.at_row(row + 1)), |start, end| {
-            share * (1.0 - share) * ((1.0 - share) * start - share * end)
-        });
-        Some(even.zip_with(bent, |even, bent| even + bent))
+        by(row - 1, row).zip_with(by(row, row + 1), |before, after| {
+            if before * after > 0.0 { before.signum() * before.abs().min(after.abs()) } else { 0.0 }
+        })
     }
 
     /// Rates of the wheels at an instant of a row's interval, rad/s.
@@ -279,12 +287,8 @@ impl Cursor<'_, '_> {
             } else {
                 ends[0].zip_with(ends[1], |start, end| 0.5 * (start + end))
             };
-            let change = ends[1].zip_with(ends[0], |end, start| end - start);
-            let bend_rad2 = if self.track.rates.are_joined(rows_s, row) {
-                (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0
-            } else {
-                0.0
-            };
+            let change = self.track.acceleration_rad_s2(row).map(|acceleration| acceleration * dt_s);
+            let bend_rad2 = (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0;
             let stands = self.track.rates.stands(rows_s, [at_s, t_s], row);
             intervals.push(WheelInterval {
                 t_s: at_s,
@@ -357,18 +361,22 @@ mod tests {
     }
 
     #[test]
-    fn within_short_rows_wheels_speed_up() {
-        // Rows at 0, 0.1, 0.2 and 0.4 s, in which the left wheel turns 10, 10 and 40.
-        let mut dataset = dataset(ticks(), true);
-        dataset.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s *= 0.1);
+    fn within_short_rows_wheels_speed_up_where_their_neighbours_do() {
+        // Rows of 0.1 s: the left wheel speeds up by 20 rad/s², the right one jumps from rest to 10 rad/s.
+        let t_s: Vec<f64> = (0..=6).map(|row| 0.1 * f64::from(row)).collect();
+        let left: Vec<f64> = t_s.iter().map(|t_s| 10.0 * t_s * t_s).collect();
+        let right: Vec<f64> = t_s.iter().map(|t_s| f64::max(10.0 * (t_s - 0.3), 0.0)).collect();
+        let mut dataset = dataset(WheelLog::Angles(Wheels { left, right }), true);
+        dataset.runs[0].odometry.t_s = t_s;
         let session = dataset.session();
         let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
-        let [first, middle, last] = track.steps(0.05, 0.3).expect("spanned")[..] else { panic!("three rows") };
-        // Over the last row it speeds up from 500/3 to 200 a second: it turns 40, and in the first half of it
-        // 20 − (20 − 50/3)/4. Rejects an even row, 20. The right one turns in neither outer row.
-        assert!((last.left - (20.0 - 10.0 / 12.0)).abs() < 1e-9, "{last:?}");
-        assert!((first.left - 5.0).abs() < 1e-9 && (middle.left - 10.0).abs() < 1e-9, "{first:?} {middle:?}");
-        assert_eq!((first.right, last.right), (0.0, 0.0));
+        let steps = track.steps(0.25, 0.35).expect("spanned");
+        let turned = steps.iter().fold(Wheels::both(0.0), |sum, step| sum.zip_with(*step, |a, b| a + b));
+        // 10 (0.35² − 0.25²). Rejects even rows, 0.575: the half of the first and of the second.
+        assert!((turned.left - 0.6).abs() < 1e-12, "{turned:?}");
+        // The half of a row at 10 rad/s. Rejects rates at the rows from both sides, which bend the row after a
+        // jump: 0.44.
+        assert!((turned.right - 0.5).abs() < 1e-12, "{turned:?}");
     }
 
     #[test]
