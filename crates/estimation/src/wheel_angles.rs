@@ -1,9 +1,9 @@
 //! The turn of each wheel along a run, at its rows and at instants between them.
 //!
 //! An outside instrument has a clock of its own. Between two rows of the log the wheels speed up as they do
-//! from row to row, steadily; every method that compares the wheels with such measurements integrates the same
-//! motion. A log whose rows jitter begins a little after its run does: half of an interval before the first row
-//! and after the last, the speeds of the interval there go on.
+//! from row to row, steadily; every method that compares the wheels with such measurements integrates the
+//! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
+//! first row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
