@@ -64,6 +64,7 @@ pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_i
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use records::{Records, Segment};
+pub use sampling_period::lateness_s;
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

@@ -9,7 +9,8 @@
 use crate::settings::{BEAT_LINE_ROWS, BEAT_ROUNDS, BEAT_SHIFT_ROWS, MIN_BEAT_ROWS, MIN_ODD_GAP, MIN_SHIFT};
 
 /// How late each stamp is, seconds; 0 where rows are too few to have a beat.
-pub(crate) fn lateness_s(t_s: &[f64]) -> Vec<f64> {
+#[must_use]
+pub fn lateness_s(t_s: &[f64]) -> Vec<f64> {
     let rows = t_s.len();
     if rows < MIN_BEAT_ROWS {
         return vec![0.0; rows];

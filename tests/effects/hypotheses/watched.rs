@@ -140,6 +140,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let mut pose = seen(0) * body_from_seen.inverse();
         let mut measurement = 1;
         let rows = rows(run, ticks_per_rev);
+        let late_s = estimation::lateness_s(&run.odometry.t_s);
         let travel_of = |row: &Row| row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
         // Between two rows the speed is that of the rows around: of one to either side, or of four where
         // stamps are irregular; at the ends of the log, of as many as there are.
@@ -161,7 +162,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
                 t_s: row.t_s,
                 dt_s: row.dt_s,
                 row_s: [row.t_s, row.t_s + row.dt_s],
-                late_s: [0.0; 2],
+                late_s: [late_s[number], late_s[number + 1]],
                 travel_m,
                 speed_m_s: if is_even { travel_m.map(|travel_m| travel_m / row.dt_s) } else { mean_m_s },
                 count_m: Wheels::both(0.0),
