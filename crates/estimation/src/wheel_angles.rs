@@ -190,9 +190,9 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some(even.zip_with(self.acceleration_rad_s2(row), |even, acceleration| even + half_rad * acceleration))
     }
 
-    /// How the wheels speed up steadily within a row, rad/s²: by the rates of the rows before and after, whichever
-    /// says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979). 0 where single
-    /// rows do not say their rates, and in rows so long that a robot does several things in them.
+    /// How the wheels speed up steadily within a row, rad/s²: by the rates of the rows before and after,
+    /// whichever says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979).
+    /// 0 where single rows do not say their rates, and in rows so long that a robot does several things.
     fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
         let none = Wheels::both(0.0);
         let is_inner = row > 0 && row + 2 < self.t_s.len();
@@ -374,8 +374,8 @@ mod tests {
         let turned = steps.iter().fold(Wheels::both(0.0), |sum, step| sum.zip_with(*step, |a, b| a + b));
         // 10 (0.35² − 0.25²). Rejects even rows, 0.575: the half of the first and of the second.
         assert!((turned.left - 0.6).abs() < 1e-12, "{turned:?}");
-        // The half of a row at 10 rad/s. Rejects rates at the rows from both sides, which bend the row after a
-        // jump: 0.44.
+        // The half of a row at 10 rad/s. Rejects rates at the rows from both sides, which bend the row after
+        // a jump: 0.44.
         assert!((turned.right - 0.5).abs() < 1e-12, "{turned:?}");
     }
 
