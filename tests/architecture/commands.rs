@@ -232,7 +232,7 @@ mod documents_show_what_commands_print {
 
     #[test]
     fn bench() {
-        shows_what_its_commands_print("docs/bench.md", 5);
+        shows_what_its_commands_print("docs/bench.md", 4);
     }
 
     #[test]
