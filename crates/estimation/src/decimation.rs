@@ -70,7 +70,6 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                 let (a, b) = (last.wheel_rad, interval.wheel_rad);
                 last.bend_rad2 += interval.bend_rad2 + 0.5 * (a.right * b.left - a.left * b.right);
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
-                last.row_s[1] = interval.row_s[1];
                 last.late_s[1] = interval.late_s[1];
             }
             _ => joined.push(*interval),

@@ -162,7 +162,6 @@ mod tests {
                 wheel_rad: *wheel_rad,
                 t_s: f64::from(row),
                 dt_s: *dt_s,
-                row_s: [f64::from(row), f64::from(row) + dt_s],
                 rate_rad_s: *wheel_rad,
                 rate_at_ends_rad_s: [[0.0, 0.05], [0.05, -0.1], [-0.1, -0.2]][usize::from(row)].map(Wheels::both),
                 late_s: [0.0; 2],

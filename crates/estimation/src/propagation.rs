@@ -417,7 +417,6 @@ impl<'f, 'a> Propagator<'f, 'a> {
         let interval = Interval {
             t_s: interval.t_s,
             dt_s: interval.dt_s,
-            row_s: interval.row_s,
             late_s: interval.late_s,
             travel_m,
             speed_m_s: m_per_rad.zip_with(interval.rate_rad_s, |m_per_rad, rate| m_per_rad * rate),

@@ -19,8 +19,6 @@ pub(crate) struct WheelInterval {
     pub(crate) dt_s: f64,
     /// Turn of each wheel, radians.
     pub(crate) wheel_rad: Wheels<f64>,
-    /// Start and end of the logged interval of which it is a part, or the whole.
-    pub(crate) row_s: [f64; 2],
     /// How late the stamps at its start and its end are, seconds.
     pub(crate) late_s: [f64; 2],
     /// Mean rate of each wheel, rad/s, for covariates ([`WheelRates`]).
@@ -279,7 +277,6 @@ impl Cursor<'_, '_> {
         let rows_s = self.track.t_s;
         let mut push = |t_s: f64, next: Wheels<f64>, row: usize| {
             let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
-            let row_s = [rows_s[row], rows_s.get(row + 1).copied().unwrap_or(t_s)];
             let dt_s = t_s - at_s;
             let ends = [at_s, t_s].map(|t_s| self.track.rate_at(row, t_s));
             let rate_rad_s = if self.track.rates.row_by_row && dt_s > 0.0 {
@@ -294,7 +291,6 @@ impl Cursor<'_, '_> {
                 t_s: at_s,
                 dt_s,
                 wheel_rad,
-                row_s,
                 late_s: [at_s, t_s].map(|t_s| self.track.late_at(row, t_s)),
                 rate_rad_s,
                 rate_at_ends_rad_s: ends,

@@ -16,9 +16,6 @@ pub struct Interval<'r> {
     pub t_s: f64,
     /// Length, seconds.
     pub dt_s: f64,
-    /// Start and end of the logged interval of which it is a part, or the whole: a measurement between two
-    /// rows cuts it.
-    pub row_s: [f64; 2],
     /// How late the stamps at its start and its end are against the regular beat of the log's rows, seconds;
     /// between two rows, in proportion.
     pub late_s: [f64; 2],

@@ -161,7 +161,6 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
             let interval = Interval {
                 t_s: row.t_s,
                 dt_s: row.dt_s,
-                row_s: [row.t_s, row.t_s + row.dt_s],
                 late_s: [late_s[number], late_s[number + 1]],
                 travel_m,
                 speed_m_s: if is_even { travel_m.map(|travel_m| travel_m / row.dt_s) } else { mean_m_s },

@@ -379,7 +379,6 @@ mod tests {
             let interval = Interval {
                 t_s: from_s,
                 dt_s: length_s,
-                row_s: [from_s, from_s + length_s],
                 late_s: [0.0; 2],
                 travel_m: Wheels { left: travel_m, right: 0.0 },
                 speed_m_s: Wheels { left: travel_m / length_s, right: 0.0 },

@@ -188,7 +188,6 @@ mod tests {
             let interval = Interval {
                 t_s,
                 dt_s: 0.04,
-                row_s: [t_s, t_s + 0.04],
                 late_s: [0.0; 2],
                 travel_m: Wheels::both(0.0),
                 speed_m_s: Wheels::both(t_s + 0.02),

@@ -143,7 +143,6 @@ mod tests {
             let interval = Interval {
                 t_s,
                 dt_s,
-                row_s: [t_s, t_s + dt_s],
                 late_s: [0.0; 2],
                 travel_m: turned_rad.map(|rad| 0.08 * rad),
                 speed_m_s: turned_rad.map(|rad| 0.08 * rad / f64::max(dt_s, 0.1)),

@@ -232,8 +232,8 @@ fn the_gradient_is_that_of_the_cost() {
         let scale = f64::sqrt(information[(k, k)]);
         let off = (gradient[k] - difference).abs() / scale;
         assert!(off < 0.02, "{column:?}: {} {difference} in {scale}", gradient[k]);
-        // A column 10 % too long would not pass.
-        assert!((1.1 * gradient[k] - difference).abs() / scale > 0.02, "{column:?}");
+        // A column 5 % too long would not pass.
+        assert!((1.05 * gradient[k] - difference).abs() / scale > 0.02, "{column:?}");
     }
 }
 
