@@ -291,7 +291,7 @@ mod tests {
             let errors = (50..750).map(|row| found.at_row(row).left - exact(0.01 * row as f64));
             let noise = mean(errors.map(|error| error * error));
             // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A
-            // tenth of it, for both wheels. Rejects a window of one row at 0.05 rad, with a noise of 1.0.
+            // tenth of it, for both wheels.
             assert!(noise < 0.1 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
             assert_eq!(found.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
         }

@@ -40,7 +40,7 @@ fn the_noise_score_of_rounded_counts_is_the_derivative_of_the_cost() {
             cost(&run(&dataset, &model(), &noise, &[0.0, 0.0], pass_options))
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
-        // As there. Rejects K taken as constant, which is off by 2 % and more.
+        // As there.
         let tolerance = 2e-3 * (1.0 + difference.abs());
         assert!((score[k] - difference).abs() < tolerance, "{k}: {} {difference}", score[k]);
     }
@@ -64,7 +64,7 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
         };
         let difference = (at(h) - at(-h)) / (2.0 * h);
         // That the rounding of counts grows with the wheels is left out as well: 0.5 % of a standard
-        // deviation. Rejects derivatives of the robot's pose that stay when a wheel turns on.
+        // deviation.
         assert!(
             (equations.gradient[k] - difference).abs() / scale < 0.03,
             "{column:?}: {} {difference} {scale}",
