@@ -163,8 +163,8 @@ fn decimated_rows_of_one_speed_give_what_single_rows_give() {
     assert_eq!((intervals(&fit), intervals(&coarse)), (vec![120; 2], vec![24; 2]));
     let close = |a: &Pass, b: &Pass| {
         let both = a.runs.iter().zip(&b.runs);
-        // Arcs put together from five of a tenth, to rounding. Rejects rows that are put together without what
-        // they go across their arc.
+        // Arcs put together from five of a tenth, to rounding. Rejects rows that are put together without
+        // what they go across their arc.
         let off = both.map(|(a, b)| (&a.gradient - &b.gradient).norm() / a.gradient.norm()).fold(0.0, f64::max);
         off < 1e-9
     };
