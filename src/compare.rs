@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::{ComparedMethod, Comparison, KindMean, METHODS, Method};
+use calib::{AugmentedCalibration, ComparedMethod, Comparison, KindMean, METHODS, Method};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::Session;
 use estimation::refuse_wrapped_counters;
 
+use crate::calibration_file::GivenCalibration;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
 /// Which calibration holds on sessions that it has not seen?
@@ -23,6 +24,10 @@ pub(crate) struct Arguments {
     /// Method; may be given several times. Without it, every one.
     #[arg(long = "method", value_name = "M", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name())))]
     methods: Vec<String>,
+    /// Calibration file, or extended model from `yair diagnose --out`, to be evaluated on every session; may be
+    /// given several times.
+    #[arg(long = "calibration", value_name = "FILE")]
+    calibrations: Vec<PathBuf>,
 }
 
 /// Kinds of path beside each other in 100 columns.
@@ -36,8 +41,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         arguments.methods.is_empty() || arguments.methods.iter().any(|name| name == method.name())
     };
     let methods: Vec<&dyn Method> = METHODS.iter().copied().filter(chosen).collect();
+    let given = given(arguments, &sessions, terminal)?;
     let bar = terminal.progress((sessions.len() * methods.len()) as u64, "calibrations");
-    let comparison = calib::compare(&sessions, &methods, || bar.inc(1))?;
+    let comparison = calib::compare(&sessions, &given, &methods, || bar.inc(1))?;
     bar.finish_and_clear();
     let robots: BTreeSet<String> = sessions
         .iter()
@@ -47,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             lengths_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ")
         })
         .collect();
-    show(&comparison, terminal)?;
+    show(&comparison, given.len(), terminal)?;
     if robots.len() > 1 {
         let robots: Vec<&str> = robots.iter().map(String::as_str).collect();
         terminal.say("sessions state different nominal values, and what a method is blind to stays nominal")?;
@@ -57,7 +63,27 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
+/// The calibrations of the files.
+fn given(
+    arguments: &Arguments,
+    sessions: &[Session<'_>],
+    terminal: &Terminal,
+) -> Result<Vec<AugmentedCalibration>, Failure> {
+    let mut all = Vec::new();
+    for path in &arguments.calibrations {
+        for given in GivenCalibration::read(path, terminal)? {
+            if given.changes_records() {
+                let why = "it has faults of the records, which methods would not have undone; use yair evaluate";
+                return Err(format!("{}: {why}", given.place()).into());
+            }
+            sessions.iter().try_for_each(|session| given.check(session.robot, session.name))?;
+            all.push(given.calibration().clone());
+        }
+    }
+    Ok(all)
+}
+
+fn show(comparison: &Comparison, given: usize, terminal: &Terminal) -> Result<(), Failure> {
     let Some(nominal) = comparison.methods.first() else { return Ok(()) };
     let sessions_of = |kind: &str| comparison.sessions.iter().filter(|session| session.path_kind == kind).count();
     let kinds: Vec<(&str, usize)> =
@@ -76,11 +102,13 @@ fn show(comparison: &Comparison, terminal: &Terminal) -> Result<(), Failure> {
             headers.extend([format!("{gap}{name}\nmm"), format!("{}deg", above(lines)), format!("{}n", above(lines))]);
         }
         let mut rows = table(&headers.iter().map(String::as_str).collect::<Vec<_>>(), 2);
-        rows.add_row(row("–", nominal, None, evaluated));
+        for untrained in &comparison.methods[..=given] {
+            rows.add_row(row("–", untrained, None, evaluated));
+        }
         for (trained, _) in &kinds {
             // A kind is printed where it begins, so that the eye finds the blocks.
             let mut label = *trained;
-            for method in &comparison.methods[1..] {
+            for method in &comparison.methods[1 + given..] {
                 let refused = method.refusals.iter().filter(|refusal| refusal.path_kind == *trained).count();
                 if refused < sessions_of(trained) {
                     rows.add_row(row(label, method, Some(trained), evaluated));

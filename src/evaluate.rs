@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::{CalibrationDrift, CalibrationReport, NamedCalibration, Names, ReportError};
+use calib::{CalibrationDrift, Names};
 use clap::Args;
 use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
 
+use crate::calibration_file::GivenCalibration;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
@@ -16,7 +17,8 @@ pub(crate) struct Arguments {
     /// Datasets with absolute truth; a folder of datasets stands for all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Calibration file from `yair calibrate --out`; may be given several times.
+    /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; may be given
+    /// several times.
     #[arg(long = "calibration", value_name = "FILE")]
     calibrations: Vec<PathBuf>,
     /// Exit with 3 when the last calibration drifts more than this, in per cent of the distance driven.
@@ -42,12 +44,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let paths = datasets_at(&arguments.datasets)?;
     let mut found = vec![None];
     for path in &arguments.calibrations {
-        let calibrations = CalibrationReport::read(path)?.calibrations();
-        if calibrations.is_empty() {
-            let message = "it holds no values".to_owned();
-            return Err(ReportError::NotACalibration { place: path.display().to_string(), message }.into());
-        }
-        found.extend(calibrations.into_iter().map(Some));
+        found.extend(GivenCalibration::read(path, terminal)?.into_iter().map(Some));
     }
     let (names, calibrations) = evaluate(&paths, &found, terminal)?;
     show(&calibrations, terminal)?;
@@ -64,11 +61,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
 }
 
-/// Names of the datasets, and the drift under each calibration. One run is held at a time: logs may be larger
-/// than the memory.
+/// Names of the datasets, and the drift under each calibration. One run is held at a time, for logs may be
+/// larger than the memory; but a whole dataset under a model that undoes faults of its records.
 fn evaluate(
     paths: &[PathBuf],
-    calibrations: &[Option<NamedCalibration>],
+    calibrations: &[Option<GivenCalibration>],
     terminal: &Terminal,
 ) -> Result<(Vec<String>, Vec<CalibrationDrift>), Failure> {
     let several = paths.len() > 1;
@@ -76,26 +73,48 @@ fn evaluate(
     let mut runs = vec![Vec::new(); calibrations.len()];
     for path in paths {
         let opened = RunByRun::open(path)?;
+        let place = path.display().to_string();
         let warn = |warnings: &[Warning]| {
             for warning in warnings {
-                terminal.remark(&format!("warning: {}: {warning}", path.display()));
+                terminal.remark(&format!("warning: {place}: {warning}"));
             }
         };
         warn(opened.warnings());
         let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
+        let robot = opened.header().robot;
+        calibrations.iter().flatten().try_for_each(|given| given.check(&robot, &place))?;
+        let mut driven_m = vec![0.0; calibrations.len()];
         for run in opened {
             let Loaded { mut dataset, warnings } = run?;
             warn(&warnings);
             dataset.provenance.name = Some(name.clone());
-            let session = [dataset.session()];
-            for (calibration, runs) in calibrations.iter().zip(&mut runs) {
-                runs.extend(calib::evaluate(&session, calibration.as_ref(), several).runs);
+            let session = dataset.session();
+            let each = calibrations.iter().zip(&mut runs).zip(&mut driven_m);
+            for ((given, runs), driven_m) in each.filter(|((given, _), _)| !is_of_whole_datasets(given.as_ref())) {
+                let calibration = given.as_ref().map(GivenCalibration::calibration);
+                runs.extend(calib::evaluate_runs(&session, calibration, several, driven_m));
+            }
+        }
+        if calibrations.iter().any(|given| is_of_whole_datasets(given.as_ref())) {
+            let mut dataset = dataset::read(path)?.dataset;
+            dataset.provenance.name = Some(name.clone());
+            for (given, runs) in calibrations.iter().zip(&mut runs) {
+                let Some(given) = given.as_ref().filter(|given| given.changes_records()) else { continue };
+                let records = given.undone(&dataset, &place, terminal)?;
+                let calibration = Some(given.calibration());
+                runs.extend(calib::evaluate_runs(&records.session(), calibration, several, &mut 0.0));
             }
         }
         names.push(name);
     }
-    let drifts = calibrations.iter().zip(runs);
-    Ok((names, drifts.map(|(calibration, runs)| CalibrationDrift::of_runs(calibration.as_ref(), runs)).collect()))
+    let of_runs = |(given, runs): (&Option<GivenCalibration>, _)| {
+        CalibrationDrift::of_runs(given.as_ref().map(|given| &given.calibration().calibration), runs)
+    };
+    Ok((names, calibrations.iter().zip(runs).map(of_runs).collect()))
+}
+
+fn is_of_whole_datasets(given: Option<&GivenCalibration>) -> bool {
+    given.is_some_and(GivenCalibration::changes_records)
 }
 
 fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {

@@ -1,8 +1,10 @@
 //! The `yair` command: one file a subcommand, and the only code that knows the terminal.
 
 mod calibrate;
+mod calibration_file;
 mod challenge;
 mod compare;
+mod correct;
 mod diagnose;
 mod diagnosis_page;
 mod evaluate;
@@ -45,6 +47,7 @@ enum Command {
     Challenge(challenge::Arguments),
     Evaluate(evaluate::Arguments),
     Compare(compare::Arguments),
+    Correct(correct::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
     Plan(plan::Arguments),
@@ -62,6 +65,7 @@ fn main() -> ExitCode {
         Command::Challenge(arguments) => challenge::run(arguments, &terminal),
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Compare(arguments) => compare::run(arguments, &terminal),
+        Command::Correct(arguments) => correct::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
         Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Plan(arguments) => plan::run(arguments, &terminal),

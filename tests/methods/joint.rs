@@ -257,7 +257,7 @@ fn published_optiodom_sessions_are_met_or_beaten() {
     {
         let imported = importer("optiodom").expect("the importer").read(&folder.join(kind)).expect("sessions");
         let sessions: Vec<_> = imported.iter().map(|imported| imported.dataset.session()).collect();
-        let found = compare(&sessions, &[&Joint::DEFAULT], || ()).expect("several sessions");
+        let found = compare(&sessions, &[], &[&Joint::DEFAULT], || ()).expect("several sessions");
         let joint = found.methods.iter().find(|method| method.method == "joint").expect("compared");
         assert_eq!(joint.kinds.len(), 1, "{kind}");
         // A session that gives no answer is no way around its errors.

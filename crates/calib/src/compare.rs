@@ -11,16 +11,17 @@ use std::collections::BTreeSet;
 use dataset::{Protocol, Session};
 use serde::Serialize;
 
-use crate::drift::evaluate;
+use crate::drift::{CalibrationDrift, evaluate_runs};
 use crate::estimate::{CalibError, Method};
-use crate::report::{CalibrationReport, MethodReport, NamedCalibration, Names};
+use crate::report::{CalibrationReport, MethodReport, Names};
+use crate::trajectory::AugmentedCalibration;
 
 /// Every method on all ordered pairs of sessions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// The sessions in the order in which they were given.
     pub sessions: Vec<ComparedSession>,
-    /// What the robot believes (`nominal`), then method by method.
+    /// What the robot believes (`nominal`), calibrations of files, then method by method.
     pub methods: Vec<ComparedMethod>,
 }
 
@@ -38,8 +39,8 @@ pub struct ComparedSession {
 /// One method on all pairs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedMethod {
-    /// The method; `nominal` for what the robot of the evaluated session believes, which is trained on
-    /// nothing.
+    /// The method, or the name of a calibration of a file; `nominal` for what the robot of the evaluated session
+    /// believes. The latter two are trained on none of the sessions.
     pub method: String,
     /// Means over the pairs of each two kinds of path.
     pub kinds: Vec<KindMean>,
@@ -52,7 +53,7 @@ pub struct ComparedMethod {
 /// Mean over the ordered pairs of two kinds of path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KindMean {
-    /// What the calibration was found on; `None` for nominal values.
+    /// What the calibration was found on; `None` for nominal values and a file's.
     pub trained_on: Option<String>,
     /// What it was evaluated on.
     pub evaluated_on: String,
@@ -67,7 +68,7 @@ pub struct KindMean {
 /// A calibration found on one session, on the runs of another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Pair {
-    /// The session that was calibrated on; `None` for nominal values.
+    /// The session that was calibrated on; `None` for nominal values and a file's.
     pub trained_on: Option<String>,
     /// The session that was evaluated on.
     pub evaluated_on: String,
@@ -116,12 +117,13 @@ pub fn path_kind(session: &Session<'_>) -> String {
 }
 
 /// Calibrates with every method on each session and evaluates on every other one; `done` is called after each
-/// method on each session.
+/// method on each session. Calibrations of a file are evaluated on every session.
 ///
 /// # Errors
 /// [`TooFewSessions`] for fewer than two sessions.
 pub fn compare(
     sessions: &[Session<'_>],
+    given: &[AugmentedCalibration],
     methods: &[&dyn Method],
     mut done: impl FnMut(),
 ) -> Result<Comparison, TooFewSessions> {
@@ -129,7 +131,8 @@ pub fn compare(
         return Err(TooFewSessions(sessions.len()));
     }
     let kinds: Vec<String> = sessions.iter().map(path_kind).collect();
-    let mut compared = vec![nominal(sessions, &kinds)];
+    let mut compared = vec![untrained(sessions, &kinds, None)];
+    compared.extend(given.iter().map(|calibration| untrained(sessions, &kinds, Some(calibration))));
     for method in methods {
         let mut pairs = Vec::new();
         let mut refusals = Vec::new();
@@ -167,11 +170,12 @@ pub fn compare(
 /// A pair with the positions of its sessions.
 type Placed = (Option<usize>, usize, Pair);
 
-fn nominal(sessions: &[Session<'_>], kinds: &[String]) -> ComparedMethod {
+/// What is trained on none of the sessions: nominal values, or a calibration of a file.
+fn untrained(sessions: &[Session<'_>], kinds: &[String], calibration: Option<&AugmentedCalibration>) -> ComparedMethod {
     let pairs: Vec<Placed> =
-        sessions.iter().enumerate().map(|(on, session)| (None, on, evaluated(None, None, session))).collect();
+        sessions.iter().enumerate().map(|(on, session)| (None, on, evaluated(None, calibration, session))).collect();
     ComparedMethod {
-        method: "nominal".to_owned(),
+        method: calibration.map_or_else(|| "nominal".to_owned(), |of| of.calibration.name.clone()),
         kinds: means(&pairs, kinds),
         pairs: pairs.into_iter().map(|(_, _, pair)| pair).collect(),
         refusals: Vec::new(),
@@ -179,7 +183,7 @@ fn nominal(sessions: &[Session<'_>], kinds: &[String]) -> ComparedMethod {
 }
 
 /// The calibration of a method on a session, as its file would have it.
-fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<NamedCalibration, String> {
+fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<AugmentedCalibration, String> {
     let outcome = method.calibrate(std::slice::from_ref(session));
     if let Ok(found) = &outcome
         && !found.converged
@@ -189,11 +193,12 @@ fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<NamedCalibra
     let why = outcome.as_ref().err().map(CalibError::to_string);
     let methods = vec![MethodReport::new(method.name(), &outcome, session.robot)];
     let report = CalibrationReport { dataset: Names::One(session.name.to_owned()), methods };
-    report.calibrations().pop().ok_or_else(|| why.unwrap_or_default())
+    report.calibrations().pop().map(AugmentedCalibration::from).ok_or_else(|| why.unwrap_or_default())
 }
 
-fn evaluated(trained: Option<&Session<'_>>, calibration: Option<&NamedCalibration>, on: &Session<'_>) -> Pair {
-    let drift = evaluate(std::slice::from_ref(on), calibration, false);
+fn evaluated(trained: Option<&Session<'_>>, calibration: Option<&AugmentedCalibration>, on: &Session<'_>) -> Pair {
+    let runs = evaluate_runs(on, calibration, false, &mut 0.0);
+    let drift = CalibrationDrift::of_runs(calibration.map(|of| &of.calibration), runs);
     Pair {
         trained_on: trained.map(|session| session.name.to_owned()),
         evaluated_on: on.name.to_owned(),
@@ -308,7 +313,7 @@ mod tests {
         let sessions: Vec<_> = sets.iter().map(Dataset::session).collect();
         let direct = method("direct").expect("known");
         let mut calls = 0;
-        let found = compare(&sessions, &[direct], || calls += 1).expect("three");
+        let found = compare(&sessions, &[], &[direct], || calls += 1).expect("three");
         assert_eq!(calls, 3);
         let kinds: Vec<_> = found.sessions.iter().map(|session| session.path_kind.as_str()).collect();
         assert_eq!(kinds, ["straights + spins", "straights + spins", "straights"]);
@@ -346,7 +351,7 @@ mod tests {
     #[test]
     fn one_session_is_not_compared() {
         let set = both("a", 1.02);
-        assert_eq!(compare(&[set.session()], &[], || ()), Err(TooFewSessions(1)));
+        assert_eq!(compare(&[set.session()], &[], &[], || ()), Err(TooFewSessions(1)));
     }
 
     #[test]

@@ -1,15 +1,15 @@
 //! Drift of dead reckoning under a calibration, measured against the outside instrument.
 //!
-//! Each run starts from its first truth pose, is integrated by the midpoint rule (paper, eq. 3) and is
-//! compared at the truth's instants; between two rows of the log the pose is interpolated along the chord.
-//! Instants outside of the log are left out.
+//! Each run starts from its first truth pose, is dead-reckoned (`trajectory.rs`) and is compared at the
+//! truth's instants; between two rows of the log the pose is interpolated along the chord. Instants outside of
+//! the log are left out.
 
 use dataset::{RunView, Session};
-use kinematics::{DriveGeometry, Pose, Rule, wrap_to_pi};
+use kinematics::{Pose, wrap_to_pi};
 use serde::Serialize;
 
 use crate::report::NamedCalibration;
-use crate::settings::TIME_TOLERANCE_S;
+use crate::trajectory::{AugmentedCalibration, Trajectory, at};
 
 /// Drift of every run under one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,24 +66,31 @@ pub struct RunDrift {
 /// `name_runs` adds each session's name to its runs.
 #[must_use]
 pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>, name_runs: bool) -> CalibrationDrift {
-    let mut runs = Vec::new();
-    for session in sessions {
-        let nominal = session.robot.geometry().ok();
-        let geometry = match calibration {
-            Some(calibration) => nominal.and_then(|nominal| calibration.geometry(session.robot, nominal)),
-            None => nominal,
+    let augmented = calibration.cloned().map(AugmentedCalibration::from);
+    let runs = sessions.iter().flat_map(|session| evaluate_runs(session, augmented.as_ref(), name_runs, &mut 0.0));
+    CalibrationDrift::of_runs(calibration, runs.collect())
+}
+
+/// The runs of one session under one calibration or extended model, or under its nominal values.
+///
+/// `driven_m` is the distance driven in the session before, metres, and grows by these runs: some effects grow
+/// with it.
+#[must_use]
+pub fn evaluate_runs(
+    session: &Session<'_>,
+    calibration: Option<&AugmentedCalibration>,
+    name_runs: bool,
+    driven_m: &mut f64,
+) -> Vec<RunDrift> {
+    let of = |run| {
+        let mut drift = match Trajectory::under(session, run, calibration, driven_m) {
+            Some(trajectory) => run_drift(run, trajectory),
+            None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
         };
-        let body_from_sensor = calibration.map_or(Pose::IDENTITY, NamedCalibration::body_from_sensor);
-        for run in &session.runs {
-            let mut drift = match geometry {
-                Some(geometry) => run_drift(session, run, geometry, body_from_sensor),
-                None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
-            };
-            drift.dataset = name_runs.then(|| session.name.to_owned());
-            runs.push(drift);
-        }
-    }
-    CalibrationDrift::of_runs(calibration, runs)
+        drift.dataset = name_runs.then(|| session.name.to_owned());
+        drift
+    };
+    session.runs.iter().map(of).collect()
 }
 
 impl CalibrationDrift {
@@ -108,42 +115,17 @@ fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {
     }
 }
 
-fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, body_from_sensor: Pose) -> RunDrift {
-    let observed = run.observed_poses();
-    let start = observed.first().map(|(_, world_from_sensor)| *world_from_sensor * body_from_sensor.inverse());
-    let mut log: Vec<(f64, Pose)> = Vec::with_capacity(run.odometry().t_s.len());
-    let mut length_m = 0.0;
-    run.dead_reckon(session.robot, &geometry, Rule::Midpoint, start.unwrap_or_default(), |t_s, pose| {
-        if let Some((_, last)) = log.last() {
-            length_m += pose.position().distance_m(last.position());
-        }
-        log.push((t_s, pose));
-    });
-    let Some(start) = start else {
-        let why = if run.run().truth.is_empty() {
-            "no absolute truth: displacements and wheel speeds give no drift from the start pose"
-        } else {
-            "position-only truth gives no start heading"
-        };
-        return unknown(run, length_m, why);
-    };
-    let Some(&(log_start_s, _)) = log.first() else { return unknown(run, length_m, "the run has no odometry") };
-    // The start pose holds at the first truth instant, which may be later than the log's first row.
-    let first_s = observed[0].0;
-    let moved = if first_s > log_start_s + TIME_TOLERANCE_S {
-        match at(&log, first_s, &mut 0) {
-            Some(dead_reckoned) => start * dead_reckoned.inverse(),
-            None => return unknown(run, length_m, "the truth does not overlap the odometry in time"),
-        }
-    } else {
-        Pose::IDENTITY
+fn run_drift(run: &RunView<'_>, trajectory: Trajectory) -> RunDrift {
+    let Trajectory { log, length_m, measured, moved } = trajectory;
+    let moved = match moved {
+        Ok(moved) => moved,
+        Err(why) => return unknown(run, length_m, why),
     };
     let identity = moved == Pose::IDENTITY;
     let (mut row, mut largest, mut last) = (0, None::<(f64, f64)>, None);
-    for (t_s, world_from_sensor) in &observed {
+    for (t_s, measured) in &measured {
         let Some(dead_reckoned) = at(&log, *t_s, &mut row) else { continue };
         let dead_reckoned = if identity { dead_reckoned } else { moved * dead_reckoned };
-        let measured = *world_from_sensor * body_from_sensor.inverse();
         let position_m = dead_reckoned.position().distance_m(measured.position());
         let heading_rad = wrap_to_pi(dead_reckoned.theta_rad - measured.theta_rad).abs();
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
@@ -163,25 +145,6 @@ fn run_drift(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, 
         final_heading_rad: last.map(|last| last.1),
         why_null: None,
     }
-}
-
-/// The dead-reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the
-/// log.
-fn at(log: &[(f64, Pose)], t_s: f64, row: &mut usize) -> Option<Pose> {
-    while *row + 1 < log.len() && log[*row + 1].0 <= t_s + TIME_TOLERANCE_S {
-        *row += 1;
-    }
-    let (row_s, pose) = *log.get(*row)?;
-    if (t_s - row_s).abs() <= TIME_TOLERANCE_S {
-        return Some(pose);
-    }
-    let (next_s, next) = *log.get(*row + 1)?;
-    if t_s < row_s {
-        return None;
-    }
-    let share = (t_s - row_s) / (next_s - row_s);
-    let between = |a: f64, b: f64| a + share * (b - a);
-    Some(Pose::new(between(pose.x_m, next.x_m), between(pose.y_m, next.y_m), between(pose.theta_rad, next.theta_rad)))
 }
 
 fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {

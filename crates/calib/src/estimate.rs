@@ -216,14 +216,9 @@ impl Calibration {
         ];
         let remark = |(parameter, nominal): (Parameter, f64)| {
             let factor = self.estimate(parameter)?.value / nominal;
-            let most = if parameter == Parameter::WheelSeparation {
-                MAX_PLAUSIBLE_SEPARATION_RATIO
-            } else {
-                MAX_PLAUSIBLE_DIAMETER_RATIO
-            };
             let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
             let message = || format!("{} is {factor:.3} times its nominal value: {cause}", parameter.key());
-            (factor > most || factor < 1.0 / most).then(message)
+            is_implausible(parameter, factor).then(message)
         };
         nominal.into_iter().filter_map(remark).collect()
     }
@@ -233,6 +228,16 @@ impl Calibration {
         let all = Parameter::ESTIMATED.into_iter().chain(Parameter::EXTRINSICS);
         all.chain([Parameter::Latency]).filter_map(|parameter| self.estimate(parameter))
     }
+}
+
+/// Whether a length is no correction of its nominal value, by the ratio of the two.
+pub(crate) fn is_implausible(parameter: Parameter, ratio: f64) -> bool {
+    let most = if parameter == Parameter::WheelSeparation {
+        MAX_PLAUSIBLE_SEPARATION_RATIO
+    } else {
+        MAX_PLAUSIBLE_DIAMETER_RATIO
+    };
+    ratio > most || ratio < 1.0 / most
 }
 
 /// Why a method gives no result.

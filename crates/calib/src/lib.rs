@@ -14,13 +14,14 @@ mod pose_measurements;
 mod report;
 mod robust;
 mod settings;
+mod trajectory;
 
 pub mod methods;
 
 pub use compare::{
     ComparedMethod, ComparedSession, Comparison, KindMean, Pair, Refusal, TooFewSessions, compare, path_kind,
 };
-pub use drift::{CalibrationDrift, RunDrift, evaluate};
+pub use drift::{CalibrationDrift, RunDrift, evaluate, evaluate_runs};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, Parameter,
@@ -32,3 +33,4 @@ pub use report::{
     ReportedValue,
 };
 pub use robust::{MedianMad, Summary};
+pub use trajectory::{AugmentedCalibration, CorrectedRun, corrected_run};

@@ -9,7 +9,7 @@ use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter};
+use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter, is_implausible};
 use crate::settings::MAX_FILE_BYTES;
 use estimation::OneStep;
 
@@ -314,6 +314,27 @@ impl NamedCalibration {
             right: diameter_m(Parameter::RightWheelDiameter, Parameter::RightPerTick, nominal_m.right),
         };
         DriveGeometry::new(diameter_m, value(Parameter::WheelSeparation).unwrap_or(nominal.wheel_separation_m())).ok()
+    }
+
+    /// The value that is no correction of a robot's nominal one, for people; `None` where all may be.
+    #[must_use]
+    pub fn implausible_for(&self, robot: &NominalRobot) -> Option<String> {
+        let found = self.geometry(robot, robot.geometry().ok()?)?;
+        let lengths = [
+            (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
+            (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
+            (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
+        ];
+        let off =
+            |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| is_implausible(parameter, found_m / nominal_m);
+        let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
+        Some(format!("{} is {found_m:.4} where the dataset states {nominal_m:.4}", parameter.key()))
+    }
+
+    /// Latency of the outside instrument's time stamps, seconds; 0 unless the calibration has it.
+    #[must_use]
+    pub fn latency_s(&self) -> f64 {
+        self.values.get(Parameter::Latency.key()).copied().unwrap_or(0.0)
     }
 
     /// The outside instrument's frame on the robot; the identity unless the calibration has extrinsics.

@@ -16,6 +16,10 @@ pub(crate) const TIME_TOLERANCE_S: f64 = 1e-9;
 /// Budgeted: a thousand times the size of such a file; anything larger is another file.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 20;
 
+/// Places that differ by less, metres, are the same.
+/// Budgeted: rounding over 10⁷ rows at 100 m from the origin adds up to 0.1 µm.
+pub(crate) const SAME_PLACE_M: f64 = 1e-6;
+
 /// Ratio of a wheel's diameter to its nominal value, or the inverse, beyond which a remark is made.
 /// Convention: wheels are known to a few per cent.
 pub(crate) const MAX_PLAUSIBLE_DIAMETER_RATIO: f64 = 1.3;

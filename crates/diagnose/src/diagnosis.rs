@@ -158,7 +158,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
     let next =
         next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
-    let extended = crate::extended_scenario::scenario_of(records, model);
+    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, model);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, &findings);
     let names: Vec<String> =

@@ -3,26 +3,32 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{Dataset, Protocol, WheelLog};
+use dataset::{Dataset, NominalRobot, Protocol, WheelLog};
 use effects::{
     Covariate, Effect, PhysicalEffect, Quantization, Sparse, SparseTerm, WheelMismatch, WheelScale, Wheelbase,
     effect_from_estimates,
 };
 use estimation::NoiseComponent;
 use motion_programs::Schedule;
-use scenario::{Engine, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
+use scenario::{Engine, Estimated, EstimatedTerm, Instrument, Log, Mark, Noise, Placement, Robot, Scenario};
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
+use crate::record_faults::Fault;
 use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
 /// diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
-/// The scenario, or why it cannot be written.
-pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Result<Scenario, String> {
+/// The scenario, or why it cannot be written. `nominal` is the robot as it was recorded, `datasets` are
+/// without `faults`.
+pub(crate) fn scenario_of(
+    datasets: &[Dataset],
+    nominal: &NominalRobot,
+    faults: &[&Fault],
+    model: &AugmentedModel<'_>,
+) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
-    let nominal = first.robot;
     let fit = &model.fit.solution;
     let counts = nominal.ticks_per_rev.unwrap_or(MIN_CONTROLLER_COUNTS);
     let per_tick = (MIN_CONTROLLER_COUNTS / counts).ceil().max(1.0);
@@ -61,7 +67,11 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
     if per_tick > 1.0 && nominal.ticks_per_rev.is_some() {
         effects.extend(Quantization::from_estimates(&[("counts_per_tick", per_tick)]).map(Effect::Quantization));
     }
+    for fault in faults {
+        effects.push(simulated(fault.id, &fault.values)?);
+    }
     let mut at = 0;
+    let mut terms = Vec::new();
     for candidate in &model.candidates {
         let parameters = candidate.parameters();
         let fitted = &fit.model.term_values[at..at + parameters.len()];
@@ -70,9 +80,9 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
             Candidate::Effect { id, .. } => {
                 let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
                 let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
-                effect_from_estimates(id, &estimates).ok_or_else(|| {
-                    format!("{id}: the estimated parameters do not make an effect that can be simulated")
-                })?
+                let values = estimates.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+                terms.push(EstimatedTerm { kind: (*id).to_owned(), values });
+                simulated(id, &estimates)?
             }
             Candidate::Sparse(sparse) => {
                 Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
@@ -96,11 +106,23 @@ pub(crate) fn scenario_of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> R
         instruments: vec![instrument],
         effects,
         protocols: protocols(datasets),
+        estimated: Some(Estimated {
+            sensor_x_m: fit.model.body_from_sensor.x_m,
+            sensor_y_m: fit.model.body_from_sensor.y_m,
+            sensor_theta_rad: fit.model.body_from_sensor.theta_rad,
+            latency_s: fit.model.latency_s,
+            terms,
+        }),
         sweep: None,
     };
     // What is written must be readable.
     let text = scenario.to_toml().map_err(|error| error.to_string())?;
     Scenario::parse(&text, "extended.toml").map_err(|error| error.to_string())
+}
+
+fn simulated(id: &str, estimates: &[(&str, f64)]) -> Result<Effect, String> {
+    let none = || format!("{id}: the estimated parameters do not make an effect that can be simulated");
+    effect_from_estimates(id, estimates).ok_or_else(none)
 }
 
 /// What the runs had of the covariates of a product that are their own.

@@ -18,6 +18,7 @@ mod covariates;
 mod detectability;
 mod diagnosis;
 mod document;
+mod extended_model;
 mod extended_scenario;
 mod finding;
 mod findings;
@@ -53,5 +54,6 @@ pub use document::{
     Blind, CandidateCause, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted,
     Smallest, UnlistedTerm, Value, Verdict,
 };
+pub use extended_model::{ExtendedModel, ExtendedModelError};
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};

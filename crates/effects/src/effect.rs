@@ -125,6 +125,12 @@ pub trait PhysicalEffect {
         None
     }
 
+    /// The sizes as a fit of the hypothesis names them, where they have other names there: the inverse of
+    /// [`Self::from_estimates`].
+    fn estimates(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
     /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is
     /// another than [`Self::from_estimates`] makes of them.
     fn at_scale(values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Self>

@@ -213,13 +213,7 @@ impl<'a> Records<'a> {
                     };
                     add_poses(&mut records.segments, &base, &track, measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
-                    let distance_m = |(diameter_m, side): (f64, &Vec<f64>)| {
-                        side.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>() * 0.5 * diameter_m
-                    };
-                    let turns = track.turns();
-                    session_m += 0.5
-                        * (distance_m((session.robot.left_wheel_diameter_m, &turns.left))
-                            + distance_m((session.robot.right_wheel_diameter_m, &turns.right)));
+                    session_m += track.distance_m(session.robot);
                 }
                 if records.segments.len() == before {
                     records.unused.push((number, position));

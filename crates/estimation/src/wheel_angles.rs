@@ -138,6 +138,15 @@ impl<'a> WheelAngleInterpolator<'a> {
         self.first_rad
     }
 
+    /// Mean distance that the wheels roll over the log, metres, by nominal diameters.
+    pub(crate) fn distance_m(&self, robot: &NominalRobot) -> f64 {
+        let distance_m = |diameter_m: f64, side: &[f64]| {
+            side.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>() * 0.5 * diameter_m
+        };
+        0.5 * (distance_m(robot.left_wheel_diameter_m, &self.turn_rad.left)
+            + distance_m(robot.right_wheel_diameter_m, &self.turn_rad.right))
+    }
+
     /// Radians that a count of each wheel stands for; 0 where angles are not rounded.
     pub(crate) const fn quantum_rad(&self) -> Wheels<f64> {
         self.rates.quantum_rad

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::Budget;
 use crate::error::{NoFit, ScenarioError};
+use crate::estimated::Estimated;
 use crate::limits::{LENGTHS_M, MAX_RUNS};
 use crate::robot::Robot;
 use crate::sweep::Sweep;
@@ -43,6 +44,9 @@ pub struct Scenario {
     /// What is driven, in order.
     #[serde(rename = "protocol")]
     pub protocols: Vec<Schedule>,
+    /// What a diagnosis estimated, for dead reckoning with the effects; the simulator does not read it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimated: Option<Estimated>,
     /// What is varied and who estimates, for `yair sweep`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sweep: Option<Sweep>,
@@ -247,6 +251,15 @@ impl Scenario {
         }
         if let Some(budget) = &self.budget {
             budget.check(location)?;
+        }
+        if let Some(Estimated { sensor_x_m, sensor_y_m, sensor_theta_rad, latency_s, terms }) = &self.estimated {
+            finite("estimated.sensor_x_m", *sensor_x_m)?;
+            finite("estimated.sensor_y_m", *sensor_y_m)?;
+            finite("estimated.sensor_theta_rad", *sensor_theta_rad)?;
+            finite("estimated.latency_s", *latency_s)?;
+            for (name, value) in terms.iter().flat_map(|term| &term.values) {
+                finite(&format!("estimated.term.values.{name}"), *value)?;
+            }
         }
         self.check_protocols(location, "protocol", &self.protocols)?;
         let Some(sweep) = &self.sweep else { return Ok(()) };

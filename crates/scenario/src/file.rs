@@ -7,7 +7,7 @@ use crate::error::ScenarioError;
 use crate::experiment::Scenario;
 
 /// Scenarios are written by hand; anything larger is another file.
-const LARGEST_FILE_BYTES: u64 = 1 << 20;
+pub const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
 impl Scenario {
     /// Reads and checks a scenario file.

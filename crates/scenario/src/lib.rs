@@ -7,6 +7,7 @@
 mod axis;
 mod budget;
 mod error;
+mod estimated;
 mod experiment;
 mod file;
 mod limits;
@@ -18,7 +19,9 @@ mod sweep;
 pub use axis::{Level, Levels, Range, Scale};
 pub use budget::Budget;
 pub use error::{NoFit, ScenarioError};
+pub use estimated::{Estimated, EstimatedTerm};
 pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario};
+pub use file::LARGEST_FILE_BYTES;
 pub use points::{Axis, CASE_AXIS, Point};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
 pub use sweep::{Case, Sobol, Sweep};

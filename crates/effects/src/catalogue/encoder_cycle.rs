@@ -88,6 +88,17 @@ impl PhysicalEffect for EncoderCycle {
             right_phase_rad: right_cos.atan2(right_sin),
         })
     }
+
+    fn estimates(&self) -> Vec<(&'static str, f64)> {
+        let Self { left_amplitude_rad, left_phase_rad, right_amplitude_rad, right_phase_rad, .. } = *self;
+        vec![
+            ("left_sin_rad", left_amplitude_rad * left_phase_rad.cos()),
+            ("left_cos_rad", left_amplitude_rad * left_phase_rad.sin()),
+            ("right_sin_rad", right_amplitude_rad * right_phase_rad.cos()),
+            ("right_cos_rad", right_amplitude_rad * right_phase_rad.sin()),
+            ("cycles", f64::from(self.cycles)),
+        ]
+    }
 }
 
 struct State {

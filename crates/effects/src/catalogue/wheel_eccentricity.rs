@@ -90,6 +90,16 @@ impl PhysicalEffect for WheelEccentricity {
             right_phase_rad: right_cos.atan2(right_sin),
         })
     }
+
+    fn estimates(&self) -> Vec<(&'static str, f64)> {
+        let Self { left_amplitude, left_phase_rad, right_amplitude, right_phase_rad } = *self;
+        vec![
+            ("left_sin", left_amplitude * left_phase_rad.cos()),
+            ("left_cos", left_amplitude * left_phase_rad.sin()),
+            ("right_sin", right_amplitude * right_phase_rad.cos()),
+            ("right_cos", right_amplitude * right_phase_rad.sin()),
+        ]
+    }
 }
 
 struct State {

@@ -1,0 +1,97 @@
+//! What `--calibration FILE` takes: a calibration file, or a scenario with effects such as the extended model
+//! of a diagnosis.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use ::diagnose::ExtendedModel;
+use calib::{AugmentedCalibration, CalibrationReport, ReportError};
+use dataset::{Dataset, NominalRobot};
+use scenario::Scenario;
+
+use crate::terminal::{Failure, Terminal};
+
+/// A calibration with the file that it is from.
+pub(crate) struct GivenCalibration {
+    place: String,
+    given: Given,
+}
+
+enum Given {
+    Values(AugmentedCalibration),
+    Model(ExtendedModel),
+}
+
+impl GivenCalibration {
+    /// The calibrations of a file. What dead reckoning does without is remarked.
+    pub(crate) fn read(path: &Path, terminal: &Terminal) -> Result<Vec<Self>, Failure> {
+        let place = path.display().to_string();
+        let of = |given| Self { place: place.clone(), given };
+        if is_scenario(path) {
+            let scenario = Scenario::read(path)?;
+            let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
+            for remark in &model.remarks {
+                terminal.remark(&format!("{place}: {remark}"));
+            }
+            return Ok(vec![of(Given::Model(model))]);
+        }
+        let calibrations = CalibrationReport::read(path)?.calibrations();
+        if calibrations.is_empty() {
+            let message = "it holds no values".to_owned();
+            return Err(ReportError::NotACalibration { place, message }.into());
+        }
+        Ok(calibrations.into_iter().map(|named| of(Given::Values(named.into()))).collect())
+    }
+
+    pub(crate) const fn calibration(&self) -> &AugmentedCalibration {
+        match &self.given {
+            Given::Values(calibration) => calibration,
+            Given::Model(model) => &model.calibration,
+        }
+    }
+
+    /// Whether a dataset must be read whole: faults of its records are undone first.
+    pub(crate) const fn changes_records(&self) -> bool {
+        matches!(&self.given, Given::Model(model) if model.changes_records())
+    }
+
+    /// Refuses the model of another robot.
+    pub(crate) fn check(&self, robot: &NominalRobot, dataset: &str) -> Result<(), Failure> {
+        let Given::Model(model) = &self.given else { return Ok(()) };
+        let what =
+            |error| format!("{}: {error} ({dataset}); give the robot's own, or correct [robot] there", self.place);
+        Ok(model.check(robot).map_err(what)?)
+    }
+
+    /// The records without the faults that the model has.
+    pub(crate) fn undone<'d>(
+        &self,
+        dataset: &'d Dataset,
+        name: &str,
+        terminal: &Terminal,
+    ) -> Result<Cow<'d, Dataset>, Failure> {
+        let Given::Model(model) = &self.given else { return Ok(Cow::Borrowed(dataset)) };
+        if !model.changes_records() {
+            return Ok(Cow::Borrowed(dataset));
+        }
+        let (records, remarks) = model.undone(dataset).map_err(|error| format!("{name}: {}: {error}", self.place))?;
+        for remark in remarks {
+            terminal.remark(&format!("{name}: {}: {remark}", self.place));
+        }
+        Ok(Cow::Owned(records))
+    }
+
+    /// The file's name, for messages.
+    pub(crate) fn place(&self) -> &str {
+        &self.place
+    }
+}
+
+/// Whether a file is TOML with a robot, as scenarios have it and calibration files do not. What is neither is
+/// refused as a calibration.
+fn is_scenario(path: &Path) -> bool {
+    let Ok(metadata) = path.metadata() else { return false };
+    metadata.len() <= scenario::LARGEST_FILE_BYTES
+        && std::fs::read_to_string(path)
+            .is_ok_and(|text| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("robot")))
+}
