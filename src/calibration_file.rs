@@ -2,12 +2,13 @@
 //! of a diagnosis.
 
 use std::borrow::Cow;
+use std::io::Read;
 use std::path::Path;
 
 use ::diagnose::ExtendedModel;
 use calib::{AugmentedCalibration, CalibrationReport, ReportError};
 use dataset::{Dataset, NominalRobot};
-use scenario::Scenario;
+use scenario::{LARGEST_FILE_BYTES, Scenario};
 
 use crate::terminal::{Failure, Terminal};
 
@@ -23,16 +24,13 @@ enum Given {
 }
 
 impl GivenCalibration {
-    /// The calibrations of a file. What dead reckoning does without is remarked.
-    pub(crate) fn read(path: &Path, terminal: &Terminal) -> Result<Vec<Self>, Failure> {
+    /// The calibrations of a file.
+    pub(crate) fn read(path: &Path) -> Result<Vec<Self>, Failure> {
         let place = path.display().to_string();
         let of = |given| Self { place: place.clone(), given };
         if is_scenario(path) {
             let scenario = Scenario::read(path)?;
             let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
-            for remark in &model.remarks {
-                terminal.remark(&format!("{place}: {remark}"));
-            }
             return Ok(vec![of(Given::Model(model))]);
         }
         let calibrations = CalibrationReport::read(path)?.calibrations();
@@ -47,6 +45,14 @@ impl GivenCalibration {
         match &self.given {
             Given::Values(calibration) => calibration,
             Given::Model(model) => &model.calibration,
+        }
+    }
+
+    /// Remarks what dead reckoning does without.
+    pub(crate) fn remark(&self, terminal: &Terminal) {
+        let Given::Model(model) = &self.given else { return };
+        for remark in &model.remarks {
+            terminal.remark(&format!("{}: {remark}", self.place));
         }
     }
 
@@ -90,8 +96,7 @@ impl GivenCalibration {
 /// Whether a file is TOML with a robot, as scenarios have it and calibration files do not. What is neither is
 /// refused as a calibration.
 fn is_scenario(path: &Path) -> bool {
-    let Ok(metadata) = path.metadata() else { return false };
-    metadata.len() <= scenario::LARGEST_FILE_BYTES
-        && std::fs::read_to_string(path)
-            .is_ok_and(|text| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("robot")))
+    let mut text = String::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE_BYTES).read_to_string(&mut text));
+    read.is_ok() && text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("robot"))
 }

@@ -71,12 +71,13 @@ fn given(
 ) -> Result<Vec<AugmentedCalibration>, Failure> {
     let mut all = Vec::new();
     for path in &arguments.calibrations {
-        for given in GivenCalibration::read(path, terminal)? {
+        for given in GivenCalibration::read(path)? {
             if given.changes_records() {
                 let why = "it has faults of the records, which methods would not have undone; use yair evaluate";
                 return Err(format!("{}: {why}", given.place()).into());
             }
             sessions.iter().try_for_each(|session| given.check(session.robot, session.name))?;
+            given.remark(terminal);
             all.push(given.calibration().clone());
         }
     }

@@ -57,7 +57,7 @@ struct RunDocument {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let calibration = only(GivenCalibration::read(&arguments.calibration, terminal)?)?;
+    let calibration = only(GivenCalibration::read(&arguments.calibration)?)?;
     let paths = datasets_at(&arguments.datasets)?;
     let out = &arguments.out;
     refuse_filled(out, arguments.force)?;
@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         let moved = std::fs::create_dir_all(folder).and_then(|()| std::fs::rename(waiting.path().join(file), &target));
         moved.map_err(|error| format!("{}: {error}", target.display()))?;
     }
+    calibration.remark(terminal);
     let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
     let rows: usize = runs().map(|run| run.rows).sum();
     terminal.say(&format!("{} runs, {rows} corrected poses in {}", runs().count(), out.display()))?;

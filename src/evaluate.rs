@@ -44,9 +44,10 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let paths = datasets_at(&arguments.datasets)?;
     let mut found = vec![None];
     for path in &arguments.calibrations {
-        found.extend(GivenCalibration::read(path, terminal)?.into_iter().map(Some));
+        found.extend(GivenCalibration::read(path)?.into_iter().map(Some));
     }
     let (names, calibrations) = evaluate(&paths, &found, terminal)?;
+    found.iter().flatten().for_each(|given| given.remark(terminal));
     show(&calibrations, terminal)?;
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();

@@ -256,6 +256,41 @@ fn a_calibration_file_that_is_none_names_the_known_keys() {
 }
 
 #[test]
+fn a_scenario_that_is_no_model_of_the_robot_says_why() {
+    let at = &workplace();
+    let at = at.path();
+    let refused_as = |text: String, what: &str| {
+        fs::write(at.join("s.toml"), text).expect("written");
+        let message = refused(at, &["evaluate", "set", "--calibration", "s.toml"]);
+        begins(&message, "s.toml");
+        contains(&message, what);
+        let corrected = ["correct", "set", "--calibration", "s.toml", "--out", "new"];
+        assert_eq!(refused(at, &corrected), message);
+    };
+    let remarks = succeed(at, &["evaluate", "set", "--calibration", "paper.toml"]).stderr;
+    assert_eq!(remarks, "paper.toml: contact_patch_wheelbase only scatters: dead reckoning does without it\n");
+    let with = |effect: &str| paper().replacen("[[protocol]]", &format!("[[effect]]\n{effect}\n\n[[protocol]]"), 1);
+    let traction = "kind = \"traction_loss\"\nstatic_friction = 0.5\nkinetic_friction = 0.4\nstribeck_speed_m_s = 0.05";
+    refused_as(with(traction), ": effect traction_loss: its sizes do not say how it acts on average");
+    let estimated = |kind: &str, values: &str| {
+        format!(
+            "{}\n[estimated]\nsensor_x_m = 0.0\nsensor_y_m = 0.0\nsensor_theta_rad = 0.0\nlatency_s = 0.0\n\
+             [[estimated.term]]\nkind = \"{kind}\"\nvalues = {{ {values} }}\n",
+            with("kind = \"slip_speed\"\nslip_s_m = 0.01")
+        )
+    };
+    fs::write(at.join("s.toml"), estimated("slip_speed", "slip_s_m = 0.01")).expect("written");
+    succeed(at, &["evaluate", "set", "--calibration", "s.toml"]);
+    let not_of_one = ": [[estimated.term]] of kind ";
+    refused_as(estimated("slip_speed", "slip_s_m = 0.02"), &format!("{not_of_one}\"slip_speed\""));
+    refused_as(estimated("lateral_skid", "skid_s = 0.02"), &format!("{not_of_one}\"lateral_skid\""));
+    refused_as(estimated("slip_speed", "slip_s_m = nan"), "estimated.term.values.slip_s_m is NaN");
+    refused_as(paper().replacen("scale = 1.0328", "scale = 1.0328\ncolour = 3", 1), "unknown field `colour`");
+    let other = paper().replacen("wheel_separation_m = 0.363", "wheel_separation_m = 3.63", 1);
+    refused_as(other, ": it is the model of another robot: wheel_separation_m is 3.6300 where the dataset states 0.3");
+}
+
+#[test]
 fn places_that_cannot_be_written_are_named_and_left_alone() {
     let at = &workplace();
     let at = at.path();

@@ -164,3 +164,29 @@ fn what_cannot_be_compared_is_refused_with_what_to_do() {
     assert!(usage(at, &["compare", "sessions", "--method", "guess"]).contains("umbmark"));
     assert_eq!(everything_in(at), before);
 }
+
+#[test]
+fn a_calibration_of_a_file_stands_beside_the_methods_on_every_session() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    sessions(at);
+    let calibrations = ["--calibration", "others.toml", "--calibration", "one.toml"];
+    succeed(at, &["calibrate", "sessions/others-0", "--method", "direct", "--out", "one.toml"]);
+    let arguments = [&["compare", "sessions", "--method", "direct"][..], &calibrations].concat();
+    let found = document(at, &arguments);
+    let methods = entries(&found, "methods");
+    let names: Vec<&str> = methods.iter().filter_map(|entry| entry["method"].as_str()).collect();
+    assert_eq!(names, ["nominal", "paper", "direct", "direct"]);
+    for session in ["others-0", "squares-1"] {
+        let set = format!("sessions/{session}");
+        let drifts = document(at, &[&["evaluate", &set][..], &calibrations].concat());
+        for method in [1, 2] {
+            let pairs = entries(&methods[method], "pairs");
+            let pair = pairs.iter().find(|pair| pair["evaluated_on"] == session).expect("a pair");
+            assert!(pair["trained_on"].is_null());
+            assert_eq!(pair["mean_final_position_m"], drifts["calibrations"][method]["mean_final_position_m"]);
+        }
+    }
+    let said = succeed(at, &arguments).stdout;
+    assert_eq!(said.lines().filter(|line| line.trim_start().starts_with('–')).count(), 3, "{said}");
+}

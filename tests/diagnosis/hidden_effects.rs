@@ -16,7 +16,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 const MOTION_CAPTURE: &str = include_str!("../../scenarios/motion-capture.toml");
 
 /// Straights, spins, squares and circles under motion capture, with calibration errors and one more effect.
-fn robot(extra: &str) -> Scenario {
+pub(crate) fn robot(extra: &str) -> Scenario {
     #[derive(serde::Deserialize)]
     struct List {
         #[serde(default)]
@@ -34,7 +34,7 @@ fn robot(extra: &str) -> Scenario {
     scenario
 }
 
-fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
+pub(crate) fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
     sim_yair::simulate(scenario, seed, 0).expect("simulates").dataset
 }
 

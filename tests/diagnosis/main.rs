@@ -2,6 +2,7 @@
 //! tell names apart.
 
 mod blind_benchmark;
+mod extended_model;
 mod hidden_effects;
 mod ordinary_logs;
 #[path = "../support/plain_robot.rs"]
