@@ -16,6 +16,12 @@ const LARGE: [(&str, &str); 3] = [
     ("carpet_nap", "drift_x = 0.01\ndrift_y = 0.005"),
 ];
 
+/// One of several terms by what it holds.
+const CYCLE: (&str, &str) = ("encoder_cycle", "cycles = 4\nleft_amplitude_rad = 0.01\nleft_phase_rad = 0.7");
+
+/// Drift under a model over that of the noise alone: seen are 0.95 to 1.02, as estimates are off by few σ.
+const MAX_OVER_NOISE: f64 = 1.15;
+
 /// A robot with an effect, and wheels of half the noise that the shipped one has: what is left of an effect
 /// shows beside it.
 fn quiet_robot(id: &str, sizes: &str) -> Scenario {
@@ -50,9 +56,9 @@ fn drift_of_noise(seed: u64) -> f64 {
     drift_percent(runs(&simulated(&scenario, seed), &model(&scenario)))
 }
 
-/// What is left is the noise of the wheels: by its own draws 1.0 to 1.1 times that of the robot without the
-/// effect, as estimates are off by few σ. A third of the smallest effect left in would be 1.5 times it. The
-/// geometry of the same diagnosis leaves the effect, 2.5 to 80 times the noise.
+/// What is left is the noise of the wheels: that of the robot without the effect by the same draws. Seen to
+/// reject terms of half their size, which leave 24 times the noise in the first case. The geometry of the
+/// same diagnosis leaves 2.1 to 47 times.
 #[test]
 fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alone_far_more() {
     let noise_percent = drift_of_noise(72);
@@ -68,26 +74,28 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
         println!(
             "{id}: nominal {nominal_percent:.3} %, geometry {geometry_percent:.3} %, extended {extended_percent:.3} %, noise {noise_percent:.3} %"
         );
-        assert!(extended_percent < 1.3 * noise_percent, "{id}");
+        assert!(extended_percent < MAX_OVER_NOISE * noise_percent, "{id}");
         assert!(geometry_percent > 2.0 * extended_percent && nominal_percent > extended_percent, "{id}");
     }
 }
 
 /// Through the file's text and back, evaluation on the diagnosed runs is the dead reckoning of the diagnosis,
-/// whose first measurement is at the log's first row and whose last one is within the log. Only sums are
-/// in another order: a run of 2000 intervals rounds to 1e-12 m. Rejects a held value that is lost (the width
-/// of a backlash moves ends by 1e-5 m) and terms that forget what the wheels did between two measurements.
+/// whose first measurement is at the log's first row and whose last one is within the log: seen are 3e-15 m.
+/// A nanometre is far below what any term does. Seen to reject a held value that is lost: another width of
+/// the backlash moves an end by 1.3e-5 m.
 #[test]
 fn evaluation_on_the_diagnosed_runs_is_the_dead_reckoning_of_the_diagnosis() {
     let others = [
-        ("backlash", "left_gap_m = 0.001\nright_gap_m = 0.001"),
-        ("castor_kick", "kick_rad = 0.05\ndecay_m = 0.07"),
+        ("backlash", "left_gap_m = 0.004\nright_gap_m = 0.004"),
+        CYCLE,
+        ("castor_drag", "drag_rad_m = 0.02\ncastor_behind_m = 0.1"),
         ("term", "channel = \"yaw\"\ncovariates = [\"v\", \"x\"]\ncoefficient = 0.02"),
     ];
     for (id, sizes) in LARGE.into_iter().chain(others) {
         let dataset = simulated(&quiet_robot(id, sizes), 73);
         let sessions = [dataset.session()];
         let found = diagnose(std::slice::from_ref(&dataset), &Options::default()).expect("a diagnosis");
+        println!("{id}: {}", found.document.sentence);
         assert!(!found.found.terms().is_empty(), "{id}");
         let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions).expect("fits");
         let ends = fit.dead_reckoned(&found.found.model, &mut found.found.terms());
@@ -102,7 +110,7 @@ fn evaluation_on_the_diagnosed_runs_is_the_dead_reckoning_of_the_diagnosis() {
     }
 }
 
-/// Seen to reject: records that are not changed drift by 100 times as much.
+/// The bound is that of the first test; records that are not changed drift by 13 times as much or more.
 #[test]
 fn faults_of_the_records_are_undone_before_dead_reckoning() {
     let noise_percent = drift_of_noise(75);
@@ -115,7 +123,7 @@ fn faults_of_the_records_are_undone_before_dead_reckoning() {
         assert!(remarks.len() == 1 && remarks[0].contains(id), "{id}: {remarks:?}");
         let percent = drift_percent(runs(&fresh, &found));
         println!("{id}: {percent:.3} %, noise {noise_percent:.3} %");
-        assert!(percent < 1.3 * noise_percent, "{id}: {percent}");
+        assert!(percent < MAX_OVER_NOISE * noise_percent, "{id}: {percent}");
     }
     // Nothing measured says by which factor these records are wrong.
     let mut blind = simulated(&quiet_robot("wrong_counts_per_turn", "factor = 4.0"), 75);
@@ -125,16 +133,18 @@ fn faults_of_the_records_are_undone_before_dead_reckoning() {
 }
 
 /// A scenario that somebody wrote is the model of its own robot, without any estimate; the bound is that of
-/// the first test. Seen to reject sine and cosine exchanged.
+/// the first test. Mean terms are linear in their sizes, so that the wheelbase grows by less here: by x it
+/// turns by a factor of 1/(1 + x) less. Seen to reject sine and cosine of the eccentricity exchanged, which
+/// leaves 1.3 times the noise.
 #[test]
 fn a_scenario_without_estimates_is_the_model_of_its_robot() {
     let noise_percent = drift_of_noise(76);
-    let cycle = ("encoder_cycle", "cycles = 2\nleft_amplitude_rad = 0.05\nleft_phase_rad = 0.7");
-    for (id, sizes) in LARGE.into_iter().chain([cycle]) {
+    let turn = ("turn_rate_wheelbase", "beta_s = 0.01");
+    for (id, sizes) in [turn, LARGE[1], LARGE[2], CYCLE] {
         let scenario = quiet_robot(id, sizes);
         let percent = drift_percent(runs(&simulated(&scenario, 76), &model(&scenario)));
         println!("{id}: {percent:.3} %, noise {noise_percent:.3} %");
-        assert!(percent < 1.3 * noise_percent, "{id}: {percent}");
+        assert!(percent < MAX_OVER_NOISE * noise_percent, "{id}: {percent}");
     }
     let scatters = quiet_robot("contact_patch_wheelbase", "sigma_m = 0.001");
     let remarks = model(&scatters).remarks;
