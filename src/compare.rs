@@ -24,8 +24,8 @@ pub(crate) struct Arguments {
     /// Method; may be given several times. Without it, every one.
     #[arg(long = "method", value_name = "M", value_parser = PossibleValuesParser::new(METHODS.iter().map(|method| method.name())))]
     methods: Vec<String>,
-    /// Calibration file, or extended model from `yair diagnose --out`, to be evaluated on every session; may be
-    /// given several times.
+    /// Calibration file, or extended model from `yair diagnose --out`, to be evaluated on every session; may
+    /// be given several times.
     #[arg(long = "calibration", value_name = "FILE")]
     calibrations: Vec<PathBuf>,
 }

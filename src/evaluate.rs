@@ -17,8 +17,8 @@ pub(crate) struct Arguments {
     /// Datasets with absolute truth; a folder of datasets stands for all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; may be given
-    /// several times.
+    /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; may be
+    /// given several times.
     #[arg(long = "calibration", value_name = "FILE")]
     calibrations: Vec<PathBuf>,
     /// Exit with 3 when the last calibration drifts more than this, in per cent of the distance driven.

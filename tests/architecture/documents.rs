@@ -16,8 +16,8 @@ fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
 #[test]
 fn the_scenario_document_has_every_key_and_every_effect() {
     use scenario::{
-        Budget, Case, Controller, Encoder, Engine, Instrument, Log, Mark, Motor, Noise, Placement, Range, Robot, Sobol,
-        Sweep,
+        Budget, Case, Controller, Encoder, Engine, Estimated, EstimatedTerm, Instrument, Log, Mark, Motor, Noise,
+        Placement, Range, Robot, Sobol, Sweep,
     };
     let document = text("docs/scenario.md");
     let parts = [
@@ -42,6 +42,8 @@ fn the_scenario_document_has_every_key_and_every_effect() {
         ("sweep.case", keys::<Case>("")),
         ("an axis' range", keys::<Range>("")),
         ("budget", keys::<Budget>("")),
+        ("estimated", keys::<Estimated>("")),
+        ("estimated.term", keys::<EstimatedTerm>("")),
     ];
     for (part, keys) in parts {
         assert!(!keys.is_empty(), "{part}");

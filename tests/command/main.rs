@@ -1,5 +1,5 @@
-//! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, campaigns that are
-//! stopped, and the gate on accuracy.
+//! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected,
+//! campaigns that are stopped, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;

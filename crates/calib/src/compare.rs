@@ -39,8 +39,8 @@ pub struct ComparedSession {
 /// One method on all pairs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedMethod {
-    /// The method, or the name of a calibration of a file; `nominal` for what the robot of the evaluated session
-    /// believes. The latter two are trained on none of the sessions.
+    /// The method, or the name of a calibration of a file; `nominal` for what the robot of the evaluated
+    /// session believes. The latter two are trained on none of the sessions.
     pub method: String,
     /// Means over the pairs of each two kinds of path.
     pub kinds: Vec<KindMean>,

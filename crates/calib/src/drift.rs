@@ -1,8 +1,8 @@
 //! Drift of dead reckoning under a calibration, measured against the outside instrument.
 //!
 //! Each run starts from its first truth pose, is dead-reckoned (`trajectory.rs`) and is compared at the
-//! truth's instants; between two rows of the log the pose is interpolated along the chord. Instants outside of
-//! the log are left out.
+//! truth's instants; between two rows of the log the pose is interpolated along the chord. Instants outside
+//! of the log are left out.
 
 use dataset::{RunView, Session};
 use kinematics::{Pose, wrap_to_pi};
@@ -73,8 +73,8 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
 
 /// The runs of one session under one calibration or extended model, or under its nominal values.
 ///
-/// `driven_m` is the distance driven in the session before, metres, and grows by these runs: some effects grow
-/// with it.
+/// `driven_m` is the distance driven in the session before, metres, and grows by these runs: some effects
+/// grow with it.
 #[must_use]
 pub fn evaluate_runs(
     session: &Session<'_>,

@@ -2,7 +2,8 @@
 //! and the faults of the records that are undone before.
 //!
 //! It is the inverse of `extended_scenario.rs`, which writes under `[estimated]` what a simulated robot does
-//! not say. Where a scenario has no such estimates, an effect whose sizes are those of its mean term gives it.
+//! not say. Where a scenario has no such estimates, an effect whose sizes are those of its mean term gives
+//! it.
 
 use calib::{AugmentedCalibration, NamedCalibration, Parameter};
 use dataset::{Dataset, NominalRobot};
