@@ -1,5 +1,4 @@
 //! Extended models in dead reckoning: what a diagnosis found makes logs drift less that it has not seen.
-#![allow(clippy::print_stdout)] // every case with its drift
 
 use calib::{AugmentedCalibration, CalibrationDrift, RunDrift, evaluate_runs};
 use dataset::Dataset;
@@ -71,11 +70,11 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
         let geometry = AugmentedCalibration::from(model.calibration.calibration.clone());
         let geometry_percent = drift_percent(evaluate_runs(&fresh.session(), Some(&geometry), false, &mut 0.0));
         let nominal_percent = drift_percent(evaluate_runs(&fresh.session(), None, false, &mut 0.0));
-        println!(
-            "{id}: nominal {nominal_percent:.3} %, geometry {geometry_percent:.3} %, extended {extended_percent:.3} %, noise {noise_percent:.3} %"
+        let shown = format!(
+            "{id}: {nominal_percent} nominal, {geometry_percent} geometry, {extended_percent} extended, {noise_percent} noise"
         );
-        assert!(extended_percent < MAX_OVER_NOISE * noise_percent, "{id}");
-        assert!(geometry_percent > 2.0 * extended_percent && nominal_percent > extended_percent, "{id}");
+        assert!(extended_percent < MAX_OVER_NOISE * noise_percent, "{shown}");
+        assert!(geometry_percent > 2.0 * extended_percent && nominal_percent > extended_percent, "{shown}");
     }
 }
 
@@ -95,7 +94,6 @@ fn evaluation_on_the_diagnosed_runs_is_the_dead_reckoning_of_the_diagnosis() {
         let dataset = simulated(&quiet_robot(id, sizes), 73);
         let sessions = [dataset.session()];
         let found = diagnose(std::slice::from_ref(&dataset), &Options::default()).expect("a diagnosis");
-        println!("{id}: {}", found.document.sentence);
         assert!(!found.found.terms().is_empty(), "{id}");
         let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions).expect("fits");
         let ends = fit.dead_reckoned(&found.found.model, &mut found.found.terms());
@@ -105,7 +103,6 @@ fn evaluation_on_the_diagnosed_runs_is_the_dead_reckoning_of_the_diagnosis() {
         let off_m =
             ends.iter().zip(&evaluated).map(|(end, run)| (end.position_m - run.final_position_m.expect("poses")).abs());
         let off_m = off_m.fold(0.0, f64::max);
-        println!("{id}: ends differ by {off_m:.1e} m");
         assert!(off_m < 1e-9, "{id}: {off_m}");
     }
 }
@@ -122,7 +119,6 @@ fn faults_of_the_records_are_undone_before_dead_reckoning() {
         let (_, remarks) = found.undone(&fresh).expect("undone");
         assert!(remarks.len() == 1 && remarks[0].contains(id), "{id}: {remarks:?}");
         let percent = drift_percent(runs(&fresh, &found));
-        println!("{id}: {percent:.3} %, noise {noise_percent:.3} %");
         assert!(percent < MAX_OVER_NOISE * noise_percent, "{id}: {percent}");
     }
     // Nothing measured says by which factor these records are wrong.
@@ -143,7 +139,6 @@ fn a_scenario_without_estimates_is_the_model_of_its_robot() {
     for (id, sizes) in [turn, LARGE[1], LARGE[2], CYCLE] {
         let scenario = quiet_robot(id, sizes);
         let percent = drift_percent(runs(&simulated(&scenario, 76), &model(&scenario)));
-        println!("{id}: {percent:.3} %, noise {noise_percent:.3} %");
         assert!(percent < MAX_OVER_NOISE * noise_percent, "{id}: {percent}");
     }
     let scatters = quiet_robot("contact_patch_wheelbase", "sigma_m = 0.001");
