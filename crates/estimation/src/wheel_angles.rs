@@ -224,8 +224,9 @@ impl<'a> WheelAngleInterpolator<'a> {
     }
 
     /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off by
-    /// half of what it changes by from row to row, as at a corner of the speed in the middle of the row; by what
-    /// it changes by in the rows around, where that is more, as what pushes the shafts goes on.
+    /// what it changes by from row to row, or by what it changes by in the rows around where that is more, as
+    /// what pushes the shafts goes on. A smooth one is off by half of that; one that changes faster than rows
+    /// come, by more than they show.
     fn interpolated_rad2(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let since_s = t_s - self.t_s[row];
         let left_s = self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - t_s);
@@ -234,7 +235,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         }
         let change = |row: usize| {
             let [before, after] = self.accelerations_around(row)?;
-            Some(before.zip_with(after, |before, after| (0.5 * (after - before)).powi(2)))
+            Some(before.zip_with(after, |before, after| (after - before).powi(2)))
         };
         let near = row.saturating_sub(ROWS_OF_CHANGE)..row + ROWS_OF_CHANGE + 1;
         let (sum, count) = near.filter_map(change).fold((Wheels::both(0.0), 0.0_f64), |(sum, count), change| {

@@ -41,13 +41,14 @@ impl WheelRates {
         (separation_m, m_per_rad): (f64, Wheels<f64>),
         continuous: bool,
     ) -> Self {
-        let jitter_s = stamp_jitter_s(t_s);
+        let wrong_share = 1.0 - share_of_true_stamps(t_s, turn_rad);
+        let jitter_s = wrong_share * stamp_jitter_s(t_s);
         let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
         // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due.
         // Stamps that counts follow are true however they jitter.
         let due_s: Vec<f64>;
         let t_s = if jitter_s > MAX_EXACT_JITTER * row_s {
-            due_s = due(t_s, late_s, 1.0 - share_of_true_stamps(t_s, turn_rad));
+            due_s = due(t_s, late_s, wrong_share);
             &due_s
         } else {
             t_s
