@@ -5,6 +5,7 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
+mod beat;
 mod counter;
 mod error;
 pub mod import;
@@ -17,6 +18,7 @@ mod table;
 mod warning;
 mod write;
 
+pub use beat::Beat;
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
 pub use prefetch::read_ahead;

@@ -6,15 +6,16 @@
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
-use estimation::{FitSettings, ModelFit, NoiseComponent};
+use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
 
 use crate::augmented_model::{cost, count};
 use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
 use crate::settings::records::{
-    FACTOR_TOLERANCE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_REMAINING_OUTLIER_RATIO, MAX_SENSOR_HEADING_RAD,
-    MAX_SEPARATION_DEVIATION_SIGMAS, MAX_SOUND_OUTLIER_FRACTION, MAX_TURN_SIGMA_RAD_PER_SQRT_RAD,
-    MAX_WHEEL_DEVIATION_SIGMAS, MAX_WHEEL_SIGMA_M_PER_SQRT_M, MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA,
-    UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR, WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
+    FACTOR_TOLERANCE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA, MAX_REMAINING_OUTLIER_RATIO,
+    MAX_SENSOR_HEADING_RAD, MAX_SEPARATION_DEVIATION_SIGMAS, MAX_SOUND_OUTLIER_FRACTION,
+    MAX_TURN_SIGMA_RAD_PER_SQRT_RAD, MAX_WHEEL_DEVIATION_SIGMAS, MAX_WHEEL_SIGMA_M_PER_SQRT_M,
+    MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA, UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR,
+    WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
 };
 
 /// A fault with the records without it.
@@ -122,13 +123,29 @@ fn is_sound(fit: &ModelFit<'_>) -> bool {
     is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
 }
 
-/// Whether the odometry is correlated with the measurements, for some geometry.
+/// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a drive,
+/// and single measurements tell where the robot went, or all of them together how large its wheels are.
 pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.solution.noise.sigma(of);
-    sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
-        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
-        && sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * fit.records.extent_m()
-        && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA
+    let follows = sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
+        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD;
+    let is_precise = || {
+        sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * fit.records.extent_m()
+            && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA
+    };
+    follows && (is_precise() || determines_wheels(fit))
+}
+
+/// Whether the measurements determine both wheels' sizes, which plausible geometry has.
+fn determines_wheels(fit: &ModelFit<'_>) -> bool {
+    let Some(covariance) = fit.covariance(&mut []) else { return false };
+    let relative_sigma = |column: Column| {
+        let at = fit.columns.iter().position(|own| *own == column)?;
+        // Steps of the wheels' columns are relative.
+        Some(covariance[(at, at)].sqrt())
+    };
+    let wheels = [Column::LeftWheel, Column::RightWheel].map(relative_sigma);
+    is_drive(fit) && wheels.iter().all(|sigma| sigma.is_some_and(|sigma| sigma < MAX_CORRELATED_WHEEL_SIGMA))
 }
 
 /// Are a fit's geometry and noise those of a drive?

@@ -2,11 +2,11 @@
 
 use estimation::ModelFit;
 
-use crate::augmented_model::AugmentedModel;
+use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
-use crate::model_comparison::{log_odds_margin, regated};
+use crate::model_comparison::{log_bayes_factor, log_odds_margin, regated};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, over_names, rivals};
@@ -61,6 +61,41 @@ fn grown<'a>(
         entries.retain(|entry| entry.scored.candidate.id() != refuted);
     }
     None
+}
+
+/// The model without the effects that only cancel each other: two that were found in the place of a third stay
+/// significant beside it, each given the other. Of all subsets of the effects, the smallest that the log Bayes
+/// factor does not discriminate from the best.
+fn without_what_cancels<'a>(
+    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    model: AugmentedModel<'a>,
+) -> AugmentedModel<'a> {
+    let effects = model.candidates.len();
+    if effects < 2 {
+        return model;
+    }
+    let mut subsets: Vec<AugmentedModel<'a>> = (1..(1_u32 << effects) - 1)
+        .filter_map(|chosen| {
+            let is_chosen = |(index, _): &(usize, &Candidate)| chosen >> index & 1 == 1;
+            let candidates: Vec<Candidate> =
+                model.candidates.iter().enumerate().filter(is_chosen).map(|(_, candidate)| candidate.clone()).collect();
+            let fit = known.fit(&candidates).cloned().or_else(|| refit(base, &model, candidates))?;
+            known.keep(&fit);
+            Some(fit)
+        })
+        .collect();
+    subsets.push(model);
+    let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(base, subset)).collect();
+    let best = odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_close = |odds: f64| odds >= best - log_odds_margin(best);
+    let fewest = (0..subsets.len())
+        .filter(|&subset| is_close(odds[subset]))
+        .min_by(|&a, &b| {
+            let sizes = subsets[a].candidates.len().cmp(&subsets[b].candidates.len());
+            sizes.then(odds[b].total_cmp(&odds[a]))
+        })
+        .unwrap_or(subsets.len() - 1);
+    subsets.swap_remove(fewest)
 }
 
 /// Whether a refit confirms what a score says of a candidate.
@@ -122,6 +157,7 @@ pub(crate) fn search<'a>(
         let Some(extended) = grown((base, &mut known), &model, entries, level) else { break };
         model = extended;
     }
+    model = without_what_cancels((base, &mut known), model);
     let mut index = 0;
     while index < model.candidates.len() {
         let Some(without) = known.without(base, &model, index) else { break };

@@ -24,6 +24,7 @@ mod hypothesis;
 mod motion_history;
 mod stream;
 mod term;
+mod time_shift;
 
 pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
 pub use channel::Channel;

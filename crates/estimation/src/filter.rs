@@ -5,7 +5,7 @@
 //! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on
 //! the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
 
-use kinematics::{Kernel, Pose, Twist, sin_cos, wrap_to_pi};
+use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -169,7 +169,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             by: Derivatives::zeros(all),
             covariance_by: Covariances::ZERO,
             pose_by_noise: [[0.0; NOISES]; 3],
-            rounding: Rounding::new(segment.quantum_rad, model, all),
+            rounding: Rounding::new(segment.quantum_rad, all),
             by_measurement: Derivatives::zeros(columns - Column::BASE.len()),
             sums: Sums::new(columns, products),
             innovations: Vec::new(),
@@ -274,7 +274,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
         self.pose_by_noise = [[0.0; NOISES]; 3];
         let [_, _, xy, theta] = self.noise.variance;
-        self.rounding.start([xy, theta]);
+        let interpolated_rad2 =
+            self.segment.intervals.get(after).map_or(Wheels::both(0.0), |first| first.interpolated_rad2[0]);
+        self.rounding.start([xy, theta], interpolated_rad2, self.model);
     }
 
     /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion
@@ -312,7 +314,10 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     #[inline(always)]
     fn predict(&mut self, number: usize, propagation: &PropagationInterval) {
-        if !self.segment.intervals[propagation.intervals.clone()].iter().all(|interval| interval.stands) {
+        // A row's error stays until the next row.
+        let intervals = &self.segment.intervals[propagation.intervals.clone()];
+        let is_of_row = matches!(intervals, [only] if only.starts_within_row);
+        if !(is_of_row || intervals.iter().all(|interval| interval.stands)) {
             let noise_score = self.pass_options.noise_score;
             let (rounding, mut state) = self.rounded();
             rounding.leave(&mut state, noise_score);
@@ -352,8 +357,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         let measured = self.segment.measurements[propagation.measurement];
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
         let variance = self.variance_of(&measured);
+        let model = self.model;
         let (rounding, mut state) = self.rounded();
-        rounding.enter(&mut state, variance);
+        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], model);
         let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
         self.measurement(number + 1, measured.t_s, twist);
         let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));

@@ -167,6 +167,8 @@ mod tests {
                 late_s: [0.0; 2],
                 bend_rad2: 0.0,
                 stands: false,
+                starts_within_row: false,
+                interpolated_rad2: [Wheels::both(0.0); 2],
             })
             .collect();
         let geometry = DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive");

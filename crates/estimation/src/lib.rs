@@ -41,7 +41,6 @@ mod propagation;
 mod records;
 mod resimulation;
 mod rounding;
-mod sampling_period;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -66,7 +65,6 @@ pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_i
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use records::{Records, Segment};
-pub use sampling_period::lateness_s;
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

@@ -18,7 +18,7 @@ use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
 use crate::propagation::{CarriedState, Propagator};
 use crate::records::{Segment, Start};
-use crate::rounding::rounding_variances;
+use crate::rounding::PoseVariance;
 use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
 
 impl ModelFit<'_> {
@@ -28,9 +28,9 @@ impl ModelFit<'_> {
     pub fn depends_on_rounding(&self) -> bool {
         let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
         self.records.segments.iter().any(|segment| {
-            let [along_m2, of_heading_rad2, _] = rounding_variances(segment.quantum_rad, &self.solution.model);
-            along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
-                || of_heading_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+            let of_counts = PoseVariance::of_rounding(segment.quantum_rad, &self.solution.model);
+            of_counts.along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
+                || of_counts.heading_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
         })
     }
 

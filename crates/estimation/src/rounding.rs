@@ -10,6 +10,9 @@
 //!
 //! the smoother's step of Rauch, Tung & Striebel 1965 for a state that does not move. Rounding adds nothing
 //! from row to row, and a standstill does not average it out. Widrow & Kollár 2008 (q²/12).
+//!
+//! Between two rows the wheels' turns are off too, by what nobody recorded of the motion there. That error is
+//! one for all measurements of a row, and another in the next: it is carried in the same way.
 
 use kinematics::{Pose, Wheels, sin_cos};
 use nalgebra::{Matrix3, Vector3};
@@ -35,44 +38,37 @@ enum Carries {
     /// That of the counts.
     OfCounts,
     /// The robot's, since a start: nothing is known of the counts' rounding.
-    SinceStart,
+    SinceStart { own: PoseVariance },
     /// The robot's, since a measurement after the counts had changed.
-    SinceMeasurement { pose: Pose, covariance: Matrix3<f64>, by_noise: [[f64; NOISES]; 3] },
+    SinceMeasurement { own: PoseVariance, pose: Pose, covariance: Matrix3<f64>, by_noise: [[f64; NOISES]; 3] },
 }
 
-/// What the rounding of both wheels' counts makes of a pose: variances along (m²) and of the heading (rad²),
-/// and their covariance.
-pub(crate) fn rounding_variances(quantum_rad: Wheels<f64>, model: &Model) -> [f64; 3] {
-    let variance_m2 = quantum_rad.zip_with(model.m_per_rad, |rad, m_per_rad| (rad * m_per_rad).powi(2) / 12.0);
-    let (Wheels { left, right }, separation_m) = (variance_m2, model.separation_m);
-    [0.25 * (left + right), (left + right) / (separation_m * separation_m), 0.5 * (right - left) / separation_m]
-}
-
-/// Rounding in the filter of one segment.
-pub(crate) struct Rounding {
-    /// Variances along and of the heading, and their covariance, by both wheels' counts.
-    along_m2: f64,
-    heading_rad2: f64,
+/// What both wheels' turns are off by makes of a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PoseVariance {
+    /// Along the heading, m².
+    pub(crate) along_m2: f64,
+    /// Of the heading, rad².
+    pub(crate) heading_rad2: f64,
+    /// Of both, m rad.
     covariance_m_rad: f64,
-    carries: Carries,
-    /// Derivatives of the counts' pose while the robot's is carried.
-    by: Derivatives,
-    covariance_by: Covariances<NOISES>,
 }
 
-impl Rounding {
-    /// Of counts that stand for these angles. `columns` are those of the derivatives.
-    pub(crate) fn new(quantum_rad: Wheels<f64>, model: &Model, columns: usize) -> Self {
-        let [along_m2, heading_rad2, covariance_m_rad] = rounding_variances(quantum_rad, model);
-        let is_rounded = heading_rad2 > 0.0;
+impl PoseVariance {
+    /// Of variances of the wheels' turns, rad².
+    fn of(variance_rad2: Wheels<f64>, model: &Model) -> Self {
+        let variance_m2 = variance_rad2.zip_with(model.m_per_rad, |rad2, m_per_rad| rad2 * m_per_rad * m_per_rad);
+        let (Wheels { left, right }, separation_m) = (variance_m2, model.separation_m);
         Self {
-            along_m2,
-            heading_rad2,
-            covariance_m_rad,
-            carries: Carries::OfCounts,
-            by: Derivatives::zeros(if is_rounded { columns } else { 0 }),
-            covariance_by: Covariances::ZERO,
+            along_m2: 0.25 * (left + right),
+            heading_rad2: (left + right) / (separation_m * separation_m),
+            covariance_m_rad: 0.5 * (right - left) / separation_m,
         }
+    }
+
+    /// Of counts that stand for these angles.
+    pub(crate) fn of_rounding(quantum_rad: Wheels<f64>, model: &Model) -> Self {
+        Self::of(quantum_rad.map(|rad| rad * rad / 12.0), model)
     }
 
     /// Does it matter beside measurements of these variances of position and heading?
@@ -97,24 +93,62 @@ impl Rounding {
             self.heading_rad2,
         )
     }
+}
+
+/// Rounding in the filter of one segment.
+pub(crate) struct Rounding {
+    /// Variances of both wheels' turns at a row, rad².
+    variance_rad2: Wheels<f64>,
+    carries: Carries,
+    /// Derivatives of the counts' pose while the robot's is carried.
+    by: Derivatives,
+    covariance_by: Covariances<NOISES>,
+}
+
+impl Rounding {
+    /// Of counts that stand for these angles. `columns` are those of the derivatives.
+    pub(crate) fn new(quantum_rad: Wheels<f64>, columns: usize) -> Self {
+        Self {
+            variance_rad2: quantum_rad.map(|rad| rad * rad / 12.0),
+            carries: Carries::OfCounts,
+            by: Derivatives::zeros(columns),
+            covariance_by: Covariances::ZERO,
+        }
+    }
+
+    /// What a pose is off by where the motion within a row adds these variances of the wheels' turns.
+    fn at(&self, interpolated_rad2: Wheels<f64>, model: &Model) -> PoseVariance {
+        PoseVariance::of(self.variance_rad2.zip_with(interpolated_rad2, |a, b| a + b), model)
+    }
 
     /// The filter starts at a measurement of these variances: what it carries is the robot's pose.
     #[inline(always)]
-    pub(crate) fn start(&mut self, variance: [f64; 2]) {
-        self.carries = if self.matters(variance) { Carries::SinceStart } else { Carries::OfCounts };
+    pub(crate) fn start(&mut self, variance: [f64; 2], interpolated_rad2: Wheels<f64>, model: &Model) {
+        let own = self.at(interpolated_rad2, model);
+        self.carries = if own.matters(variance) { Carries::SinceStart { own } } else { Carries::OfCounts };
     }
 
     /// A measurement of these variances comes: the robot's pose is carried from here on.
     #[inline(always)]
-    pub(crate) fn enter(&mut self, state: &mut FilterState<'_>, variance: [f64; 2]) {
-        if self.carries != Carries::OfCounts || !self.matters(variance) {
+    pub(crate) fn enter(
+        &mut self,
+        state: &mut FilterState<'_>,
+        variance: [f64; 2],
+        interpolated_rad2: Wheels<f64>,
+        model: &Model,
+    ) {
+        if self.carries != Carries::OfCounts {
+            return;
+        }
+        let own = self.at(interpolated_rad2, model);
+        if !own.matters(variance) {
             return;
         }
         let covariance = state.covariance.matrix(0);
-        *state.covariance = Covariance::of([&(covariance + self.in_room(state.pose.theta_rad))]);
+        *state.covariance = Covariance::of([&(covariance + own.in_room(state.pose.theta_rad))]);
         self.by.copy_from(state.by);
         self.covariance_by = *state.covariance_by;
-        self.carries = Carries::SinceMeasurement { pose: *state.pose, covariance, by_noise: *state.pose_by_noise };
+        self.carries = Carries::SinceMeasurement { own, pose: *state.pose, covariance, by_noise: *state.pose_by_noise };
     }
 
     /// A wheel turns on: the counts' pose is carried from here on.
@@ -124,12 +158,12 @@ impl Rounding {
         match carried {
             Carries::OfCounts => {}
             // Without any knowledge before, the counts' pose is the robot's and their rounding.
-            Carries::SinceStart => {
-                let covariance = state.covariance.matrix(0) + self.in_room(state.pose.theta_rad);
+            Carries::SinceStart { own } => {
+                let covariance = state.covariance.matrix(0) + own.in_room(state.pose.theta_rad);
                 *state.covariance = Covariance::of([&covariance]);
             }
-            Carries::SinceMeasurement { pose, covariance, by_noise } => {
-                let entered = covariance + self.in_room(pose.theta_rad);
+            Carries::SinceMeasurement { own, pose, covariance, by_noise } => {
+                let entered = covariance + own.in_room(pose.theta_rad);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };
                 let gain = covariance * inverse;

@@ -114,33 +114,6 @@ pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
 /// Budgeted: one lost row is bridged.
 pub(crate) const GAP_RATIO: f64 = 2.5;
 
-/// Rows from which on a log has a beat.
-/// Budgeted: the line through so many is off by a fifth of what stamps jitter by.
-pub(crate) const MIN_BEAT_ROWS: usize = 24;
-
-/// Rows to either side whose line is the beat.
-/// Budgeted: 500 rows know it to a twentieth of what stamps
-/// jitter by; in five seconds a clock keeps its beat.
-pub(crate) const BEAT_LINE_ROWS: usize = 250;
-
-/// Rows to either side of an odd gap, whose promptest tell whether rows were lost in it.
-/// Budgeted: of so many rows one is hardly late.
-pub(crate) const BEAT_SHIFT_ROWS: usize = 24;
-
-/// Rounds in which beat and numbers are found from each other.
-/// Budgeted: the second mends what lost rows do to the first.
-pub(crate) const BEAT_ROUNDS: usize = 3;
-
-/// Departure of a gap from the beat, as a share of it, from which on rows may have been lost in it, or have
-/// come by themselves.
-/// Derived: a lost row makes it 1, less what both ends jitter by.
-pub(crate) const MIN_ODD_GAP: f64 = 0.4;
-
-/// Shift of the promptest rows after a gap against those before, as a share of the beat, that lost rows make.
-/// Derived: a lost row makes it 1; the promptest of 24 rows that jitter by a fifth of the beat differ by
-/// 0.13.
-pub(crate) const MIN_SHIFT: f64 = 0.65;
-
 /// Longest row within which the wheels' rates change steadily, seconds.
 /// Budgeted: robots speed up and stop in some tenths of a second; within a longer row they may do both.
 pub(crate) const MAX_STEADY_ROW_S: f64 = 0.3;
@@ -174,6 +147,10 @@ pub(crate) const MIN_RESIMULATED_VARIANCE_RATIO: f64 = 0.05;
 /// Acceleration, m/s², by which a robot that stands between two counts may set off or stop.
 /// Budgeted: gentle for a robot; a count of 4 mm then takes 0.2 s, one of 0.01 mm 10 ms.
 pub(crate) const GENTLE_ACCELERATION_M_S2: f64 = 0.2;
+
+/// Rows to either side in which wheels change their speed as much as in a row.
+/// Budgeted: a mean square of eleven is known to two fifths.
+pub(crate) const ROWS_OF_CHANGE: usize = 5;
 
 /// Variance that rounding adds to a pose, over that of a measurement, below which it is left out.
 /// Budgeted: it changes a standard deviation by 0.05 %.

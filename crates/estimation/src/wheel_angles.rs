@@ -5,11 +5,10 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{NominalRobot, RunView, WheelLog};
+use dataset::{Beat, NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
-use crate::sampling_period::lateness_s;
-use crate::settings::{MAX_EXTRAPOLATION, TIME_TOLERANCE_S};
+use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
 use crate::wheel_rates::{WheelRates, quantum_of_angles};
 
 /// A stretch of the log within one row.
@@ -31,6 +30,11 @@ pub(crate) struct WheelInterval {
     pub(crate) bend_rad2: f64,
     /// No count comes in it, nor near it.
     pub(crate) stands: bool,
+    /// It starts within a row, and not at one.
+    pub(crate) starts_within_row: bool,
+    /// Variances of each wheel's turn at its start and at its end, rad²: what the motion within the row there
+    /// may be off by from how the wheels are taken to speed up. 0 at a row.
+    pub(crate) interpolated_rad2: [Wheels<f64>; 2],
 }
 
 /// Turns of both wheels since a run's first row.
@@ -92,7 +96,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         };
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
-        let late_s = if continuous { lateness_s(&odometry.t_s) } else { vec![0.0; odometry.t_s.len()] };
+        let beat = if continuous { Beat::of(&odometry.t_s) } else { None };
+        let late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
         let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })
     }
@@ -201,19 +206,53 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// whichever says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979).
     /// 0 where single rows do not say their rates, and in rows so long that a robot does several things.
     fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
-        let none = Wheels::both(0.0);
-        let is_inner = row > 0 && row + 2 < self.t_s.len();
-        if !(self.rates.row_by_row && is_inner && (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row))) {
-            return none;
+        let is_steady = || (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row));
+        let Some([before, after]) = self.accelerations_around(row).filter(|_| is_steady()) else {
+            return Wheels::both(0.0);
+        };
+        before.zip_with(
+            after,
+            |before, after| {
+                if before * after > 0.0 { before.signum() * before.abs().min(after.abs()) } else { 0.0 }
+            },
+        )
+    }
+
+    /// How the wheels speed up from the row before to a row, and from it to the next, rad/s²; `None` where
+    /// single rows do not say their rates, and at the ends of the log.
+    fn accelerations_around(&self, row: usize) -> Option<[Wheels<f64>; 2]> {
+        if !self.rates.row_by_row || row == 0 || row + 2 >= self.t_s.len() {
+            return None;
         }
         let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
         let by = |from: usize, to: usize| {
             let passed_s = middle_s(to) - middle_s(from);
             self.row_rate(to).zip_with(self.row_rate(from), |to, from| (to - from) / passed_s)
         };
-        by(row - 1, row).zip_with(by(row, row + 1), |before, after| {
-            if before * after > 0.0 { before.signum() * before.abs().min(after.abs()) } else { 0.0 }
-        })
+        Some([by(row - 1, row), by(row, row + 1)])
+    }
+
+    /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off by
+    /// what it changes by from row to row, or by what it changes by in the rows around where that is more, as
+    /// what pushes the shafts goes on. A smooth one is off by half of that; one that changes faster than rows
+    /// come, by more than they show.
+    fn interpolated_rad2(&self, row: usize, t_s: f64) -> Wheels<f64> {
+        let since_s = t_s - self.t_s[row];
+        let left_s = self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - t_s);
+        if since_s <= TIME_TOLERANCE_S || left_s <= TIME_TOLERANCE_S {
+            return Wheels::both(0.0);
+        }
+        let change = |row: usize| {
+            let [before, after] = self.accelerations_around(row)?;
+            Some(before.zip_with(after, |before, after| (after - before).powi(2)))
+        };
+        let near = row.saturating_sub(ROWS_OF_CHANGE)..row + ROWS_OF_CHANGE + 1;
+        let (sum, count) = near.filter_map(change).fold((Wheels::both(0.0), 0.0_f64), |(sum, count), change| {
+            (sum.zip_with(change, |sum, change| sum + change), count + 1.0)
+        });
+        let own = change(row).unwrap_or(Wheels::both(0.0));
+        let half_s2 = 0.5 * since_s * left_s;
+        own.zip_with(sum, |own, sum| own.max(sum / count.max(1.0)) * half_s2 * half_s2)
     }
 
     /// Rates of the wheels at an instant of a row's interval, rad/s.
@@ -296,6 +335,8 @@ impl Cursor<'_, '_> {
             let change = self.track.acceleration_rad_s2(row).map(|acceleration| acceleration * dt_s);
             let bend_rad2 = (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0;
             let stands = self.track.rates.stands(rows_s, [at_s, t_s], row);
+            let starts_within_row = at_s > rows_s[row] + TIME_TOLERANCE_S;
+            let interpolated_rad2 = [at_s, t_s].map(|t_s| self.track.interpolated_rad2(row, t_s));
             intervals.push(WheelInterval {
                 t_s: at_s,
                 dt_s,
@@ -305,6 +346,8 @@ impl Cursor<'_, '_> {
                 rate_at_ends_rad_s: ends,
                 bend_rad2,
                 stands,
+                starts_within_row,
+                interpolated_rad2,
             });
             (at_s, angle) = (t_s, next);
         };

@@ -41,13 +41,14 @@ impl WheelRates {
         (separation_m, m_per_rad): (f64, Wheels<f64>),
         continuous: bool,
     ) -> Self {
-        let jitter_s = stamp_jitter_s(t_s);
+        let wrong_share = 1.0 - share_of_true_stamps(t_s, turn_rad);
+        let jitter_s = wrong_share * stamp_jitter_s(t_s);
         let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
-        // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due,
-        // and is off by no more than the stamps, one way or the other.
+        // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due.
+        // Stamps that counts follow are true however they jitter.
         let due_s: Vec<f64>;
         let t_s = if jitter_s > MAX_EXACT_JITTER * row_s {
-            due_s = t_s.iter().zip(late_s).map(|(t_s, late_s)| t_s - late_s).collect();
+            due_s = due(t_s, late_s, wrong_share);
             &due_s
         } else {
             t_s
@@ -183,7 +184,7 @@ fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half
 fn slope(t_s: &[f64], turn_rad: &[f64]) -> f64 {
     if let (&[from_s, _, to_s], &[from, _, to]) = (t_s, turn_rad) {
         // The most frequent window, whose middle has no weight where rows are even.
-        return (to - from) / (to_s - from_s);
+        return if to_s > from_s { (to - from) / (to_s - from_s) } else { 0.0 };
     }
     let count = t_s.len() as f64;
     let (middle_s, middle_rad) = (t_s.iter().sum::<f64>() / count, turn_rad.iter().sum::<f64>() / count);
@@ -192,6 +193,34 @@ fn slope(t_s: &[f64], turn_rad: &[f64]) -> f64 {
         (products + since_s * (turn_rad - middle_rad), squares + since_s * since_s)
     });
     if squares > 0.0 { products / squares } else { 0.0 }
+}
+
+/// When rows were due, by how late their stamps are and which share of that is an error: never before a row
+/// that came earlier, as rows that came by themselves share a number on the beat with their neighbours.
+fn due(t_s: &[f64], late_s: &[f64], wrong_share: f64) -> Vec<f64> {
+    let mut latest_s = f64::NEG_INFINITY;
+    let mut next = |(t_s, late_s): (&f64, &f64)| {
+        latest_s = f64::max(latest_s, t_s - wrong_share * late_s);
+        latest_s
+    };
+    t_s.iter().zip(late_s).map(&mut next).collect()
+}
+
+/// Share of what stamps jitter by that is true, 0 to 1: a row that was read late has turned on by as much.
+/// Slope of second differences of the turns on those of the stamps times the rate around them.
+fn share_of_true_stamps(t_s: &[f64], turn_rad: &Wheels<Vec<f64>>) -> f64 {
+    let (mut products, mut squares) = (0.0, 0.0);
+    for turn_rad in [&turn_rad.left, &turn_rad.right] {
+        for (t_s, turn_rad) in t_s.windows(3).zip(turn_rad.windows(3)) {
+            let (&[from_s, at_s, to_s], &[from, at, to]) = (t_s, turn_rad) else { continue };
+            if to_s > from_s {
+                let due_rad = (to - from) / (to_s - from_s) * (to_s - 2.0 * at_s + from_s);
+                products += due_rad * (to - 2.0 * at + from);
+                squares += due_rad * due_rad;
+            }
+        }
+    }
+    if squares > 0.0 { (products / squares).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Stretches of rows without a gap; in a log with gaps each row stands alone.
@@ -326,6 +355,36 @@ mod tests {
         let slow_s: Vec<f64> = (0..100).map(f64::from).collect();
         let slow = WheelRates::of((&slow_s, &[0.0; 100]), &turns, Wheels::both(0.0), DRIVE, true);
         assert!((0..99).all(|row| !slow.are_joined(&slow_s, row)));
+    }
+
+    #[test]
+    fn rows_of_one_number_on_the_beat_have_rates() {
+        // Stamps that jitter by 2 ms and a quarter of them by 8, none of it true: beats are missed, and rows are
+        // due at once.
+        let draws = (0..400_u32).map(|row| f64::from(row.wrapping_mul(2_654_435_761) >> 16) / 65_536.0);
+        let t_s: Vec<f64> = draws
+            .enumerate()
+            .map(|(row, draw)| 0.01 * row as f64 + if row % 4 == 0 { 0.008 } else { 0.002 } * draw)
+            .collect();
+        let turns = Wheels::both((0..400).map(|row| 0.03 * f64::from(row)).collect::<Vec<f64>>());
+        let late_s: Vec<f64> =
+            (0..400).map(|row| if row % 50 < 4 { 0.01 * f64::from(row % 50) } else { 0.0 }).collect();
+        let found = WheelRates::of((&t_s, &late_s), &turns, Wheels::both(0.0), DRIVE, true);
+        let rates = &found.at_rows_rad_s.left;
+        // Rejects a quotient of nothing by nothing.
+        assert!(rates.iter().all(|rate| rate.is_finite()), "{rates:?}");
+    }
+
+    #[test]
+    fn counts_say_whether_stamps_are_true() {
+        let jitter = |row: u32| 0.004 * (f64::from(row.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5);
+        let t_s: Vec<f64> = (0..400).map(|row| 0.01 * f64::from(row) + jitter(row)).collect();
+        let angle = |t_s: f64| 3.0 * t_s - 1.5 * (1.1 * t_s).cos();
+        let by_stamps = Wheels::both(t_s.iter().map(|t_s| angle(*t_s)).collect::<Vec<f64>>());
+        let by_beat = Wheels::both((0..400).map(|row| angle(0.01 * f64::from(row))).collect::<Vec<f64>>());
+        // The rate by stamps is off by the jitter of both ends, 0.12 of it: 1 and 0 to the square of that.
+        let [of_stamps, of_beat] = [&by_stamps, &by_beat].map(|turns| share_of_true_stamps(&t_s, turns));
+        assert!(of_stamps > 0.97 && of_beat < 0.03, "{of_stamps} {of_beat}");
     }
 
     #[test]

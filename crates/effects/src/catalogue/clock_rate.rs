@@ -7,14 +7,16 @@
 //! Alias: `wheel_scale` where speeds are logged; `truth_latency` over short runs.
 //! Reference: resonators and timers, 0.01 to 3 %, as users report.
 
-use model_term::{Measurement, ModelTerm, TermParameter};
-use kinematics::Pose;
+use dataset::RunInfo;
+use kinematics::{Pose, Twist};
+use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::time_shift::TimeShift;
 
 /// What it is, in one line.
 const MEANING: &str = "one clock runs fast";
@@ -38,7 +40,7 @@ impl PhysicalEffect for ClockRate {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Variant::plain(Term))
+        Hypothesis::Terms(Variant::plain(Term::default()))
     }
 
     fn description() -> Description {
@@ -68,8 +70,13 @@ impl Forward for State {
     }
 }
 
-#[derive(Clone)]
-struct Term;
+/// The motion from the stamp on to the instant by the true clock, over the rate: its twist times the time since
+/// the run's start where there is none yet.
+#[derive(Clone, Default)]
+struct Term {
+    rate: f64,
+    shift: TimeShift,
+}
 
 impl ModelTerm for Term {
     /// Plausible: 3 %, the upper end of what users report.
@@ -77,10 +84,30 @@ impl ModelTerm for Term {
         &[TermParameter { name: "rate", unit: "1", prior_sigma: 0.03 }]
     }
 
-    /// What the counts say of the instant t by the robot's clock was true ρ t before it: the robot is seen
+    fn linearize_at(&mut self, values: &[f64]) {
+        self.rate = values.first().copied().unwrap_or(0.0);
+    }
+
+    fn restart(&mut self, _run: &RunInfo) {
+        self.shift.restart();
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, _gradient: &mut [Pose]) {
+        if self.rate != 0.0 {
+            self.shift.motion(interval);
+        }
+    }
+
+    /// What the counts say of the instant t by the robot's clock was true ρ t before: the robot is seen
     /// farther on.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
-        gradient[0] = Pose::new(measurement.t_s * measurement.twist.v_m_s, 0.0, measurement.t_s * measurement.twist.omega_rad_s);
+        gradient[0] = if self.rate == 0.0 {
+            let Twist { v_m_s, omega_rad_s } = measurement.twist;
+            Pose::new(measurement.t_s * v_m_s, 0.0, measurement.t_s * omega_rad_s)
+        } else {
+            let seen = self.shift.seen(measurement, -self.rate * measurement.t_s);
+            Pose::new(seen.x_m / self.rate, seen.y_m / self.rate, seen.theta_rad / self.rate)
+        };
     }
 }
 

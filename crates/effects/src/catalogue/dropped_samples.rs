@@ -8,7 +8,7 @@
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{Dataset, Odometry, WheelLog};
+use dataset::{Beat, Dataset, Odometry, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -86,12 +86,17 @@ impl Forward for State {
     }
 }
 
-/// An interval longer than the usual one by this factor is nearer to two of them: it may be a gap, or a pause
-/// of the log, and the counts tell.
+/// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
+/// two of them. It may be a gap, or a pause of the log, and the counts tell.
 const GAP_RATIO: f64 = 1.5;
-/// With a smaller share of the counts that the speed around it asks for, a gap has lost some: one row in two
-/// leaves a half.
-const MIN_KEPT_SHARE: f64 = 0.8;
+/// What the rows that are missing in a gap counted, by the speed around it, counts of both wheels; with fewer
+/// the rounding of the rows around it does not let them be missed.
+const MIN_MISSED_COUNTS: f64 = 6.0;
+/// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
+const ROWS_AROUND: usize = 3;
+/// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong, and
+/// the log alone shows nothing.
+const MAX_LATE_SHARE: f64 = 0.25;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
 
@@ -103,6 +108,26 @@ struct Missing {
     lost: usize,
     /// Gaps over which it did not.
     kept: usize,
+    /// The numbers of the rows are not certain.
+    uncertain: bool,
+}
+
+/// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
+/// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
+fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
+    if let Some(beat) = Beat::of(t_s) {
+        let square_s2 = beat.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / t_s.len() as f64;
+        let uncertain = square_s2.sqrt() > MAX_LATE_SHARE * beat.period_s;
+        return Some((beat.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
+    }
+    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual_s = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0)?;
+    let rows = |length_s: &f64| match length_s / usual_s {
+        ratio if ratio > GAP_RATIO => ratio,
+        ratio if ratio * GAP_RATIO < 1.0 => 0.0,
+        _ => 1.0,
+    };
+    Some((lengths_s.iter().map(rows).collect(), false))
 }
 
 /// Carries the counts of every gap on, and says what was missing.
@@ -112,34 +137,39 @@ struct Missing {
 fn fill(odometry: &mut Odometry) -> Missing {
     let mut missing = Missing::default();
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return missing };
-    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let Some(usual_s) = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0) else { return missing };
-    let is_gap = |k: usize| lengths_s[k] > GAP_RATIO * usual_s;
+    let Some((rows, uncertain)) = rows_after(t_s) else { return missing };
+    missing.uncertain = uncertain;
     let shown =
         ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
-    // What came by itself, between two rows, is none.
-    let is_row = |k: &usize| !is_gap(*k) && lengths_s[*k] * GAP_RATIO > usual_s;
+    let is_row = |k: &usize| rows[*k] == 1.0;
     let mut lost = Wheels::both(0.0);
-    for (k, &length_s) in lengths_s.iter().enumerate() {
-        if is_gap(k) {
-            let around = [(0..k).rev().find(is_row), (k + 1..lengths_s.len()).find(is_row)];
-            let due = Wheels { left: Side::Left, right: Side::Right }.map(|side| {
-                // Not the mean of two speeds: stamps may jitter, and one over a length that does is too
-                // large.
-                let (counts, time_s) = around.iter().flatten().fold((0.0, 0.0), |(counts, time_s), near| {
-                    (counts + shown[side][*near], time_s + lengths_s[*near])
-                });
-                if time_s > 0.0 { length_s * counts / time_s } else { 0.0 }
-            });
-            let [due_of_both, shown_of_both] =
-                [due.left.abs() + due.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
-            if shown_of_both < MIN_KEPT_SHARE * due_of_both {
+    for (k, &of_gap) in rows.iter().enumerate() {
+        if of_gap > 1.0 {
+            let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
+            let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
+            let of_each = match before.len().min(after.len()) {
+                0 => ROWS_AROUND,
+                of_each => of_each,
+            };
+            let around: Vec<usize> = before.into_iter().take(of_each).chain(after.into_iter().take(of_each)).collect();
+            let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
+            let counts = Wheels::from_sides(|side| around.iter().map(|near| shown[side][*near]).sum::<f64>());
+            // Counts of a row around it, and of the gap at their speed.
+            let of_row = counts.map(|counts| counts / (around.len() as f64).max(1.0));
+            let due = counts.map(|counts| if time_s > 0.0 { counts / time_s * (t_s[k + 1] - t_s[k]) } else { 0.0 });
+            let [row_of_both, shown_of_both] =
+                [of_row.left.abs() + of_row.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
+            // Half of the missing rows' counts lie between what a single row shows and what all of them do.
+            let is_lost = shown_of_both < 0.5 * (1.0 + of_gap) * row_of_both;
+            if (of_gap - 1.0) * row_of_both < MIN_MISSED_COUNTS {
+                // Neither tells.
+            } else if is_lost {
                 for side in Side::BOTH {
                     lost[side] += due[side] - shown[side][k];
                 }
                 missing.lost += 1;
-                missing.rows += (length_s / usual_s).round() - 1.0;
-            } else if due_of_both > 0.0 {
+                missing.rows += of_gap.round() - 1.0;
+            } else {
                 missing.kept += 1;
             }
         }
@@ -158,6 +188,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         missing.rows += of_run.rows;
         missing.lost += of_run.lost;
         missing.kept += of_run.kept;
+        missing.uncertain |= of_run.uncertain;
         let written = run.odometry.t_s.len() as f64;
         rows += written;
     }
@@ -167,7 +198,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     vec![RecordCorrection {
         values: vec![("probability", missing.rows / (missing.rows + rows))],
         sentence: format!("{} rows are missing, and their counts with them", missing.rows),
-        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && missing.lost > missing.kept,
+        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && missing.lost > missing.kept && !missing.uncertain,
         records,
     }]
 }

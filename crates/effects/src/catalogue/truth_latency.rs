@@ -8,10 +8,8 @@
 //! Reference: the delay that target-tracking and hand-eye calibrations estimate beside the geometry; 5 to 100
 //! ms, in published logs up to 0.3 s.
 
-use std::collections::VecDeque;
-
 use dataset::RunInfo;
-use kinematics::{Increment, Pose, Twist};
+use kinematics::{Pose, Twist};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +17,7 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::time_shift::{LONGEST_S, TimeShift};
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's measurements are late";
@@ -78,41 +77,7 @@ impl Forward for State {
 #[derive(Clone, Default)]
 struct Term {
     delay_s: f64,
-    /// Ends of the intervals of the last [`LONGEST_S`], with the velocities there.
-    ends: VecDeque<(f64, Twist)>,
-}
-
-/// Delays of more are not followed back, seconds.
-const LONGEST_S: f64 = 1.5;
-
-impl Term {
-    /// Distance and turn from the instant `delay_s` before now on.
-    fn moved(&self, now: (f64, Twist)) -> Increment {
-        let from_s = now.0 - self.delay_s;
-        let (mut moved, mut after) = (Increment { distance_m: 0.0, turn_rad: 0.0 }, now);
-        let mut add = |time_s: f64, a: Twist, b: Twist| {
-            moved.distance_m += 0.5 * time_s * (a.v_m_s + b.v_m_s);
-            moved.turn_rad += 0.5 * time_s * (a.omega_rad_s + b.omega_rad_s);
-        };
-        for before in self.ends.iter().rev().copied().filter(|(end_s, _)| *end_s < now.0) {
-            let length_s = after.0 - before.0;
-            if before.0 <= from_s {
-                let share = if length_s > 0.0 { (after.0 - from_s) / length_s } else { 0.0 };
-                let between = |after: f64, before: f64| after + share * (before - after);
-                let start = Twist {
-                    v_m_s: between(after.1.v_m_s, before.1.v_m_s),
-                    omega_rad_s: between(after.1.omega_rad_s, before.1.omega_rad_s),
-                };
-                add(after.0 - from_s, start, after.1);
-                return moved;
-            }
-            add(length_s, before.1, after.1);
-            after = before;
-        }
-        // Before the log it went on as at its start.
-        add(after.0 - from_s, after.1, after.1);
-        moved
-    }
+    shift: TimeShift,
 }
 
 impl ModelTerm for Term {
@@ -122,39 +87,26 @@ impl ModelTerm for Term {
     }
 
     fn linearize_at(&mut self, values: &[f64]) {
-        self.delay_s = values.first().map_or(0.0, |delay_s| delay_s.clamp(0.0, LONGEST_S));
+        self.delay_s = values.first().map_or(0.0, |delay_s| delay_s.clamp(-LONGEST_S, LONGEST_S));
     }
 
     fn restart(&mut self, _run: &RunInfo) {
-        self.ends.clear();
+        self.shift.restart();
     }
 
     fn motion(&mut self, interval: &Interval<'_>, _gradient: &mut [Pose]) {
-        if self.delay_s == 0.0 {
-            return;
-        }
-        let [start, end] = interval.speed_at_ends_m_s.map(|speed_m_s| {
-            let Increment { distance_m, turn_rad } = Increment::from_travel(speed_m_s, interval.wheel_separation_m);
-            Twist { v_m_s: distance_m, omega_rad_s: turn_rad }
-        });
-        if self.ends.is_empty() {
-            self.ends.push_back((interval.t_s, start));
-        }
-        let end_s = interval.t_s + interval.dt_s;
-        self.ends.push_back((end_s, end));
-        while self.ends.front().is_some_and(|(at_s, _)| *at_s < end_s - LONGEST_S) {
-            self.ends.pop_front();
+        if self.delay_s != 0.0 {
+            self.shift.motion(interval);
         }
     }
 
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
-        let Twist { v_m_s, omega_rad_s } = measurement.twist;
         gradient[0] = if self.delay_s == 0.0 {
+            let Twist { v_m_s, omega_rad_s } = measurement.twist;
             Pose::new(-v_m_s, 0.0, -omega_rad_s)
         } else {
-            let Increment { distance_m, turn_rad } = self.moved((measurement.t_s, measurement.twist));
-            let back = Increment { distance_m: -distance_m, turn_rad: -turn_rad }.arc();
-            Pose::new(back.x_m / self.delay_s, back.y_m / self.delay_s, back.theta_rad / self.delay_s)
+            let seen = self.shift.seen(measurement, self.delay_s);
+            Pose::new(seen.x_m / self.delay_s, seen.y_m / self.delay_s, seen.theta_rad / self.delay_s)
         };
     }
 }
@@ -162,7 +114,6 @@ impl ModelTerm for Term {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinematics::Wheels;
 
     #[test]
     fn a_late_stamp_shows_the_robot_behind() {
@@ -174,37 +125,5 @@ mod tests {
         let mut gradient = [Pose::IDENTITY];
         Term::default().measurement(&Measurement { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
         assert_eq!(gradient, [Pose::new(-0.4, 0.0, 0.2)]);
-    }
-
-    #[test]
-    fn a_large_delay_goes_back_over_what_the_robot_did() {
-        // Speeding up at 1 m/s² for a second, in rows of 40 ms: 0.1 s before t = 1 s it was 0.1 − 0.1²/2 m
-        // back.
-        let (run, mut term) = (RunInfo::default(), Term::default());
-        term.linearize_at(&[0.1]);
-        let mut gradient = [Pose::IDENTITY];
-        for row in 0..25 {
-            let t_s = 0.04 * f64::from(row);
-            let interval = Interval {
-                t_s,
-                dt_s: 0.04,
-                late_s: [0.0; 2],
-                travel_m: Wheels::both(0.0),
-                speed_m_s: Wheels::both(t_s + 0.02),
-                speed_at_ends_m_s: [t_s, t_s + 0.04].map(Wheels::both),
-                count_m: Wheels::both(0.0),
-                wheel_separation_m: 0.36,
-                wheel_rad: Wheels::both(0.0),
-                turned_rad: Wheels::both(0.0),
-                world_from_body: Pose::IDENTITY,
-                session_m: 0.0,
-                run: &run,
-            };
-            term.motion(&interval, &mut gradient);
-        }
-        let twist = Twist { v_m_s: 1.0, omega_rad_s: 0.0 };
-        term.measurement(&Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
-        // Rejects the speed at the measurement, −1.
-        assert!((gradient[0].x_m + 0.95).abs() < 1e-12, "{:?}", gradient[0]);
     }
 }

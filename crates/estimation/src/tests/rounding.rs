@@ -87,7 +87,7 @@ fn a_standstill_does_not_average_rounding_out() {
     let model = Model { m_per_rad: Wheels::both(1.0), separation_m: 1e9, ..MODEL };
     // Of the centre, a quarter of both wheels' q²/12.
     let quantum_rad = Wheels::both(24_f64.sqrt());
-    let mut rounding = Rounding::new(quantum_rad, &model, 1);
+    let mut rounding = Rounding::new(quantum_rad, 1);
     let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(1));
     by.set(0, Vector3::new(1.0, 0.0, 0.0));
     let mut covariance = Covariance::of([&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-9))]);
@@ -101,7 +101,7 @@ fn a_standstill_does_not_average_rounding_out() {
             covariance_by: &mut covariance_by,
             pose_by_noise: &mut pose_by_noise,
         };
-        rounding.enter(&mut state, [1.0, 1.0]);
+        rounding.enter(&mut state, [1.0, 1.0], Wheels::both(0.0), &model);
         let (h, v) = (Vector3::x(), measured - pose.x_m);
         let ph = Vector3::from(covariance.along(&h).map(|[along]| along));
         let gain = ph / (h.dot(&ph) + 1.0);

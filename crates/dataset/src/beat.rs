@@ -1,0 +1,418 @@
+//! The regular beat behind the stamps of a log: which of its ticks each row is of, and how late it is stamped.
+//!
+//! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows
+//! have numbers on the beat: one more from row to row, more where rows were lost, the same where a row came
+//! by itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts itself,
+//! and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each path with
+//! its own idea of how late rows usually are, so that a clock need not keep one beat all day.
+
+use std::collections::HashMap;
+
+/// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
+const MIN_ROWS: usize = 24;
+/// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
+/// in five seconds a clock keeps its beat.
+const LINE_ROWS: usize = 250;
+/// Rounds in which beat and numbers are found from each other, at the most: each mends what numbers that were
+/// wrong do to the beat.
+const ROUNDS: usize = 5;
+/// Share of the beat by which gaps that are whole numbers of it depart at the most.
+const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
+/// Spans of so many rows whose phases say the beat, within these shares of what was known before, and in how
+/// many steps: a fifth of the rows may be lost at first; then three times what a span before leaves open.
+const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
+    [(2, [0.8, 1.02], 44), (8, [0.97, 1.03], 24), (23, [0.99, 1.01], 20), (100, [0.9975, 1.0025], 20)];
+/// A run has as many spans one after the other at the least, so that a beat that begins anew spoils few.
+const SPANS: usize = 8;
+/// Spans of which phases are taken.
+const PHASES_TAKEN: usize = 1000;
+/// Paths that are followed side by side.
+const PATHS: usize = 8;
+/// Rows over which a path's idea of how late rows usually are forgets.
+const MEMORY_ROWS: f64 = 200.0;
+/// Rows whose middle one says how late rows usually are, at first.
+const FIRST_ROWS: usize = 9;
+/// Log odds against a lost row, against each further one with it, and against a pause however long: rows are
+/// lost a few in a thousand, several together more often than independently.
+const LOST_COST: f64 = 8.0;
+const FURTHER_LOST_COST: f64 = 2.0;
+const PAUSE_COST: f64 = 14.0;
+/// The same against a row that came by itself.
+const BY_ITSELF_COST: f64 = 10.0;
+/// Deviations beyond which an error costs in proportion to its size (Huber 1964).
+const HUBER_SIGMAS: f64 = 1.5;
+/// A gap of less of the beat is between rows that waited for each other; rows come in bunches where more than
+/// this share of the gaps is such.
+const BUNCHED_GAP: f64 = 0.2;
+const MIN_BUNCHED_SHARE: f64 = 0.1;
+/// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
+const MIN_JITTER: f64 = 0.02;
+
+/// The beat of a run's rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beat {
+    /// Time between two ticks, seconds.
+    pub period_s: f64,
+    /// For each row, which tick it is of; 0 for the first.
+    pub numbers: Vec<i64>,
+    /// For each row, how late its stamp is, seconds, against the line through the rows around it.
+    pub late_s: Vec<f64>,
+}
+
+impl Beat {
+    /// The beat of stamps that do not fall; `None` where rows are too few to have one.
+    #[must_use]
+    pub fn of(t_s: &[f64]) -> Option<Self> {
+        if t_s.len() < MIN_ROWS {
+            return None;
+        }
+        let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
+        // The middle gap is exact where stamps are.
+        let of_gap = Numbered::from(t_s, gap_s);
+        let found = match of_gap {
+            Some(exact) if exact.cost == 0.0 => exact,
+            of_gap => {
+                let others = first_periods(t_s)?.into_iter().filter_map(|first_s| Numbered::from(t_s, first_s));
+                of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?
+            }
+        };
+        let Numbered { period_s, numbers, .. } = found;
+        let late_s = lateness(t_s, &numbers, period_s);
+        Some(Self { period_s, numbers, late_s })
+    }
+
+    /// Ticks from a row to the next one: 2 where one row is missing between them.
+    #[must_use]
+    pub fn ticks_after(&self, row: usize) -> Option<i64> {
+        Some(self.numbers.get(row + 1)? - self.numbers[row])
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Beats before numbers are known: the mean gap, as if no row were lost; and the one of which spans of a few
+/// rows, then of more, are whole numbers most nearly (Rayleigh's test of their phases).
+fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
+    let span = LINE_ROWS.min(t_s.len() / SPANS);
+    let mean_s = median(t_s.windows(span + 1).map(|rows| (rows[span] - rows[0]) / span as f64).collect())?;
+    if mean_s <= 0.0 {
+        return None;
+    }
+    let mut found_s = mean_s;
+    for (rows, [low, high], steps) in PHASE_SPANS.into_iter().filter(|(rows, ..)| *rows < t_s.len()) {
+        let every = (t_s.len() / PHASES_TAKEN).max(1);
+        let spans: Vec<f64> = t_s.windows(rows + 1).step_by(every).map(|of| of[rows] - of[0]).collect();
+        let agreement = |period_s: f64| -> f64 {
+            spans.iter().map(|span_s| (std::f64::consts::TAU * span_s / period_s).cos()).sum()
+        };
+        let at = |step: u32| found_s * (low + (high - low) * f64::from(step) / f64::from(steps));
+        let best = (0..=steps).map(|step| (at(step), agreement(at(step)))).max_by(|a, b| a.1.total_cmp(&b.1));
+        found_s = best.map_or(found_s, |(period_s, _)| period_s);
+    }
+    Some([mean_s, found_s])
+}
+
+/// The middle one of what long spans say.
+fn period(t_s: &[f64], numbers: &[i64]) -> Option<f64> {
+    let span = LINE_ROWS.min(t_s.len() / SPANS);
+    let of = |(t_s, numbers): (&[f64], &[i64])| (t_s[span] - t_s[0]) / ((numbers[span] - numbers[0]).max(1) as f64);
+    let all = t_s.windows(span + 1).zip(numbers.windows(span + 1)).map(of).collect();
+    median(all).filter(|period_s| *period_s > 0.0)
+}
+
+/// Rows with their numbers by some beat.
+struct Numbered {
+    period_s: f64,
+    numbers: Vec<i64>,
+    /// Negative log likelihood.
+    cost: f64,
+}
+
+impl Numbered {
+    /// From a first idea of the beat on; `None` where it leads nowhere.
+    fn from(t_s: &[f64], first_s: f64) -> Option<Self> {
+        if first_s <= 0.0 {
+            return None;
+        }
+        let mut found = Self { period_s: first_s, numbers: Vec::new(), cost: f64::INFINITY };
+        for _ in 0..ROUNDS {
+            let whole = whole_gaps(t_s, found.period_s).map(|numbers| (numbers, 0.0));
+            let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, found.period_s));
+            if numbers == found.numbers {
+                break;
+            }
+            found = Self { period_s: period(t_s, &numbers)?, numbers, cost };
+        }
+        Some(found)
+    }
+}
+
+/// Numbers where every gap is a whole number of beats.
+fn whole_gaps(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
+    let mut numbers = vec![0];
+    let mut last = 0;
+    for pair in t_s.windows(2) {
+        let gap = (pair[1] - pair[0]) / period_s;
+        let ticks = gap.round();
+        // A clock that drifts by less makes a long pause no whole number.
+        if ticks < 1.0 || (gap - ticks).abs() > MAX_WHOLE_GAP_ERROR * ticks.sqrt() {
+            return None;
+        }
+        last += ticks as i64;
+        numbers.push(last);
+    }
+    Some(numbers)
+}
+
+/// One way to number the rows so far.
+#[derive(Debug, Clone, Copy)]
+struct Path {
+    number: i64,
+    cost: f64,
+    /// How late rows usually are on it, in beats.
+    usual: f64,
+    /// The path that it goes on from, among those of the row before.
+    from: u8,
+}
+
+/// Cost of a row that is later than usual by so much of its standard deviation.
+fn huber(deviation: f64) -> f64 {
+    let size = deviation.abs();
+    if size <= HUBER_SIGMAS { 0.5 * size * size } else { HUBER_SIGMAS * (size - 0.5 * HUBER_SIGMAS) }
+}
+
+/// Cost of a step by so many ticks.
+fn step_cost(ticks: i64) -> f64 {
+    match ticks {
+        ..=1 => 0.0,
+        _ => (LOST_COST + FURTHER_LOST_COST * (ticks - 2) as f64).min(PAUSE_COST),
+    }
+}
+
+/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows; by
+/// all gaps where rows come in bunches.
+fn jitter(t_s: &[f64], period_s: f64) -> f64 {
+    let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
+    // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
+    let of_second = median(second).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt());
+    let gaps = || t_s.windows(2).map(|pair| (pair[1] - pair[0]) / period_s);
+    let rows = (t_s.len() - 1) as f64;
+    let bunched = gaps().filter(|gap| *gap < BUNCHED_GAP).count() as f64 > MIN_BUNCHED_SHARE * rows;
+    let of_gaps = (gaps().map(|gap| (gap - 1.0).powi(2)).sum::<f64>() / (2.0 * rows)).sqrt();
+    of_second.max(if bunched { of_gaps } else { 0.0 }).max(MIN_JITTER)
+}
+
+/// The numbers by the likeliest path, and its cost.
+fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
+    let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
+    let jitter = jitter(t_s, period_s);
+    // The first row may be late itself.
+    let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
+    let mut rows: Vec<Vec<Path>> = vec![vec![Path { number: 0, cost: 0.0, usual, from: 0 }]];
+    for row in 1..t_s.len() {
+        let mut next: HashMap<i64, Path> = HashMap::new();
+        for (from, path) in (0_u8..).zip(&rows[row - 1]) {
+            let mut offer = |path: Path| {
+                if next.get(&path.number).is_none_or(|known| path.cost < known.cost) {
+                    next.insert(path.number, path);
+                }
+            };
+            let due = at(row) - path.usual;
+            for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
+                if number > path.number {
+                    let late = at(row) - number as f64 - path.usual;
+                    let cost = path.cost + step_cost(number - path.number) + huber(late / jitter);
+                    let learnt = late.clamp(-2.0 * jitter, 2.0 * jitter) / MEMORY_ROWS.min(row as f64 + 1.0);
+                    offer(Path { number, cost, usual: path.usual + learnt, from });
+                }
+            }
+            // A row that came by itself is of no tick, and as late as it likes.
+            offer(Path { cost: path.cost + BY_ITSELF_COST, from, ..path.to_owned() });
+            // The beat begins anew, as after a pause that is no whole number of ticks.
+            let number = path.number + 1;
+            offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });
+        }
+        let mut paths: Vec<Path> = next.into_values().collect();
+        paths.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
+        paths.truncate(PATHS);
+        rows.push(paths);
+    }
+    let mut numbers = vec![0; t_s.len()];
+    let cost = rows.last().and_then(|paths| paths.first()).map_or(f64::INFINITY, |path| path.cost);
+    let mut at = 0;
+    for row in (0..t_s.len()).rev() {
+        let path = rows[row][at];
+        (numbers[row], at) = (path.number, usize::from(path.from));
+    }
+    (numbers, cost)
+}
+
+/// How late each stamp is against the line through the rows around it.
+fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
+    let rows = t_s.len();
+    // Sums of a window slide along; times over numbers stay small for precision.
+    let mut sums = Sums::default();
+    let (mut from, mut to) = (0, 0);
+    let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
+    let late = |row: usize| {
+        while to < rows.min(row + LINE_ROWS + 1) {
+            sums.add(point(to), 1.0);
+            to += 1;
+        }
+        while from + LINE_ROWS < row {
+            sums.add(point(from), -1.0);
+            from += 1;
+        }
+        let (number, rest_s) = point(row);
+        rest_s - sums.line_at(number)
+    };
+    (0..rows).map(late).collect()
+}
+
+/// Sums of a line through points.
+#[derive(Default)]
+struct Sums {
+    count: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl Sums {
+    fn add(&mut self, (x, y): (f64, f64), times: f64) {
+        self.count += times;
+        self.x += times * x;
+        self.y += times * y;
+        self.xx += times * x * x;
+        self.xy += times * x * y;
+    }
+
+    /// The line at a point; the mean where it has no slope.
+    fn line_at(&self, x: f64) -> f64 {
+        let (mean_x, mean_y) = (self.x / self.count, self.y / self.count);
+        let square = self.xx - self.count * mean_x * mean_x;
+        let slope = if square > 0.5 * self.count { (self.xy - self.count * mean_x * mean_y) / square } else { 0.0 };
+        mean_y + slope * (x - mean_x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 0.01;
+
+    /// Uniform draws in (0, 1): a multiplicative congruential generator (Park & Miller 1988).
+    struct Draws(u64);
+
+    impl Draws {
+        fn uniform(&mut self) -> f64 {
+            self.0 = self.0 * 48_271 % 2_147_483_647;
+            self.0 as f64 / 2_147_483_647.0
+        }
+
+        /// By the sum of twelve.
+        fn normal(&mut self) -> f64 {
+            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    /// Rows of which some are lost, late by draws; in order. Stamp, lateness and number of each.
+    fn stamps(rows: i64, lost: f64, mut late_s: impl FnMut(&mut Draws) -> f64) -> Vec<(f64, f64, i64)> {
+        let mut draws = Draws(7);
+        let (mut before_s, mut all) = (f64::NEG_INFINITY, Vec::new());
+        for row in 0..rows {
+            let due_s = PERIOD_S * row as f64;
+            let stamp_s = f64::max(due_s + late_s(&mut draws), before_s + 1e-4);
+            if row == 0 || draws.uniform() >= lost {
+                all.push((stamp_s, stamp_s - due_s, row));
+                before_s = stamp_s;
+            }
+        }
+        all
+    }
+
+    fn beat(stamps: &[(f64, f64, i64)]) -> Beat {
+        let t_s: Vec<f64> = stamps.iter().map(|(t_s, ..)| *t_s).collect();
+        Beat::of(&t_s).expect("a beat")
+    }
+
+    /// Root mean square of what lateness is off from what it was, its mean apart.
+    fn off_s(stamps: &[(f64, f64, i64)]) -> f64 {
+        let found = beat(stamps).late_s;
+        let off: Vec<f64> = found.iter().zip(stamps).map(|(found, (_, late_s, _))| found - late_s).collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        (off.iter().map(|off| (off - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt()
+    }
+
+    /// Share of the steps from row to row of which the number is wrong.
+    fn wrong_steps(stamps: &[(f64, f64, i64)]) -> f64 {
+        let found = beat(stamps).numbers;
+        let pairs = found.windows(2).zip(stamps.windows(2));
+        let wrong = pairs.filter(|(found, of)| found[1] - found[0] != of[1].2 - of[0].2).count();
+        wrong as f64 / stamps.len() as f64
+    }
+
+    #[test]
+    fn a_normal_jitter_is_found_row_by_row() {
+        let normal = |draws: &mut Draws| 2e-3 * draws.normal();
+        // The line through 500 rows is off by 2 ms/√500 on average, by twice that at the ends of a run.
+        let found = off_s(&stamps(3000, 0.0, normal));
+        assert!(found < 2e-4, "{found}");
+        assert!(off_s(&stamps(3000, 0.03, |_| 0.0)) < 1e-9, "rows that are lost are not late");
+        assert!(off_s(&stamps(3000, 0.0, |_| 0.0)) < 1e-12);
+    }
+
+    #[test]
+    fn lost_rows_are_counted_among_stamps_that_jitter() {
+        // A fifth of the beat. A lost row and a late one look alike until the next stamps: a wrong number costs
+        // two wrong steps, and one row in a hundred is later than two standard deviations beside a lost one.
+        let all = stamps(3000, 0.03, |draws| 2e-3 * draws.normal());
+        // Rejects numbers by the rounding of each gap, which are wrong for 0.012 of the rows.
+        assert!(wrong_steps(&all) < 3e-3, "{}", wrong_steps(&all));
+        assert!(off_s(&all) < 4e-4, "{}", off_s(&all));
+    }
+
+    #[test]
+    fn rows_that_were_received_late_are_no_lost_ones() {
+        for mean_s in [2e-3, 5e-3] {
+            let delayed = move |draws: &mut Draws| -mean_s * draws.uniform().ln();
+            let all = stamps(3000, 0.0, delayed);
+            // Delays of some rows together are taken for the clock's: a fifth of them.
+            assert!(off_s(&all) < 0.2 * mean_s, "{mean_s}: {}", off_s(&all));
+            assert!(wrong_steps(&all) < 2e-3, "{mean_s}: {}", wrong_steps(&all));
+        }
+    }
+
+    #[test]
+    fn a_row_that_came_by_itself_has_a_number_of_its_neighbour() {
+        let mut t_s: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
+        t_s.insert(80, 7.93);
+        let found = Beat::of(&t_s).expect("a beat");
+        // Rejects a row more on the beat, after which all are early by one.
+        assert_eq!((found.numbers[79], found.numbers[81], found.numbers[200]), (79, 80, 199));
+    }
+
+    #[test]
+    fn a_beat_that_begins_anew_has_lost_no_row() {
+        let mut t_s: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
+        t_s[90..].iter_mut().for_each(|t_s| *t_s += 0.06);
+        let found = Beat::of(&t_s).expect("a beat");
+        // Rejects a lost row, after which all are early by 0.4 of a tick.
+        assert!((found.numbers[199], found.ticks_after(89)) == (199, Some(1)), "{:?}", &found.numbers[85..95]);
+    }
+
+    #[test]
+    fn a_clock_that_drifts_is_not_late() {
+        // 500 ppm from end to end of half a minute, steadily: a quarter of a period.
+        let t_s: Vec<f64> =
+            (0..3000).map(|row| PERIOD_S * f64::from(row)).map(|t_s| t_s + 2.5e-4 * t_s * t_s / 30.0).collect();
+        let found = Beat::of(&t_s).expect("a beat");
+        assert!(found.late_s.iter().all(|late_s| late_s.abs() < 2e-4));
+        assert_eq!(Beat::of(&[0.0, 0.1, 0.3]), None);
+    }
+}
