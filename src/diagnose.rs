@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use ::diagnose::{Diagnosis, Document, Options};
+use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, Options};
 use clap::Args;
 
 use crate::diagnosis_page::Page;
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
         if let Ok(scenario) = &extended {
             let path = out.join("extended.toml");
-            write_whole(&path, scenario.to_toml()?.as_bytes())?;
+            write_whole(&path, [reservations(&document), scenario.to_toml()?].concat().as_bytes())?;
             document.extended_model = Some(path.display().to_string());
         }
         write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(&document)?)?;
@@ -47,6 +47,20 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     show(&document, terminal)?;
     terminal.document(&document)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the extended model does not say of itself: terms of which nobody can tell whether they hold elsewhere,
+/// and those that were left out because they do not.
+fn reservations(document: &Document) -> String {
+    let of = |finding: &Finding| {
+        let what = match finding.carries_over {
+            Some(true) => return None,
+            Some(false) => "is left out, as it does not carry over",
+            None => "may not carry over to other sessions and kinds of path",
+        };
+        finding.of_the_mean.then(|| format!("# {} {what}: {}\n", finding.id, finding.carries_over_why))
+    };
+    document.findings.iter().filter_map(of).collect()
 }
 
 fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
@@ -64,6 +78,13 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
         terminal.say(&findings.to_string())?;
         for finding in &document.findings {
             terminal.say(&finding.sentence)?;
+            if finding.of_the_mean && finding.carries_over != Some(false) {
+                let carries = match finding.carries_over {
+                    Some(_) => "carries over",
+                    None => "cannot be told whether it carries over",
+                };
+                terminal.say(&format!("  {carries}: {}", finding.carries_over_why))?;
+            }
         }
     }
     for check in document.checks.iter().filter(|check| !check.passes) {
@@ -81,6 +102,14 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
                 drift.base, drift.extended, drift.low, drift.high
             ))?;
         }
+    }
+    for LevelGain { level, units, drift_percent, .. } in document.gain.iter().flat_map(|gain| &gain.levels) {
+        let (GainLevel::Kinds | GainLevel::Sessions, Some(drift)) = (level, drift_percent) else { continue };
+        let whole = if *level == GainLevel::Kinds { "kinds of path" } else { "sessions" };
+        terminal.say(&format!(
+            "with whole {whole} held out, {units} in turn: drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
+            drift.base, drift.extended, drift.low, drift.high
+        ))?;
     }
     if let Some(next) = &document.next_experiment {
         terminal.say(&format!("next experiment (yair plan tells more): {}", next.drive))?;

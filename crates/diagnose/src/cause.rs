@@ -76,4 +76,6 @@ pub(crate) enum Doubt {
     ProbablyPartOfUnlisted,
     /// A fault of the records may do the same.
     FaultyRecords,
+    /// Some session or kind of path does not have it as the others give it.
+    DoesNotCarryOver,
 }

@@ -8,14 +8,15 @@ use estimation::{EstimationError, FitSettings, ModelFit};
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
-use crate::augmented_model::AugmentedModel;
+use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::{Candidate, mean_terms};
+use crate::carry_over::{CarryOver, carry_over};
 use crate::check::TestResult;
 use crate::clock_offsets::clock_offsets;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
 use crate::findings::{StageResults, findings};
-use crate::gain::gain;
+use crate::gain::gain_by_level;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::mean_structure;
 use crate::plan::{Limits, next_experiment};
@@ -144,6 +145,11 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
     let structure = mean_structure(records, base, &catalogue, restored);
     let (log, spans) = (check_rows(records), check_spans(records));
+    let model = structure.model();
+    let names: Vec<String> =
+        records.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
+    let carry_over: Vec<CarryOver> =
+        (0..model.candidates.len()).map(|candidate| carry_over(model, candidate, &names)).collect();
     let findings = findings(&StageResults {
         structure: &structure,
         log: log.as_ref(),
@@ -152,17 +158,16 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         clocks,
         uncorrelated,
         without: &options.without,
+        carry_over: &carry_over,
     });
-    let model = structure.model();
-    let (gain, gain_why_null) = gain_of(&structure.base, model);
+    let (gain, gain_why_null) = gain_of(&structure.base, model, &names);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
     let next =
         next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
-    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, model);
+    let carried = carried(&structure.base, model, &carry_over);
+    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, &carried);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, &findings);
-    let names: Vec<String> =
-        records.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
     let document = Document {
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
@@ -187,15 +192,27 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     Ok(Diagnosis { document, extended, residuals, alternatives, found })
 }
 
-fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> (Option<Gain>, Option<String>) {
+fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) -> (Option<Gain>, Option<String>) {
     if model.candidates.is_empty() {
         return (None, Some("nothing was added to the calibrated model's mean".to_owned()));
     }
     let alone = AugmentedModel::base(base);
-    match gain(&alone, model) {
+    match gain_by_level(&alone, model, names) {
         Ok(gain) => (Some(gain), None),
         Err(why) => (None, Some(why)),
     }
+}
+
+/// The model without the terms that do not carry over to some session or kind of path.
+fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, carry_over: &[CarryOver]) -> AugmentedModel<'a> {
+    let stays = |(_, of): &(_, &CarryOver)| of.carries_over != Some(false);
+    let candidates: Vec<Candidate> =
+        model.candidates.iter().zip(carry_over).filter(stays).map(|(candidate, _)| candidate.clone()).collect();
+    if candidates.len() == model.candidates.len() {
+        return model.clone();
+    }
+    let others = if candidates.is_empty() { None } else { refit(base, model, candidates) };
+    others.unwrap_or_else(|| AugmentedModel::base(base))
 }
 
 /// The calibration with what was found in the model.

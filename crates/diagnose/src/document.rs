@@ -106,6 +106,18 @@ pub struct Finding {
     pub unlisted_term: Option<UnlistedTerm>,
     /// Ids of the runs that it concerns; `None` for all.
     pub runs: Option<Vec<String>>,
+    /// Whether every session and kind of path that could tell has more than half of the size that the others
+    /// give it; `None` where these data cannot tell.
+    pub carries_over: Option<bool>,
+    /// Why.
+    pub carries_over_why: String,
+    /// Whether it is a term of the model's mean, which another session may have as well.
+    #[serde(skip)]
+    pub of_the_mean: bool,
+    /// Sizes in each session that determines them, along the proportions found in all.
+    pub by_session: BTreeMap<String, BTreeMap<String, Value>>,
+    /// The same for each kind of path.
+    pub by_kind: BTreeMap<String, BTreeMap<String, Value>>,
 }
 
 /// A size.
@@ -164,6 +176,35 @@ pub struct Gain {
     /// Log likelihood of a scalar observation: extended − base.
     pub log_score_per_observation: Compared,
     /// Final position error of dead reckoning over the distance: base − extended.
+    pub drift_percent: Option<Compared>,
+    /// The same with runs, whole kinds of path and whole sessions held out, where there are several.
+    pub levels: Vec<LevelGain>,
+}
+
+/// What is held out together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GainLevel {
+    /// Blocks of runs.
+    Blocks,
+    /// Runs, in a few folds that have runs of each protocol.
+    Runs,
+    /// Kinds of path.
+    Kinds,
+    /// Sessions.
+    Sessions,
+}
+
+/// What an extension gains on what was held out together; intervals are over the units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LevelGain {
+    /// What is a unit.
+    pub level: GainLevel,
+    /// How many units there are.
+    pub units: usize,
+    /// As in [`Gain`].
+    pub log_score_per_observation: Compared,
+    /// As in [`Gain`].
     pub drift_percent: Option<Compared>,
 }
 

@@ -7,6 +7,7 @@ use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
 use estimation::{ModelFit, NoiseComponent};
 
 use crate::candidate::Candidate;
+use crate::carry_over::CarryOver;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
 use crate::clock_offsets::ClockOffset;
@@ -42,6 +43,9 @@ pub(crate) struct Finding {
     pub(crate) doubts: Vec<Doubt>,
     /// Ids of the runs that it concerns; `None` for all.
     pub(crate) runs: Option<Vec<String>>,
+    /// The index of its term in the model's mean, if it has one, and whether that carries over.
+    pub(crate) term: Option<usize>,
+    pub(crate) carry_over: Option<CarryOver>,
 }
 
 impl Finding {
@@ -102,7 +106,13 @@ pub(crate) fn parameters(candidate: &Candidate, estimates: &[(f64, f64)]) -> BTr
 /// The findings of a search over the catalogue.
 pub(crate) fn of_search(found: &SearchResult<'_>) -> Vec<Finding> {
     let indices = found.model.candidates.iter().zip(&found.names).zip(&found.tests);
-    indices.map(|((candidate, names), test)| of_candidate(candidate, names, test, trials(found, candidate))).collect()
+    indices
+        .enumerate()
+        .map(|(index, ((candidate, names), test))| Finding {
+            term: Some(index),
+            ..of_candidate(candidate, names, test, trials(found, candidate))
+        })
+        .collect()
 }
 
 /// How many variants of an effect were tried.
@@ -139,6 +149,8 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
         basis: Basis::Mean,
         doubts: Vec::new(),
         runs: None,
+        term: None,
+        carry_over: None,
     }
 }
 
@@ -163,6 +175,8 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
         basis: Basis::Products(trials),
         doubts: Vec::new(),
         runs: None,
+        term: None,
+        carry_over: None,
     })
 }
 
@@ -300,6 +314,8 @@ pub(crate) fn of_fault(fault: &Fault) -> Finding {
         basis: Basis::RecordFault(fault.sentence.clone()),
         doubts: Vec::new(),
         runs: None,
+        term: None,
+        carry_over: None,
     }
 }
 
@@ -329,7 +345,18 @@ pub(crate) fn of_causes(
         causes.push(Cause::Unknown);
     }
     let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) / causes.len() as f64 };
-    Finding { causes, probability, z: z_of_p(p_value), p_value, parameters, basis, doubts: Vec::new(), runs: None }
+    Finding {
+        causes,
+        probability,
+        z: z_of_p(p_value),
+        p_value,
+        parameters,
+        basis,
+        doubts: Vec::new(),
+        runs: None,
+        term: None,
+        carry_over: None,
+    }
 }
 
 /// A noise effect by the log likelihood of each candidate cause. The likeliest comes first. Those that
@@ -374,6 +401,8 @@ mod tests {
             basis: Basis::Mean,
             doubts: Vec::new(),
             runs: None,
+            term: None,
+            carry_over: None,
         }
     }
 

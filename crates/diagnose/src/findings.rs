@@ -1,6 +1,7 @@
 //! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log;
 //! and the doubts that they cast on each other. [`findings`] lists the stages in their order.
 
+use crate::carry_over::CarryOver;
 use crate::cause::Doubt;
 use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
@@ -35,6 +36,8 @@ pub(crate) struct StageResults<'e, 'a> {
     pub(crate) uncorrelated: bool,
     /// Effects that are not to be named.
     pub(crate) without: &'e [String],
+    /// Whether each term of the model's mean carries over.
+    pub(crate) carry_over: &'e [CarryOver],
 }
 
 impl StageResults<'_, '_> {
@@ -49,7 +52,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 11] = [
+    let stages: [Stage; 12] = [
         record_faults,
         mean_effects,
         clocks,
@@ -60,6 +63,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         doubt_parts_of_stronger_findings,
         doubt_incomplete_models,
         doubt_low_significance,
+        doubt_what_does_not_carry_over,
         by_significance,
     ];
     stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
@@ -93,7 +97,8 @@ fn sparse_terms(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> V
     let model = results.structure.model();
     for (index, p_value, trials) in results.structure.unlisted.iter().flat_map(UncataloguedTerms::terms) {
         let test = wald_test(model, index).map(|(test, _)| test);
-        findings.extend(test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials)));
+        let found = test.and_then(|test| finding::of_sparse(&model.candidates[index], &test, p_value, trials));
+        findings.extend(found.map(|found| Finding { term: Some(index), ..found }));
     }
     findings
 }
@@ -161,6 +166,19 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
 
 fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     finding::or_of_low_significance(&mut findings);
+    findings
+}
+
+/// A term that some session or kind of path does not have as the others give it shares its place: what else was
+/// special there does as well.
+fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    for finding in &mut findings {
+        finding.carry_over = finding.term.and_then(|term| results.carry_over.get(term)).cloned();
+        let is_refuted = finding.carry_over.as_ref().is_some_and(|of| of.carries_over == Some(false));
+        if is_refuted && !finding.is_unlisted() {
+            finding.or_unlisted(1.0, Doubt::DoesNotCarryOver);
+        }
+    }
     findings
 }
 

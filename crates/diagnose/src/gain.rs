@@ -4,14 +4,18 @@
 //! noise, four numbers, is that of all runs for both models. Intervals are over runs (a ratio's linearised
 //! standard error with Student's quantile).
 
+use std::collections::BTreeMap;
+
 use estimation::{Column, EndError, Information, Model, ModelFit, NormalEquations, RIDGE, inverse};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
-use crate::document::{Compared, Gain};
+use crate::carry_over::{Level, Units};
+use crate::document::{Compared, Gain, GainLevel, LevelGain};
 use crate::settings::levels::MIN_RUNS;
+use crate::settings::records::{SEPARATION_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA};
 use crate::settings::search::{HOLD_OUT_FOLDS, MIN_HELD_OUT_UNITS};
 use crate::statistics::student_95;
 
@@ -23,14 +27,60 @@ struct Unit {
     fold: usize,
 }
 
+/// What is held out together.
+#[derive(Clone, Copy)]
+enum HeldOut<'u> {
+    /// Runs, or blocks of them, in a few folds.
+    Runs,
+    /// All runs of a unit.
+    Units(&'u Units),
+}
+
 /// The gain, or why it cannot be computed.
 pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> Result<Gain, String> {
-    let (before, reckoned_before) = held_out(&base.fit, &mut terms(&base.candidates))?;
-    let (after, reckoned_after) = held_out(&extended.fit, &mut terms(&extended.candidates))?;
+    let (held_out_runs, compared) = compared(base, extended, HeldOut::Runs)?;
+    let (log_score_per_observation, drift_percent) = compared;
+    Ok(Gain { held_out_runs, log_score_per_observation, drift_percent, levels: Vec::new() })
+}
+
+/// The same where whole sessions and whole kinds of path are held out too; `names` are those of the sessions.
+pub(crate) fn gain_by_level(
+    base: &AugmentedModel<'_>,
+    extended: &AugmentedModel<'_>,
+    names: &[String],
+) -> Result<Gain, String> {
+    let gain = gain(base, extended)?;
+    let runs = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    let mut levels = vec![LevelGain {
+        level: if runs >= MIN_RUNS { GainLevel::Runs } else { GainLevel::Blocks },
+        units: gain.held_out_runs,
+        log_score_per_observation: gain.log_score_per_observation,
+        drift_percent: gain.drift_percent,
+    }];
+    for (of, level) in [(Level::Kind, GainLevel::Kinds), (Level::Session, GainLevel::Sessions)] {
+        let units = Units::of(extended, names, of);
+        let compared = (units.names.len() > 1).then(|| compared(base, extended, HeldOut::Units(&units)));
+        levels.extend(compared.and_then(Result::ok).map(|(_, (log_score_per_observation, drift_percent))| LevelGain {
+            level,
+            units: units.names.len(),
+            log_score_per_observation,
+            drift_percent,
+        }));
+    }
+    Ok(Gain { levels, ..gain })
+}
+
+/// How many runs or blocks were held out, and both models' scores and drift over what was held out together.
+fn compared(
+    base: &AugmentedModel<'_>,
+    extended: &AugmentedModel<'_>,
+    held_out: HeldOut<'_>,
+) -> Result<(usize, (Compared, Option<Compared>)), String> {
+    let (before, reckoned_before) = held_out_units(&base.fit, &mut terms(&base.candidates), held_out)?;
+    let (after, reckoned_after) = held_out_units(&extended.fit, &mut terms(&extended.candidates), held_out)?;
     if before.len() != after.len() || before.iter().zip(&after).any(|(before, after)| before.run != after.run) {
         return Err("the models do not hold out the same runs".to_owned());
     }
-    let freedom = before.len() as f64 - 1.0;
     let per_observation = |units: &[Unit]| -> f64 {
         let constant = 0.5 * std::f64::consts::TAU.ln();
         -units.iter().map(|unit| unit.cost).sum::<f64>() / units.iter().map(|unit| unit.equations.count).sum::<f64>()
@@ -38,40 +88,48 @@ pub(crate) fn gain(base: &AugmentedModel<'_>, extended: &AugmentedModel<'_>) -> 
     };
     // A measurement that one model takes for an outlier and the other does not is charged to the first.
     let charged = |own: &Unit, other: &Unit| own.cost + left_out_cost(&own.equations, other.equations.count);
-    let pairs: Vec<(f64, f64)> = before
-        .iter()
-        .zip(&after)
-        .map(|(before, after)| {
-            (charged(before, after) - charged(after, before), before.equations.count.max(after.equations.count))
-        })
-        .collect();
+    let of_unit = |position: usize, run: (usize, usize)| match held_out {
+        HeldOut::Runs => position,
+        HeldOut::Units(units) => units.of_run.get(&run).copied().unwrap_or(position),
+    };
+    let mut pairs: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    for (position, (before, after)) in before.iter().zip(&after).enumerate() {
+        let sum = pairs.entry(of_unit(position, before.run)).or_default();
+        sum.0 += charged(before, after) - charged(after, before);
+        sum.1 += before.equations.count.max(after.equations.count);
+    }
+    let pairs: Vec<(f64, f64)> = pairs.into_values().collect();
     let (mean, error) = ratio(&pairs);
-    let half_width = student_95(freedom) * error;
+    let half_width = student_95(pairs.len() as f64 - 1.0) * error;
     let log_score = Compared {
         base: per_observation(&before),
         extended: per_observation(&after),
         low: mean - half_width,
         high: mean + half_width,
     };
-    let drift = drift(&reckoned_before, &reckoned_after);
-    Ok(Gain { held_out_runs: before.len(), log_score_per_observation: log_score, drift_percent: drift })
+    Ok((before.len(), (log_score, drift(&reckoned_before, &reckoned_after, held_out))))
 }
 
-/// Drift under both models, run by run.
-fn drift(before: &[EndError], after: &[EndError]) -> Option<Compared> {
-    let by_run = |ends: &[EndError]| -> Vec<(f64, f64)> {
-        ends.chunk_by(|a, b| a.run == b.run)
-            .map(|run| {
-                (run.iter().map(|end| end.position_m).sum::<f64>(), run.iter().map(|end| end.length_m).sum::<f64>())
-            })
-            .collect()
+/// Drift under both models, by what was held out together.
+fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'_>) -> Option<Compared> {
+    let by_unit = |ends: &[EndError]| -> Vec<(f64, f64)> {
+        let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
+        for end in ends {
+            let unit = match held_out {
+                HeldOut::Runs => end.run,
+                HeldOut::Units(units) => (units.of_run.get(&end.run).copied().unwrap_or(usize::MAX), 0),
+            };
+            let sum = sums.entry(unit).or_default();
+            *sum = (sum.0 + end.position_m, sum.1 + end.length_m);
+        }
+        sums.into_values().collect()
     };
-    let (before, after) = (by_run(before), by_run(after));
-    let distance_m: f64 = before.iter().map(|run| run.1).sum();
+    let (before, after) = (by_unit(before), by_unit(after));
+    let distance_m: f64 = before.iter().map(|unit| unit.1).sum();
     if before.len() != after.len() || before.len() < 2 || distance_m <= 0.0 {
         return None;
     }
-    let percent = |runs: &[(f64, f64)]| 100.0 * runs.iter().map(|run| run.0).sum::<f64>() / distance_m;
+    let percent = |units: &[(f64, f64)]| 100.0 * units.iter().map(|unit| unit.0).sum::<f64>() / distance_m;
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
     let (mean, error) = ratio(&pairs);
@@ -94,24 +152,35 @@ fn ratio(pairs: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// Every unit's cost under a fit to the other folds, and its run's dead reckoning under that fit.
-fn held_out(fit: &ModelFit<'_>, terms: &mut [Box<dyn ModelTerm>]) -> Result<(Vec<Unit>, Vec<EndError>), String> {
-    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
-    let (units, blocks) = if runs >= MIN_RUNS {
-        (fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).cloned().collect::<Vec<_>>(), false)
-    } else if runs > 0 {
-        (fit.in_blocks(terms, MIN_RUNS.div_ceil(runs)), true)
-    } else {
-        return Err("no run has measurements".to_owned());
+fn held_out_units(
+    fit: &ModelFit<'_>,
+    terms: &mut [Box<dyn ModelTerm>],
+    held_out: HeldOut<'_>,
+) -> Result<(Vec<Unit>, Vec<EndError>), String> {
+    let of_runs = || fit.solution.pass.runs.iter().filter(|run| run.count > 0.0);
+    let runs = of_runs().count();
+    let by_runs = || of_runs().cloned().collect::<Vec<_>>();
+    let (units, fold_of, folds) = match held_out {
+        HeldOut::Units(of) => {
+            let fold_of = of_runs().map(|run| of.of_run.get(&run.run).copied().unwrap_or(0)).collect();
+            (by_runs(), fold_of, of.names.len())
+        }
+        HeldOut::Runs if runs == 0 => return Err("no run has measurements".to_owned()),
+        HeldOut::Runs => {
+            let blocks = runs < MIN_RUNS;
+            let units = if blocks { fit.in_blocks(terms, MIN_RUNS.div_ceil(runs)) } else { by_runs() };
+            if units.len() < MIN_HELD_OUT_UNITS {
+                return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
+            }
+            let fold_of = folds(fit, &units, blocks);
+            (units, fold_of, HOLD_OUT_FOLDS)
+        }
     };
-    if units.len() < MIN_HELD_OUT_UNITS {
-        return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
-    }
-    let fold_of = folds(fit, &units, blocks);
     let free = fit.free_basis();
-    let prior = prior(fit, terms);
+    let prior = prior(fit, terms, matches!(held_out, HeldOut::Units(_)));
     let mut scored: Vec<Unit> = Vec::new();
     let mut models: Vec<Model> = Vec::new();
-    for fold in 0..HOLD_OUT_FOLDS {
+    for fold in 0..folds {
         let mut others = units.iter().zip(&fold_of).filter(|(_, of)| **of != fold).map(|(unit, _)| unit);
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: NormalEquations = first.clone();
@@ -151,13 +220,21 @@ fn refit_step(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -
     Some(free * (-(covariance * (free.transpose() * own.gradient))))
 }
 
-/// For each column its size and how precisely it is known before: a term's is normal about nothing, as
-/// large as is plausible.
-fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>]) -> Vec<(f64, f64)> {
+/// For each column its size and how precisely it is known before: a term's is normal about nothing, as large
+/// as is plausible. Where whole kinds of path are held out, the others may say nothing of some length, which
+/// then is as stated, to a few per cent.
+fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>], of_lengths: bool) -> Vec<(f64, f64)> {
     let prior_sigma: Vec<f64> =
         terms.iter().flat_map(|term| term.parameters()).map(|parameter| parameter.prior_sigma).collect();
+    let (model, nominal) = (&fit.solution.model, &fit.nominal);
+    let length = |found: f64, nominal: f64, sigma: f64| {
+        ((found / nominal).abs().ln(), if of_lengths { sigma.powi(-2) } else { 0.0 })
+    };
     let of = |column: &Column| match column {
-        Column::Term(k) => (fit.solution.model.term_values[*k], prior_sigma[*k].powi(-2)),
+        Column::Term(k) => (model.term_values[*k], prior_sigma[*k].powi(-2)),
+        Column::LeftWheel => length(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_PRIOR_SIGMA),
+        Column::RightWheel => length(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_PRIOR_SIGMA),
+        Column::Separation => length(model.separation_m, nominal.separation_m, SEPARATION_PRIOR_SIGMA),
         _ => (0.0, 0.0),
     };
     fit.columns.iter().map(of).collect()

@@ -10,6 +10,7 @@
 mod alternatives;
 mod augmented_model;
 mod candidate;
+mod carry_over;
 mod cause;
 mod check;
 mod clock_offsets;
@@ -24,6 +25,7 @@ mod finding;
 mod findings;
 mod fit_cache;
 mod gain;
+mod kinds;
 mod large_errors;
 mod log_rows;
 mod mean_structure;
@@ -51,8 +53,8 @@ mod wald;
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
-    Blind, CandidateCause, Check, Compared, Document, Finding, Gain, NextExperiment, PlannedSession, Predicted,
-    Smallest, UnlistedTerm, Value, Verdict,
+    Blind, CandidateCause, Check, Compared, Document, Finding, Gain, GainLevel, LevelGain, NextExperiment,
+    PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
 };
 pub use extended_model::{ExtendedModel, ExtendedModelError};
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};

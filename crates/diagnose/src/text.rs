@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::alternatives::{Alternative, Status};
+use crate::carry_over::Level;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
 use crate::document::{self, Gain, UnlistedTerm, Value, Verdict};
@@ -14,6 +15,11 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         Cause::Term(term) => Some(term.clone()),
         Cause::Effect(_) | Cause::Unknown => None,
     };
+    let by = |level| {
+        let sizes = finding.carry_over.as_ref().map(|of| of.sizes(level, &fitted(&finding.parameters)));
+        sizes.unwrap_or_default()
+    };
+    let why = finding.carry_over.as_ref().map_or("it is no term of the mean", |of| of.why.as_str());
     document::Finding {
         id: finding.first().id().to_owned(),
         names: finding.causes.iter().map(|cause| cause.id().to_owned()).collect(),
@@ -24,7 +30,21 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         sentence: sentence(finding),
         unlisted_term,
         runs: finding.runs.clone(),
+        carries_over: finding.carry_over.as_ref().and_then(|of| of.carries_over),
+        carries_over_why: why.to_owned(),
+        of_the_mean: finding.carry_over.is_some(),
+        by_session: by(Level::Session),
+        by_kind: by(Level::Kind),
     }
+}
+
+/// The parameters that were fitted, with unit and value.
+fn fitted(parameters: &BTreeMap<String, Value>) -> Vec<(&str, &str, f64)> {
+    parameters
+        .iter()
+        .filter(|(_, value)| value.sigma.is_some())
+        .map(|(name, value)| (name.as_str(), value.unit.as_str(), value.value))
+        .collect()
 }
 
 /// A candidate cause as scripts get it.
@@ -84,6 +104,10 @@ fn sentence(finding: &Finding) -> String {
             Doubt::Incomplete => format!("{sentence}; it does not explain all that is there"),
             Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
             Doubt::FaultyRecords => format!("{sentence}; what is wrong with the records may do the same"),
+            Doubt::DoesNotCarryOver => {
+                let why = finding.carry_over.as_ref().map_or("", |of| of.why.as_str());
+                format!("{sentence}; it does not carry over: {why}")
+            }
         };
     }
     sentence

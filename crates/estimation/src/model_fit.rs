@@ -379,12 +379,18 @@ impl ModelFit<'_> {
         free_basis(self.columns.len(), &self.fixed())
     }
 
+    /// The same of some columns alone.
+    #[must_use]
+    pub fn free_basis_of(&self, columns: &[Column]) -> DMatrix<f64> {
+        free_basis(columns.len(), &self.fixed_along(columns))
+    }
+
     /// The Schur complement of the free columns, without some.
     #[must_use]
     pub fn eliminated(&self, equations: &NormalEquations, others: &[usize]) -> Option<SchurComplement> {
         let columns: Vec<Column> =
             self.columns.iter().copied().filter(|column| !others.contains(&column.index())).collect();
-        let basis = free_basis(columns.len(), &self.fixed_along(&columns));
+        let basis = self.free_basis_of(&columns);
         SchurComplement::of(equations, &columns, basis)
     }
 }

@@ -1,0 +1,364 @@
+//! What carries over: whether a term that was found has the size in each session, and in each kind of path,
+//! that all the others give it.
+//!
+//! A term is found because it raises the likelihood of what was driven. Runs of one day, or of one kind of
+//! path, share whatever else was special there, and held-out runs among them share it too. Each unit, a session
+//! or a kind of path, therefore gets a share of the found size of its own, all fitted together with the
+//! geometry that they have in common: one step of Gauss and Newton from the fit, with a covariance that is
+//! robust over runs. With a of the unit and b of all others, the extension lowers the unit's error exactly when
+//! a/b > ½: the contrast a − ½ b decides. A unit is asked where the others determine b, and where a = b would
+//! show.
+//!
+//! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979; Cochran 1954 (Q).
+
+use std::collections::BTreeMap;
+
+use estimation::{ClusterRobust, Information, NormalEquations, RIDGE, inverse};
+use nalgebra::{DMatrix, DVector};
+
+use crate::augmented_model::AugmentedModel;
+use crate::document::Value;
+use crate::kinds::kinds_of_runs;
+use crate::settings::carry_over::{
+    MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
+};
+use crate::settings::levels::MIN_RUNS;
+use crate::statistics::{holm, p_of_chi_square, p_of_z};
+
+/// What is a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Level {
+    /// A session: a dataset.
+    Session,
+    /// A kind of path.
+    Kind,
+}
+
+impl Level {
+    pub(crate) const BOTH: [Self; 2] = [Self::Session, Self::Kind];
+
+    const fn noun(self) -> &'static str {
+        match self {
+            Self::Session => "session",
+            Self::Kind => "kind of path",
+        }
+    }
+}
+
+/// Runs by unit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Units {
+    /// The units' names, in the order in which they were driven first.
+    pub(crate) names: Vec<String>,
+    /// The unit of each run.
+    pub(crate) of_run: BTreeMap<(usize, usize), usize>,
+}
+
+impl Units {
+    /// The units of a model's runs; `names` are those of the sessions.
+    pub(crate) fn of(model: &AugmentedModel<'_>, names: &[String], level: Level) -> Self {
+        let mut units = Self { names: Vec::new(), of_run: BTreeMap::new() };
+        let kinds = kinds_of_runs(&model.fit);
+        for run in model.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0) {
+            let name = match level {
+                Level::Session => match names.get(run.run.0) {
+                    // Sessions may be called alike.
+                    Some(name) if names.iter().filter(|other| *other == name).count() == 1 => name.clone(),
+                    Some(name) => format!("{name} ({})", run.run.0 + 1),
+                    None => format!("{}", run.run.0 + 1),
+                },
+                Level::Kind => kinds.get(&run.run).map_or_else(|| "mixed".to_owned(), |kind| (*kind).to_owned()),
+            };
+            let unit = units.names.iter().position(|known| *known == name).unwrap_or_else(|| {
+                units.names.push(name);
+                units.names.len() - 1
+            });
+            units.of_run.insert(run.run, unit);
+        }
+        units
+    }
+}
+
+/// Sizes of one term by the units of one level, as shares of the size found in all.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SizesByUnit {
+    level: Level,
+    units: Vec<UnitShare>,
+    /// p-value of units that differ by as much, were they alike.
+    pub(crate) p_of_differing: f64,
+}
+
+/// One unit's share, and how it stands against the others.
+#[derive(Debug, Clone, PartialEq)]
+struct UnitShare {
+    name: String,
+    /// Share of the size found, with its standard deviation; `None` where the unit does not determine it.
+    own: Option<(f64, f64)>,
+    contrast: Option<Contrast>,
+}
+
+/// A unit against all others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Contrast {
+    /// a − ½ b, signed by b, with its standard deviation.
+    value: (f64, f64),
+    /// |b| over its standard deviation.
+    sigmas_of_others: f64,
+    /// ½ |b| over the standard deviation of the contrast: how plainly a unit that agrees would show it.
+    power_sigmas: f64,
+}
+
+impl Contrast {
+    fn is_testable(&self) -> bool {
+        self.sigmas_of_others >= MIN_SIGMAS_OF_OTHERS && self.power_sigmas >= MIN_POWER_SIGMAS
+    }
+}
+
+/// Whether a term carries over, and the sizes by unit behind that.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CarryOver {
+    /// `None` where these data cannot tell.
+    pub(crate) carries_over: Option<bool>,
+    pub(crate) why: String,
+    by_level: Vec<SizesByUnit>,
+}
+
+impl CarryOver {
+    /// Sizes of each parameter by the units of a level: of units that determine them.
+    pub(crate) fn sizes(
+        &self,
+        level: Level,
+        parameters: &[(&str, &str, f64)],
+    ) -> BTreeMap<String, BTreeMap<String, Value>> {
+        let units = self.by_level.iter().filter(|sizes| sizes.level == level).flat_map(|sizes| &sizes.units);
+        let of = |(share, sigma): (f64, f64)| {
+            let value = |(name, unit, size): &(&str, &str, f64)| {
+                let value = Value { value: share * size, sigma: Some(sigma * size.abs()), unit: (*unit).to_owned() };
+                ((*name).to_owned(), value)
+            };
+            parameters.iter().map(value).collect::<BTreeMap<String, Value>>()
+        };
+        units.filter_map(|unit| Some((unit.name.clone(), of(unit.own?)))).collect()
+    }
+}
+
+/// Whether one candidate of a fitted model carries over to the sessions and kinds of path that its data have.
+pub(crate) fn carry_over(model: &AugmentedModel<'_>, candidate: usize, names: &[String]) -> CarryOver {
+    let sizes = Level::BOTH.map(|level| sizes_by_unit(model, candidate, &Units::of(model, names, level), level));
+    let by_level: Vec<SizesByUnit> = sizes.into_iter().flatten().collect();
+    let (carries_over, why) = verdict(&by_level);
+    CarryOver { carries_over, why, by_level }
+}
+
+/// The verdict over the units of all levels.
+fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
+    if by_level.is_empty() {
+        return (None, "one session and one kind of path: nothing to carry over to was driven".to_owned());
+    }
+    let mut supported = Vec::new();
+    let mut open = Vec::new();
+    for sizes in by_level {
+        let noun = sizes.level.noun();
+        let testable: Vec<(&str, Contrast)> = sizes
+            .units
+            .iter()
+            .filter_map(|unit| Some((unit.name.as_str(), unit.contrast.filter(Contrast::is_testable)?)))
+            .collect();
+        let z = |contrast: &Contrast| contrast.value.0 / contrast.value.1;
+        let p_below: Vec<f64> =
+            testable.iter().map(|(_, of)| if z(of) < 0.0 { 0.5 * p_of_z(z(of)) } else { 1.0 }).collect();
+        let refuted = holm(&p_below, REFUTED_LEVEL);
+        if let Some(((name, _), _)) = testable.iter().zip(refuted).find(|(_, refuted)| *refuted) {
+            return (Some(false), format!("{noun} {name} has less than half of the size that the others give it"));
+        }
+        let of = sizes.units.len();
+        if testable.len() >= MIN_TESTABLE_UNITS && testable.iter().all(|(_, contrast)| z(contrast) > SUPPORTED_SIGMAS) {
+            supported.push(format!("{} of {of} by {noun}", testable.len()));
+        } else {
+            let plain =
+                |unit: &&UnitShare| unit.own.is_some_and(|(share, sigma)| share.abs() > MIN_SIGMAS_OF_OTHERS * sigma);
+            let shown: Vec<&str> = sizes.units.iter().filter(plain).map(|unit| unit.name.as_str()).collect();
+            open.push(match (&shown[..], testable.len()) {
+                ([only], _) => format!("only {noun} {only} shows it"),
+                (_, tested) if tested < MIN_TESTABLE_UNITS => format!("{tested} of {of} testable by {noun}"),
+                _ => {
+                    let weak = testable.iter().find(|(_, contrast)| z(contrast) <= SUPPORTED_SIGMAS);
+                    format!("too weak in {noun} {}", weak.map_or("", |(name, _)| name))
+                }
+            });
+        }
+    }
+    let all = [&supported[..], &open[..]].concat().join("; ");
+    if open.is_empty() {
+        return (Some(true), format!("each unit that could tell has more than half of the size: {all}"));
+    }
+    (None, all)
+}
+
+/// The shares of the units of a level; `None` where there is one unit only.
+fn sizes_by_unit(model: &AugmentedModel<'_>, candidate: usize, units: &Units, level: Level) -> Option<SizesByUnit> {
+    if units.names.len() < 2 {
+        return None;
+    }
+    let system = System::of(model, candidate)?;
+    let unit_of = |run: (usize, usize)| units.of_run.get(&run).copied();
+    let number = units.names.len();
+    let all = system.shares(number, unit_of);
+    let share = |unit: usize| {
+        let (shares, covariance) = all.as_ref()?;
+        let sigma = covariance[(unit, unit)].sqrt();
+        (sigma.is_finite() && sigma > 0.0).then(|| (shares[unit], sigma))
+    };
+    let contrast = |unit: usize| {
+        let (shares, covariance) = system.shares(2, |run| unit_of(run).map(|of| usize::from(of != unit)))?;
+        let (own, others) = (shares[0], shares[1]);
+        let sign = others.signum();
+        let variance = covariance[(0, 0)] - covariance[(0, 1)] + 0.25 * covariance[(1, 1)];
+        let (sigma, sigma_of_others) = (variance.sqrt(), covariance[(1, 1)].sqrt());
+        (sigma > 0.0 && sigma_of_others > 0.0).then(|| Contrast {
+            value: (sign * (own - 0.5 * others), sigma),
+            sigmas_of_others: others.abs() / sigma_of_others,
+            power_sigmas: 0.5 * others.abs() / sigma,
+        })
+    };
+    let of_units: Vec<UnitShare> = units
+        .names
+        .iter()
+        .enumerate()
+        .map(|(unit, name)| UnitShare { name: name.clone(), own: share(unit), contrast: contrast(unit) })
+        .collect();
+    let known: Vec<(f64, f64)> = of_units.iter().filter_map(|unit| unit.own).collect();
+    Some(SizesByUnit { level, units: of_units, p_of_differing: p_of_differing(&known) })
+}
+
+/// Cochran's Q of values with their standard deviations.
+fn p_of_differing(values: &[(f64, f64)]) -> f64 {
+    if values.len() < 2 {
+        return 1.0;
+    }
+    let weight = |sigma: f64| sigma.powi(-2);
+    let total: f64 = values.iter().map(|(_, sigma)| weight(*sigma)).sum();
+    let mean = values.iter().map(|(value, sigma)| weight(*sigma) * value).sum::<f64>() / total;
+    let q: f64 = values.iter().map(|(value, sigma)| weight(*sigma) * (value - mean).powi(2)).sum();
+    p_of_chi_square(q, values.len() as f64 - 1.0)
+}
+
+/// The runs' normal equations by the columns that all units share, and along the size found of one candidate.
+struct System {
+    /// Of each run: the shared columns first, the candidate's last.
+    runs: Vec<((usize, usize), Information)>,
+    shared: usize,
+}
+
+impl System {
+    fn of(model: &AugmentedModel<'_>, candidate: usize) -> Option<Self> {
+        let fit = &model.fit;
+        let size = model.estimates(candidate);
+        let own: Vec<usize> = model.columns(candidate);
+        let columns: Vec<_> = fit.columns.iter().copied().filter(|column| !own.contains(&column.index())).collect();
+        let basis = fit.free_basis_of(&columns);
+        let shared = basis.ncols();
+        let at: Vec<usize> = columns.iter().map(|column| column.index()).chain(own.iter().copied()).collect();
+        // The shared columns along what is free of them, the candidate's along its size.
+        let mut along = DMatrix::zeros(at.len(), shared + 1);
+        along.view_mut((0, 0), (columns.len(), shared)).copy_from(&basis);
+        along.view_mut((columns.len(), shared), (own.len(), 1)).copy_from(&size);
+        let of_run = |run: &NormalEquations| {
+            let own = Information { matrix: run.block(&at, &at), gradient: run.gradient_of(&at) };
+            (run.run, own.along(&along))
+        };
+        let runs: Vec<_> = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).map(of_run).collect();
+        (!runs.is_empty()).then_some(Self { runs, shared })
+    }
+
+    /// The units' shares of the size, and their covariance: the wider of that by the noise and that by the
+    /// scatter of runs, where there are enough. `None` where they are not determined.
+    fn shares(
+        &self,
+        units: usize,
+        unit_of: impl Fn((usize, usize)) -> Option<usize>,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let n = self.shared + units;
+        let spread = |(run, own): &((usize, usize), Information)| {
+            let unit = unit_of(*run)?;
+            let mut to = DMatrix::zeros(self.shared + 1, n);
+            (0..self.shared).for_each(|k| to[(k, k)] = 1.0);
+            to[(self.shared, self.shared + unit)] = 1.0;
+            Some(own.along(&to))
+        };
+        let runs: Vec<Information> = self.runs.iter().filter_map(spread).collect();
+        let mut sum = Information { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
+        for run in &runs {
+            sum.matrix += &run.matrix;
+            sum.gradient += &run.gradient;
+        }
+        let by_noise = inverse(&sum.matrix, RIDGE)?;
+        let step = -(&by_noise * &sum.gradient);
+        let own = |matrix: &DMatrix<f64>| matrix.view((self.shared, self.shared), (units, units)).into_owned();
+        let mut covariance = own(&by_noise);
+        if runs.len() >= MIN_RUNS + units {
+            let ClusterRobust { covariance: by_runs, left_out } = ClusterRobust::of(&by_noise, runs);
+            let by_runs = own(&by_runs);
+            if left_out == 0 && by_runs.trace() > covariance.trace() {
+                covariance = by_runs;
+            }
+        }
+        // The found size is a share of one.
+        let shares = step.rows(self.shared, units).map(|step| 1.0 + step);
+        Some((shares, covariance))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit(name: &str, own: (f64, f64), contrast: (f64, f64)) -> UnitShare {
+        let contrast = Contrast { value: contrast, sigmas_of_others: 10.0, power_sigmas: 0.5 / contrast.1 };
+        UnitShare { name: name.to_owned(), own: Some(own), contrast: Some(contrast) }
+    }
+
+    fn sessions(units: Vec<UnitShare>) -> SizesByUnit {
+        SizesByUnit { level: Level::Session, units, p_of_differing: 1.0 }
+    }
+
+    #[test]
+    fn two_units_that_agree_support_and_one_that_does_not_refutes() {
+        let agree = || unit("a", (1.0, 0.1), (0.5, 0.1));
+        assert_eq!(verdict(&[sessions(vec![agree(), agree()])]).0, Some(true));
+        // Of a size of a tenth: 0.1 − 0.5 = −0.4, four standard deviations below nothing.
+        let (found, why) = verdict(&[sessions(vec![agree(), unit("b", (0.1, 0.1), (-0.4, 0.1)), agree()])]);
+        assert_eq!(found, Some(false), "{why}");
+        assert!(why.contains("session b"), "{why}");
+        // One testable unit is none to compare with; half of the size neither supports nor refutes.
+        let weak = unit("b", (1.0, 1.0), (0.5, 1.0));
+        assert_eq!(verdict(&[sessions(vec![agree(), weak])]).0, None);
+        assert_eq!(verdict(&[sessions(vec![agree(), unit("b", (0.5, 0.1), (0.0, 0.1))])]).0, None);
+        assert_eq!(verdict(&[]).0, None);
+    }
+
+    #[test]
+    fn shares_of_units_are_those_on_paper() {
+        // No shared column. Runs of units a, a, b with information 2, 2, 4 of the size found and gradients
+        // −2, 0, 2: shares 1 + 2/4 and 1 − 2/4, variances 1/4.
+        let run = |run, information, gradient| {
+            let own = Information {
+                matrix: DMatrix::from_element(1, 1, information),
+                gradient: DVector::from_element(1, gradient),
+            };
+            ((0, run), own)
+        };
+        let system = System { runs: vec![run(0, 2.0, -2.0), run(1, 2.0, 0.0), run(2, 4.0, 2.0)], shared: 0 };
+        let (shares, covariance) = system.shares(2, |(_, run)| Some(usize::from(run == 2))).expect("determined");
+        // The ridge changes them by 1e-11.
+        assert!((shares[0] - 1.5).abs() < 1e-9 && (shares[1] - 0.5).abs() < 1e-9, "{shares}");
+        assert!((covariance[(0, 0)] - 0.25).abs() < 1e-9 && covariance[(0, 1)].abs() < 1e-9, "{covariance}");
+    }
+
+    #[test]
+    fn units_that_differ_are_told_by_q() {
+        // 1 ± 0.1 and 0 ± 0.1: Q = 50 with one degree of freedom. Rejects unweighted squares, 0.5.
+        assert!((p_of_differing(&[(1.0, 0.1), (0.0, 0.1)]) / p_of_chi_square(50.0, 1.0) - 1.0).abs() < 1e-9);
+        assert_eq!(p_of_differing(&[(1.0, 0.1)]), 1.0);
+    }
+}
