@@ -6,8 +6,6 @@
 //! and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each path with
 //! its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
-use std::collections::HashMap;
-
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
 const MIN_ROWS: usize = 24;
 /// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
@@ -68,15 +66,14 @@ impl Beat {
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
-        let of_gap = Numbered::from(t_s, gap_s);
-        let found = match of_gap {
+        let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
             Some(exact) if exact.cost == 0.0 => exact,
             of_gap => {
-                let others = first_periods(t_s)?.into_iter().filter_map(|first_s| Numbered::from(t_s, first_s));
-                of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?
+                let others = first_periods(t_s)?.into_iter().filter_map(|first_s| Numbered::by(t_s, first_s));
+                let found = of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+                found.settled(t_s)
             }
         };
-        let Numbered { period_s, numbers, .. } = found;
         let late_s = lateness(t_s, &numbers, period_s);
         Some(Self { period_s, numbers, late_s })
     }
@@ -132,21 +129,26 @@ struct Numbered {
 }
 
 impl Numbered {
-    /// From a first idea of the beat on; `None` where it leads nowhere.
-    fn from(t_s: &[f64], first_s: f64) -> Option<Self> {
+    /// By some idea of the beat, with the beat of these numbers; `None` where it leads nowhere.
+    fn by(t_s: &[f64], first_s: f64) -> Option<Self> {
         if first_s <= 0.0 {
             return None;
         }
-        let mut found = Self { period_s: first_s, numbers: Vec::new(), cost: f64::INFINITY };
-        for _ in 0..ROUNDS {
-            let whole = whole_gaps(t_s, found.period_s).map(|numbers| (numbers, 0.0));
-            let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, found.period_s));
-            if numbers == found.numbers {
-                break;
+        let whole = whole_gaps(t_s, first_s).map(|numbers| (numbers, 0.0));
+        let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, first_s));
+        Some(Self { period_s: period(t_s, &numbers)?, numbers, cost })
+    }
+
+    /// Beat and numbers that are found from each other.
+    fn settled(self, t_s: &[f64]) -> Self {
+        let mut found = self;
+        for _ in 1..ROUNDS {
+            match Self::by(t_s, found.period_s) {
+                Some(next) if next.numbers != found.numbers => found = next,
+                _ => break,
             }
-            found = Self { period_s: period(t_s, &numbers)?, numbers, cost };
         }
-        Some(found)
+        found
     }
 }
 
@@ -213,12 +215,12 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
     let mut rows: Vec<Vec<Path>> = vec![vec![Path { number: 0, cost: 0.0, usual, from: 0 }]];
     for row in 1..t_s.len() {
-        let mut next: HashMap<i64, Path> = HashMap::new();
+        let mut next: Vec<Path> = Vec::with_capacity(5 * PATHS);
         for (from, path) in (0_u8..).zip(&rows[row - 1]) {
-            let mut offer = |path: Path| {
-                if next.get(&path.number).is_none_or(|known| path.cost < known.cost) {
-                    next.insert(path.number, path);
-                }
+            let mut offer = |path: Path| match next.iter_mut().find(|known| known.number == path.number) {
+                Some(known) if path.cost < known.cost => *known = path,
+                Some(_) => {}
+                None => next.push(path),
             };
             let due = at(row) - path.usual;
             for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
@@ -235,10 +237,9 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
             let number = path.number + 1;
             offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });
         }
-        let mut paths: Vec<Path> = next.into_values().collect();
-        paths.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
-        paths.truncate(PATHS);
-        rows.push(paths);
+        next.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
+        next.truncate(PATHS);
+        rows.push(next);
     }
     let mut numbers = vec![0; t_s.len()];
     let cost = rows.last().and_then(|paths| paths.first()).map_or(f64::INFINITY, |path| path.cost);

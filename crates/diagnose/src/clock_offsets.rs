@@ -14,6 +14,7 @@ use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
 use crate::settings::records::{
     CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
     MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_COMMON_CLOCK_OFFSET_S,
+    MIN_RUNS_PER_ODD_CLOCK,
 };
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -64,8 +65,10 @@ pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
             && of.profile.gain_over(middle_s) > MIN_CLOCK_GAIN
     };
     let odd: Vec<&OfRun> = all.iter().filter(is_odd).collect();
-    // Where many runs have clocks of their own, none is the odd one.
-    let odd = if 2 * odd.len() < all.len() { odd } else { Vec::new() };
+    // Where many runs have clocks of their own, none is the odd one: errors that are alike for seconds say so
+    // of any run.
+    let few = (all.len() / MIN_RUNS_PER_ODD_CLOCK).max(1);
+    let odd = if odd.len() <= few { odd } else { Vec::new() };
     let own = |of: &&OfRun| ClockOffset {
         runs: Some(vec![id(of.run)]),
         offset_s: of.profile.offset_s,
@@ -257,6 +260,7 @@ mod tests {
         assert!(clock_offsets(&found.records).is_none());
         assert!(clock_offsets(&[driven(&[0.05; 4])]).is_none(), "what the fit can estimate");
         assert!(clock_offsets(&[driven(&[0.0, 0.3])]).is_none(), "of two, either is the odd one");
+        assert!(clock_offsets(&[driven(&[0.0, 0.3, 0.0, -0.2, 0.0, 0.0])]).is_none(), "two of six are not odd");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use dataset::{Beat, NominalRobot, RunView, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
-use crate::wheel_rates::{WheelRates, quantum_of_angles};
+use crate::wheel_rates::{WheelRates, are_inexact, quantum_of_angles};
 
 /// A stretch of the log within one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +96,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         };
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
-        let beat = if continuous { Beat::of(&odometry.t_s) } else { None };
+        // Of stamps that are exact but for a few, those few are true.
+        let beat = if continuous && are_inexact(&odometry.t_s) { Beat::of(&odometry.t_s) } else { None };
         let late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
         let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })

@@ -240,6 +240,12 @@ fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
+/// Do a log's stamps jitter by more than what numbers in a file are rounded by?
+pub(crate) fn are_inexact(t_s: &[f64]) -> bool {
+    let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
+    stamp_jitter_s(t_s) > MAX_EXACT_JITTER * row_s
+}
+
 /// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not
 /// have, by their median, so that lost rows do not count.
 #[must_use]

@@ -43,6 +43,10 @@ pub(crate) const MIN_CLOCK_TURN_RAD: f64 = 0.01;
 /// Derived: of two, either is.
 pub(crate) const MIN_CLOCK_RUNS: usize = 4;
 
+/// Number. Of so many runs one may have a clock of its own; where more have, their errors are no clock's.
+/// Convention: one in ten.
+pub(crate) const MIN_RUNS_PER_ODD_CLOCK: usize = 10;
+
 /// Number. Fewer pairs of poses do not say an offset.
 /// Budgeted: three seconds at ten a second.
 pub(crate) const MIN_CLOCK_PAIRS: usize = 30;
