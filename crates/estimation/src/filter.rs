@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
+use crate::filter_state::{FilterState, Step};
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
@@ -18,7 +19,7 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
 use crate::records::{MeasuredPose, Segment, Start};
-use crate::rounding::{FilterState, Rounding};
+use crate::rounding::Rounding;
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 
@@ -323,32 +324,18 @@ impl<'f, 'a> Filter<'f, 'a> {
             rounding.leave(&mut state, noise_score);
         }
         let Moved { motion, by_geometry } = self.propagator.moved(self.pose, number, propagation);
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
-        let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
-        let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
-        self.by.turn(step);
-        for (column, of_propagation) in by_geometry.into_iter().enumerate() {
-            self.by.set(column, self.by.get(column) + room(of_propagation));
-        }
-        self.by.add_turned(Column::BASE.len(), (sin, cos), &self.propagator.propagation_by_terms);
-        self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
-        let noise = propagation.noise.turned((sin, cos)).times([
-            self.noise.variance[NoiseComponent::Wheel as usize],
-            self.noise.variance[NoiseComponent::Turn as usize],
-        ]);
-        self.covariance.carry(-step.y, step.x);
-        self.covariance.add(0, &noise, 0);
-        self.covariance.add(0, &noise, 1);
-        if self.pass_options.noise_score {
-            self.covariance_by.carry(-step.y, step.x);
-            self.covariance_by.add(NoiseComponent::Wheel as usize, &noise, 0);
-            self.covariance_by.add(NoiseComponent::Turn as usize, &noise, 1);
-            let [x, y, theta] = &mut self.pose_by_noise;
-            for a in 0..NOISES {
-                x[a] -= step.y * theta[a];
-                y[a] += step.x * theta[a];
-            }
-        }
+        let [wheel, turn, ..] = self.noise.variance;
+        let Self { pose, covariance, by, covariance_by, pose_by_noise, rounding, propagator, pass_options, .. } = self;
+        let step = Step {
+            motion,
+            by_geometry,
+            by_terms: &propagator.propagation_by_terms,
+            noise: &propagation.noise,
+            variance: [wheel, turn],
+            noise_score: pass_options.noise_score,
+        };
+        rounding.advance(&step);
+        FilterState { pose, covariance, by, covariance_by, pose_by_noise }.advance(&step);
     }
 
     /// Takes a measurement; false, and nothing changes, when it lies too far off.

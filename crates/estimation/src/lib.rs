@@ -21,6 +21,7 @@ mod decimation;
 mod derivatives;
 mod error;
 mod filter;
+mod filter_state;
 mod group_extrinsics;
 mod kinematic_samples;
 mod log_dead_reckoning;

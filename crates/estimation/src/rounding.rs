@@ -19,28 +19,20 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
+use crate::filter_state::{FilterState, Step};
 use crate::model::Model;
 use crate::noise::NOISES;
 use crate::settings::MIN_ROUNDING_VARIANCE_RATIO;
 
-/// The filter's state, with its derivatives.
-pub(crate) struct FilterState<'s> {
-    pub(crate) pose: &'s mut Pose,
-    pub(crate) covariance: &'s mut Covariance,
-    pub(crate) by: &'s mut Derivatives,
-    pub(crate) covariance_by: &'s mut Covariances<NOISES>,
-    pub(crate) pose_by_noise: &'s mut [[f64; NOISES]; 3],
-}
-
 /// Which pose the filter carries.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 enum Carries {
     /// That of the counts.
     OfCounts,
     /// The robot's, since a start: nothing is known of the counts' rounding.
     SinceStart { own: PoseVariance },
     /// The robot's, since a measurement after the counts had changed.
-    SinceMeasurement { own: PoseVariance, pose: Pose, covariance: Matrix3<f64>, by_noise: [[f64; NOISES]; 3] },
+    SinceMeasurement { own: PoseVariance, pose: Pose, covariance: Covariance, by_noise: [[f64; NOISES]; 3] },
 }
 
 /// What both wheels' turns are off by makes of a pose.
@@ -137,18 +129,27 @@ impl Rounding {
         interpolated_rad2: Wheels<f64>,
         model: &Model,
     ) {
-        if self.carries != Carries::OfCounts {
+        if !matches!(self.carries, Carries::OfCounts) {
             return;
         }
         let own = self.at(interpolated_rad2, model);
         if !own.matters(variance) {
             return;
         }
-        let covariance = state.covariance.matrix(0);
-        *state.covariance = Covariance::of([&(covariance + own.in_room(state.pose.theta_rad))]);
+        let covariance = *state.covariance;
+        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.in_room(state.pose.theta_rad))]);
         self.by.copy_from(state.by);
         self.covariance_by = *state.covariance_by;
         self.carries = Carries::SinceMeasurement { own, pose: *state.pose, covariance, by_noise: *state.pose_by_noise };
+    }
+
+    /// The robot moves within a row: what the counts say of it moves as well.
+    #[inline(always)]
+    pub(crate) fn advance(&mut self, step: &Step<'_>) {
+        if let Carries::SinceMeasurement { pose, covariance, by_noise, .. } = &mut self.carries {
+            let (by, covariance_by) = (&mut self.by, &mut self.covariance_by);
+            FilterState { pose, covariance, by, covariance_by, pose_by_noise: by_noise }.advance(step);
+        }
     }
 
     /// A wheel turns on: the counts' pose is carried from here on.
@@ -163,6 +164,7 @@ impl Rounding {
                 *state.covariance = Covariance::of([&covariance]);
             }
             Carries::SinceMeasurement { own, pose, covariance, by_noise } => {
+                let covariance = covariance.matrix(0);
                 let entered = covariance + own.in_room(pose.theta_rad);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };

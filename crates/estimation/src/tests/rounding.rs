@@ -80,7 +80,8 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
 fn a_standstill_does_not_average_rounding_out() {
     use crate::covariances::{Covariance, Covariances};
     use crate::derivatives::Derivatives;
-    use crate::rounding::{FilterState, Rounding};
+    use crate::filter_state::FilterState;
+    use crate::rounding::Rounding;
     use nalgebra::{Matrix3, Vector3};
 
     // Along the robot alone: a base so wide that its heading knows no rounding.
@@ -120,4 +121,60 @@ fn a_standstill_does_not_average_rounding_out() {
     // Rejects rounding that is new at each measurement, 1 − 1/(1 + 2/2) = 0.5, and none at all, 1/3.
     assert!((covariance.matrix(0)[(0, 0)] - 0.6).abs() < 1e-12, "{}", covariance.matrix(0));
     assert!((pose.x_m - 3.0 / 2.5).abs() < 1e-12 && (by.x[0] - 0.6).abs() < 1e-12, "{} {}", pose.x_m, by.x[0]);
+}
+
+/// A robot that goes on within a row takes the error of that row along, and what the counts say of it goes on
+/// as far.
+#[test]
+fn a_rows_error_goes_along_with_the_robot() {
+    use crate::covariances::{Covariance, Covariances};
+    use crate::derivatives::Derivatives;
+    use crate::filter_state::{FilterState, Step};
+    use crate::rounding::Rounding;
+    use nalgebra::{Matrix3, Vector3};
+
+    let model = Model { m_per_rad: Wheels::both(1.0), separation_m: 1e9, ..MODEL };
+    let mut rounding = Rounding::new(Wheels::both(24_f64.sqrt()), 8);
+    let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(8));
+    let mut covariance = Covariance::of([&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-9))]);
+    let mut covariance_by = Covariances::ZERO;
+    let mut pose_by_noise = [[0.0; 4]; 3];
+    let none = Derivatives::zeros(0);
+    // Measured at 2, then 7 after five metres: the same as two measurements of 2 at the first place.
+    for (moved_m, measured) in [(0.0, 2.0), (5.0, 7.0)] {
+        let mut state = FilterState {
+            pose: &mut pose,
+            covariance: &mut covariance,
+            by: &mut by,
+            covariance_by: &mut covariance_by,
+            pose_by_noise: &mut pose_by_noise,
+        };
+        let step = Step {
+            motion: Pose::new(moved_m, 0.0, 0.0),
+            by_geometry: [Vector3::zeros(); 3],
+            by_terms: &none,
+            noise: &Covariances::ZERO,
+            variance: [0.0; 2],
+            noise_score: false,
+        };
+        rounding.advance(&step);
+        state.advance(&step);
+        rounding.enter(&mut state, [1.0, 1.0], Wheels::both(0.0), &model);
+        let (h, v) = (Vector3::x(), measured - pose.x_m);
+        let ph = Vector3::from(covariance.along(&h).map(|[along]| along));
+        let gain = ph / (h.dot(&ph) + 1.0);
+        covariance.lower(&gain, &ph);
+        pose.x_m += gain.x * v;
+    }
+    let mut state = FilterState {
+        pose: &mut pose,
+        covariance: &mut covariance,
+        by: &mut by,
+        covariance_by: &mut covariance_by,
+        pose_by_noise: &mut pose_by_noise,
+    };
+    rounding.leave(&mut state, false);
+    // As above: z⁺ = 5 + ȳ P/(P + Q + R/2). Rejects counts that stay where they were: 0.4 of five metres.
+    assert!((pose.x_m - (5.0 + 2.0 / 2.5)).abs() < 1e-6, "{}", pose.x_m);
+    assert!((covariance.matrix(0)[(0, 0)] - 0.6).abs() < 1e-6, "{}", covariance.matrix(0));
 }
