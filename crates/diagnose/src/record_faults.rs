@@ -123,20 +123,21 @@ fn is_sound(fit: &ModelFit<'_>) -> bool {
     is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
 }
 
-/// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a drive,
-/// and single measurements tell where the robot went, or all of them together how large its wheels are.
+/// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a drive
+/// and single measurements tell where the robot went, or all of them together tell that its wheels are as large
+/// as stated, whatever the noise.
 pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.solution.noise.sigma(of);
+    // A robot that turns on the spot goes nowhere.
+    let extent_m = fit.records.extent_m().max(fit.nominal.separation_m);
     let follows = sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
-        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD;
-    let is_precise = || {
-        sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * fit.records.extent_m()
-            && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA
-    };
-    follows && (is_precise() || determines_wheels(fit))
+        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * extent_m
+        && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA;
+    follows || determines_wheels(fit)
 }
 
-/// Whether the measurements determine both wheels' sizes, which plausible geometry has.
+/// Whether the measurements determine both wheels' sizes, and these are those of the stated robot.
 fn determines_wheels(fit: &ModelFit<'_>) -> bool {
     let Some(covariance) = fit.covariance(&mut []) else { return false };
     let relative_sigma = |column: Column| {
@@ -145,19 +146,25 @@ fn determines_wheels(fit: &ModelFit<'_>) -> bool {
         Some(covariance[(at, at)].sqrt())
     };
     let wheels = [Column::LeftWheel, Column::RightWheel].map(relative_sigma);
-    is_drive(fit) && wheels.iter().all(|sigma| sigma.is_some_and(|sigma| sigma < MAX_CORRELATED_WHEEL_SIGMA))
+    has_stated_geometry(fit)
+        && wheels.iter().all(|sigma| sigma.is_some_and(|sigma| sigma > 0.0 && sigma < MAX_CORRELATED_WHEEL_SIGMA))
 }
 
 /// Are a fit's geometry and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
+    has_stated_geometry(fit)
+        && fit.solution.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && fit.solution.converged
+}
+
+/// Is a fit's geometry that of the stated robot, as far as such may differ?
+fn has_stated_geometry(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let is_near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
     is_near(model.m_per_rad.left, nominal.m_per_rad.left, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
         && is_near(model.m_per_rad.right, nominal.m_per_rad.right, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
         && is_near(model.separation_m, nominal.separation_m, MAX_SEPARATION_DEVIATION_SIGMAS * SEPARATION_PRIOR_SIGMA)
-        && fit.solution.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
-        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
-        && fit.solution.converged
 }
 
 /// By which factor the wheels of a fit are too large or too small for the robot that its description tells
