@@ -49,8 +49,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the extended model does not say of itself: terms of which nobody can tell whether they hold elsewhere,
-/// and those that were left out because they do not.
+/// What the extended model does not say of itself: terms of which nobody can tell whether they hold
+/// elsewhere, and those that were left out because they do not.
 fn reservations(document: &Document) -> String {
     let of = |finding: &Finding| {
         let what = match finding.carries_over {

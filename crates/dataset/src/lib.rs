@@ -5,7 +5,6 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
-mod beat;
 mod counter;
 mod error;
 pub mod import;
@@ -13,12 +12,12 @@ mod imported;
 mod prefetch;
 mod read;
 mod record;
+mod sampling_period;
 mod session;
 mod table;
 mod warning;
 mod write;
 
-pub use beat::Beat;
 pub use counter::suspected_wrap;
 pub use error::DatasetError;
 pub use prefetch::read_ahead;
@@ -27,6 +26,7 @@ pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
+pub use sampling_period::SamplingPeriod;
 pub use session::{RunView, Session};
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

@@ -2,12 +2,12 @@
 //! that all the others give it.
 //!
 //! A term is found because it raises the likelihood of what was driven. Runs of one day, or of one kind of
-//! path, share whatever else was special there, and held-out runs among them share it too. Each unit, a session
-//! or a kind of path, therefore gets a share of the found size of its own, all fitted together with the
-//! geometry that they have in common: one step of Gauss and Newton from the fit, with a covariance that is
-//! robust over runs. With a of the unit and b of all others, the extension lowers the unit's error exactly when
-//! a/b > ½: the contrast a − ½ b decides. A unit is asked where the others determine b, and where a = b would
-//! show.
+//! path, share whatever else was special there, and held-out runs among them share it too. Each unit, a
+//! session or a kind of path, therefore gets a share of the found size of its own, all fitted together with
+//! the geometry that they have in common: one step of Gauss and Newton from the fit, with a covariance that
+//! is robust over runs. With a of the unit and b of all others, the extension lowers the unit's error
+//! exactly when a/b > ½: the contrast a − ½ b decides. A unit is asked where the others determine b, and
+//! where a = b would show.
 //!
 //! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979; Cochran 1954 (Q).
 

@@ -169,8 +169,8 @@ fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) 
     findings
 }
 
-/// A term that some session or kind of path does not have as the others give it shares its place: what else was
-/// special there does as well.
+/// A term that some session or kind of path does not have as the others give it shares its place: what else
+/// was special there does as well.
 fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     for finding in &mut findings {
         finding.carry_over = finding.term.and_then(|term| results.carry_over.get(term)).cloned();

@@ -123,9 +123,9 @@ fn is_sound(fit: &ModelFit<'_>) -> bool {
     is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
 }
 
-/// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a drive
-/// and single measurements tell where the robot went, or all of them together tell that its wheels are as large
-/// as stated, whatever the noise.
+/// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a
+/// drive and single measurements tell where the robot went, or all of them together tell that its wheels
+/// are as large as stated, whatever the noise.
 pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
     let sigma = |of| fit.solution.noise.sigma(of);
     // A robot that turns on the spot goes nowhere.

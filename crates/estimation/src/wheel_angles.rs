@@ -5,7 +5,7 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{Beat, NominalRobot, RunView, WheelLog};
+use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog};
 use kinematics::{Count, Twist, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
@@ -97,7 +97,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         // Of stamps that are exact but for a few, those few are true.
-        let beat = if continuous && are_inexact(&odometry.t_s) { Beat::of(&odometry.t_s) } else { None };
+        let beat = if continuous && are_inexact(&odometry.t_s) { SamplingPeriod::of(&odometry.t_s) } else { None };
         let late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
         let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })

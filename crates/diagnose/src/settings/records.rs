@@ -90,9 +90,10 @@ pub(crate) const UNCORRELATED_NOISE_FACTOR: f64 = 3.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const UNCORRELATED_MEASUREMENT_SIGMA: f64 = 0.3;
 
-/// Relative standard deviation. Where all measurements together determine both wheels' sizes better than this,
-/// odometry is correlated with them however imprecise single ones are.
-/// Budgeted: by accident wheels that do not move the robot are as large as stated to 2 % once in fifty times.
+/// Relative standard deviation. Where all measurements together determine both wheels' sizes better than
+/// this, odometry is correlated with them however imprecise single ones are.
+/// Budgeted: by accident wheels that do not move the robot are as large as stated to 2 % once in fifty
+/// times.
 pub(crate) const MAX_CORRELATED_WHEEL_SIGMA: f64 = 0.02;
 
 /// Fraction of the measurements. With more outliers, a fit is not sound and faults without a trace in the log

@@ -8,7 +8,7 @@
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{Beat, Dataset, Odometry, WheelLog};
+use dataset::{SamplingPeriod, Dataset, Odometry, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -115,7 +115,7 @@ struct Missing {
 /// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
 /// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
 fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
-    if let Some(beat) = Beat::of(t_s) {
+    if let Some(beat) = SamplingPeriod::of(t_s) {
         let square_s2 = beat.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / t_s.len() as f64;
         let uncertain = square_s2.sqrt() > MAX_LATE_SHARE * beat.period_s;
         return Some((beat.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));

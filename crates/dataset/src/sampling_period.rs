@@ -1,10 +1,11 @@
-//! The regular beat behind the stamps of a log: which of its ticks each row is of, and how late it is stamped.
+//! The sampling period behind the stamps of a log: which of its ticks each row is of, and how late the row is
+//! stamped.
 //!
 //! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows
 //! have numbers on the beat: one more from row to row, more where rows were lost, the same where a row came
-//! by itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts itself,
-//! and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each path with
-//! its own idea of how late rows usually are, so that a clock need not keep one beat all day.
+//! by itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts
+//! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
+//! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
 const MIN_ROWS: usize = 24;
@@ -46,9 +47,9 @@ const MIN_BUNCHED_SHARE: f64 = 0.1;
 /// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
 const MIN_JITTER: f64 = 0.02;
 
-/// The beat of a run's rows.
+/// The regular beat of a run's rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beat {
+pub struct SamplingPeriod {
     /// Time between two ticks, seconds.
     pub period_s: f64,
     /// For each row, which tick it is of; 0 for the first.
@@ -57,7 +58,7 @@ pub struct Beat {
     pub late_s: Vec<f64>,
 }
 
-impl Beat {
+impl SamplingPeriod {
     /// The beat of stamps that do not fall; `None` where rows are too few to have one.
     #[must_use]
     pub fn of(t_s: &[f64]) -> Option<Self> {
@@ -139,7 +140,7 @@ impl Numbered {
         Some(Self { period_s: period(t_s, &numbers)?, numbers, cost })
     }
 
-    /// Beat and numbers that are found from each other.
+    /// SamplingPeriod and numbers that are found from each other.
     fn settled(self, t_s: &[f64]) -> Self {
         let mut found = self;
         for _ in 1..ROUNDS {
@@ -194,8 +195,8 @@ fn step_cost(ticks: i64) -> f64 {
     }
 }
 
-/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows; by
-/// all gaps where rows come in bunches.
+/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows;
+/// by all gaps where rows come in bunches.
 fn jitter(t_s: &[f64], period_s: f64) -> f64 {
     let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
     // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
@@ -337,9 +338,9 @@ mod tests {
         all
     }
 
-    fn beat(stamps: &[(f64, f64, i64)]) -> Beat {
+    fn beat(stamps: &[(f64, f64, i64)]) -> SamplingPeriod {
         let t_s: Vec<f64> = stamps.iter().map(|(t_s, ..)| *t_s).collect();
-        Beat::of(&t_s).expect("a beat")
+        SamplingPeriod::of(&t_s).expect("a beat")
     }
 
     /// Root mean square of what lateness is off from what it was, its mean apart.
@@ -370,8 +371,9 @@ mod tests {
 
     #[test]
     fn lost_rows_are_counted_among_stamps_that_jitter() {
-        // A fifth of the beat. A lost row and a late one look alike until the next stamps: a wrong number costs
-        // two wrong steps, and one row in a hundred is later than two standard deviations beside a lost one.
+        // A fifth of the beat. A lost row and a late one look alike until the next stamps: a wrong number
+        // costs two wrong steps, and one row in a hundred is later than two standard deviations beside a
+        // lost one.
         let all = stamps(3000, 0.03, |draws| 2e-3 * draws.normal());
         // Rejects numbers by the rounding of each gap, which are wrong for 0.012 of the rows.
         assert!(wrong_steps(&all) < 3e-3, "{}", wrong_steps(&all));
@@ -393,7 +395,7 @@ mod tests {
     fn a_row_that_came_by_itself_has_a_number_of_its_neighbour() {
         let mut t_s: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
         t_s.insert(80, 7.93);
-        let found = Beat::of(&t_s).expect("a beat");
+        let found = SamplingPeriod::of(&t_s).expect("a beat");
         // Rejects a row more on the beat, after which all are early by one.
         assert_eq!((found.numbers[79], found.numbers[81], found.numbers[200]), (79, 80, 199));
     }
@@ -402,7 +404,7 @@ mod tests {
     fn a_beat_that_begins_anew_has_lost_no_row() {
         let mut t_s: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
         t_s[90..].iter_mut().for_each(|t_s| *t_s += 0.06);
-        let found = Beat::of(&t_s).expect("a beat");
+        let found = SamplingPeriod::of(&t_s).expect("a beat");
         // Rejects a lost row, after which all are early by 0.4 of a tick.
         assert!((found.numbers[199], found.ticks_after(89)) == (199, Some(1)), "{:?}", &found.numbers[85..95]);
     }
@@ -412,8 +414,8 @@ mod tests {
         // 500 ppm from end to end of half a minute, steadily: a quarter of a period.
         let t_s: Vec<f64> =
             (0..3000).map(|row| PERIOD_S * f64::from(row)).map(|t_s| t_s + 2.5e-4 * t_s * t_s / 30.0).collect();
-        let found = Beat::of(&t_s).expect("a beat");
+        let found = SamplingPeriod::of(&t_s).expect("a beat");
         assert!(found.late_s.iter().all(|late_s| late_s.abs() < 2e-4));
-        assert_eq!(Beat::of(&[0.0, 0.1, 0.3]), None);
+        assert_eq!(SamplingPeriod::of(&[0.0, 0.1, 0.3]), None);
     }
 }
