@@ -13,6 +13,7 @@ mod imported;
 mod prefetch;
 mod read;
 mod record;
+mod row_lengths;
 mod session;
 mod table;
 mod warning;
@@ -27,6 +28,7 @@ pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
+pub use row_lengths::row_jitter_s;
 pub use session::{RunView, Session};
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

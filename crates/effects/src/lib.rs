@@ -203,6 +203,7 @@ contents! {
     dropped_samples::DroppedSamples,
     counter_wrap::CounterWrap,
     torn_read::TornRead,
+    counter_reset::CounterReset,
     swapped_wheels::SwappedWheels,
     truth_latency::TruthLatency,
     truth_lever_arm::TruthLeverArm,

@@ -1,0 +1,59 @@
+//! By how much the rows of a log with gaps are longer than usual, as far as that is jitter.
+//!
+//! Rows between gaps have no common beat, but lengths of their own. Most differ by what a scheduler makes of
+//! them. A few are longer by far more: something came in between, and such a length is true.
+
+/// Rows from which on there is a usual length.
+const MIN_ROWS: usize = 24;
+/// Share of the rows whose lengths depart by jitter alone, at the least. The median would not do: lengths often
+/// come in two sorts, of which the more frequent hardly departs.
+const JITTER_SHARE: f64 = 0.9;
+/// Departures beyond so many times that quantile are true: 4.9 standard deviations of normal lengths.
+const MAX_JITTER_RATIO: f64 = 3.0;
+
+/// For each row but the first, by how much it is longer than the usual one, seconds; 0 where its length is
+/// true, as it departs by more than the others' jitter, and of rows too few to say.
+#[must_use]
+pub fn row_jitter_s(t_s: &[f64]) -> Vec<f64> {
+    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if t_s.len() < MIN_ROWS {
+        return vec![0.0; lengths_s.len()];
+    }
+    let usual_s = quantile(lengths_s.clone(), 0.5);
+    let departures_s: Vec<f64> = lengths_s.into_iter().map(|length_s| length_s - usual_s).collect();
+    let jitter_s = quantile(departures_s.iter().map(|departure_s| departure_s.abs()).collect(), JITTER_SHARE);
+    let is_jitter = |departure_s: f64| departure_s.abs() <= MAX_JITTER_RATIO * jitter_s;
+    departures_s.into_iter().map(|departure_s| if is_jitter(departure_s) { departure_s } else { 0.0 }).collect()
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    let at = (share * values.len() as f64) as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_two_lengths_jitter_and_a_long_one_is_true() {
+        // As a laser's scans fall on a controller's cycle: 0.791 s and 0.805 s, and a cycle of 0.2 s more.
+        let mut t_s = vec![0.0_f64];
+        for row in 0..100 {
+            let length_s = if row == 40 { 1.001 } else { [0.791, 0.805, 0.791][row % 3] };
+            t_s.push(t_s[row] + length_s);
+        }
+        let found = row_jitter_s(&t_s);
+        // Rejects a threshold by the median departure, 0 here, above which the second sort of rows lies.
+        assert!((found[1] - 0.014).abs() < 1e-9 && found[0].abs() < 1e-9, "{:?}", &found[..3]);
+        assert_eq!(found[40], 0.0);
+    }
+
+    #[test]
+    fn even_rows_and_few_rows_have_no_jitter() {
+        let even: Vec<f64> = (0..50).map(f64::from).collect();
+        assert!(row_jitter_s(&even).iter().all(|jitter_s| *jitter_s == 0.0));
+        assert_eq!(row_jitter_s(&[0.0, 1.0, 2.5]), [0.0, 0.0]);
+        assert!(row_jitter_s(&[]).is_empty());
+    }
+}
