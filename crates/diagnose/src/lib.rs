@@ -24,6 +24,7 @@ mod finding;
 mod findings;
 mod fit_cache;
 mod gain;
+mod geometry_deviations;
 mod large_errors;
 mod log_rows;
 mod mean_structure;
