@@ -140,7 +140,8 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let mut pose = seen(0) * body_from_seen.inverse();
         let mut measurement = 1;
         let rows = rows(run, ticks_per_rev);
-        let late_s = estimation::lateness_s(&run.odometry.t_s);
+        let beat = dataset::Beat::of(&run.odometry.t_s);
+        let late_s = beat.map_or_else(|| vec![0.0; run.odometry.t_s.len()], |beat| beat.late_s);
         let travel_of = |row: &Row| row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
         // Between two rows the speed is that of the rows around: of one to either side, or of four where
         // stamps are irregular; at the ends of the log, of as many as there are.

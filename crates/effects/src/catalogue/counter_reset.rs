@@ -110,6 +110,9 @@ const MAX_ROWS: usize = 2;
 /// and counts of a wheel that sets off.
 const FAR_INCREMENTS: f64 = 4.0;
 const FAR_COUNTS: f64 = 16.0;
+/// A counter comes back to where it was if it counts no more meanwhile than this share of it; one that counts on
+/// from zero has lost all of it.
+const MAX_COUNTED_SHARE: f64 = 0.5;
 /// Widths of counters whose end is no reset, bits.
 const WRAP_BITS: [u32; 4] = [8, 16, 24, 32];
 /// Rows of zero that make the log itself show the fault: one may be a row of another device.
@@ -125,6 +128,15 @@ impl<'c> Rates<'c> {
     fn of(t_s: &'c [f64], ticks: &[i64]) -> Self {
         let increments = ticks.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]) as f64).collect();
         Self { t_s, increments }
+    }
+
+    /// What the wheel may count from a row to the next, by the increments around it but the two largest: it may
+    /// set off there, and a reset is one of them.
+    fn may_count(&self, row: usize) -> f64 {
+        let near = row.saturating_sub(NEIGHBOUR_ROWS)..(row + NEIGHBOUR_ROWS + 1).min(self.increments.len());
+        let mut sizes: Vec<f64> = near.map(|k| self.increments[k].abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        far(sizes.len().checked_sub(3).map_or(0.0, |third| sizes[third]))
     }
 
     /// What the wheel counts from a row to a later one, by the increments around the first.
@@ -159,9 +171,8 @@ fn fill_zero_rows(t_s: &[f64], ticks: &mut [i64]) -> usize {
             None => rates.due(before, end - 1),
         };
         let last = end.min(ticks.len() - 1);
-        let due = rates.due(before, last);
         let (from, passed_s) = (ticks[before], t_s[last] - t_s[before]);
-        if (counted - due).abs() <= far(due) && passed_s > 0.0 {
+        if counted.abs() <= MAX_COUNTED_SHARE * (from as f64).abs() && passed_s > 0.0 {
             for k in row..end {
                 ticks[k] = from + (counted * (t_s[k] - t_s[before]) / passed_s).round() as i64;
                 restored += 1;
@@ -182,9 +193,10 @@ fn carry_on(t_s: &[f64], ticks: &mut [i64]) -> usize {
         let off = rates.increments[row - 1] - due;
         let wraps = |bits: &u32| (off.abs() - 2_f64.powi(*bits as i32)).abs() <= 2.0 * due.abs() + FAR_COUNTS;
         // It goes on from there, and does not come back.
-        let goes_on = rates.increments.get(row).is_some_and(|next| (next - rates.due(row, row + 1)).abs() <= far(due));
-        let is_near_zero = (shown[row] as f64).abs() <= far(due) && (shown[row - 1] as f64).abs() > far(due);
-        if is_near_zero && off.abs() > far(due) && goes_on && !WRAP_BITS.iter().any(wraps) {
+        let most = rates.may_count(row - 1);
+        let goes_on = rates.increments.get(row).is_some_and(|next| next.abs() <= most);
+        let is_near_zero = (shown[row] as f64).abs() <= most && (shown[row - 1] as f64).abs() > most;
+        if is_near_zero && off.abs() > most && goes_on && !WRAP_BITS.iter().any(wraps) {
             carried += shown[row - 1] + due.round() as i64 - shown[row];
             resets += 1;
         }
