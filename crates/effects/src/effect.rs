@@ -131,8 +131,8 @@ pub trait PhysicalEffect {
         Vec::new()
     }
 
-    /// Whether only records can show it whose motions go by the lengths of the log's rows: logged speeds, or
-    /// displacements that are measured row by row.
+    /// Whether only records can show it whose motions go by the lengths of the log's rows: displacements that
+    /// are measured row by row.
     fn needs_row_lengths(&self) -> bool {
         false
     }

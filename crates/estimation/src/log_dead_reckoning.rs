@@ -70,7 +70,6 @@ impl<'a> LogDeadReckoning<'a> {
             wheel_rad: track.first_rad(),
             quantum_rad: track.quantum_rad(),
             session_m,
-            logs_speeds: false,
         };
         Some(Self { segment, instants, distance_m: track.distance_m(robot) })
     }

@@ -5,7 +5,7 @@
 //! origin of its own frame. Displacements of a run go on from each other: the heading in the room and the
 //! state of terms are carried from one to the next.
 
-use dataset::{Run, RunInfo, Session, TruthSample, WheelLog};
+use dataset::{Run, RunInfo, Session, TruthSample};
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
@@ -55,8 +55,6 @@ pub struct Segment<'a> {
     pub(crate) quantum_rad: Wheels<f64>,
     /// Distance driven in the session before, metres, by nominal values.
     pub(crate) session_m: f64,
-    /// The log has speeds, which only the lengths of its rows make a motion of.
-    pub(crate) logs_speeds: bool,
 }
 
 impl Segment<'_> {
@@ -212,7 +210,6 @@ impl<'a> Records<'a> {
                         wheel_rad: track.first_rad(),
                         quantum_rad: track.quantum_rad(),
                         session_m,
-                        logs_speeds: matches!(run.odometry().wheels, WheelLog::Twist { .. }),
                     };
                     add_poses(&mut records.segments, &base, &track, measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
@@ -232,11 +229,11 @@ impl<'a> Records<'a> {
         self
     }
 
-    /// Whether the log's row lengths, and no clock of their own, say how long the motions between measurements
-    /// lasted: of logged speeds, and of displacements that are measured row by row.
+    /// Whether motions were measured row by row of the log: nothing but the lengths of the rows says then how
+    /// long they lasted, where poses have stamps of their own clock.
     #[must_use]
     pub fn go_by_row_lengths(&self) -> bool {
-        self.segments.iter().any(|segment| segment.logs_speeds || segment.is_displacement())
+        self.segments.iter().any(Segment::is_displacement)
     }
 
     /// How many measurements there are.
