@@ -1,4 +1,4 @@
-//! The regular beat behind the stamps of a log: which of its ticks each row is of, and how late it is stamped.
+//! The regular beat behind the stamps of a log: which of its ticks each row is of, and how late its stamp is.
 //!
 //! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows
 //! have numbers on the beat: one more from row to row, more where rows were lost, the same where a row came
