@@ -8,6 +8,7 @@ mod ordinary_logs;
 #[path = "../support/plain_robot.rs"]
 mod plain_robot;
 mod plan;
+mod record_faults;
 mod report;
 #[path = "../support/mod.rs"]
 mod support;

@@ -100,6 +100,7 @@ const SPECIMENS: &[[&str; 4]] = &[
         "probability = 0.05, jump_counts = 256",
         "probability = 0.05, jump_counts = 255",
     ],
+    ["counter_reset", "probability = 0.0", "probability = 0.05", "probability = 1.0"],
     ["swapped_wheels", "swapped = false", "swapped = true", ""],
     ["truth_latency", "delay_s = 0.0", "delay_s = 0.05", "delay_s = inf"],
     [
@@ -203,6 +204,7 @@ const NAMES: [&[&str]; 8] = [
         "wrong_counts_per_turn",
         "counter_wrap",
         "torn_read",
+        "counter_reset",
         "dropped_samples",
         "time_unit",
     ],
@@ -397,7 +399,7 @@ const ENGINES_AGREE: f64 = 2e-4;
 
 /// Effects on the record alone: what dead reckoning makes of a faulty record is no motion that the engines
 /// could agree on.
-const RECORD: [&str; 8] = [
+const RECORD: [&str; 9] = [
     "interval_error",
     "reversed_wheel",
     "wrong_counts_per_turn",
@@ -405,6 +407,7 @@ const RECORD: [&str; 8] = [
     "dropped_samples",
     "counter_wrap",
     "torn_read",
+    "counter_reset",
     "swapped_wheels",
 ];
 

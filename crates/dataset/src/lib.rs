@@ -12,6 +12,7 @@ mod imported;
 mod prefetch;
 mod read;
 mod record;
+mod row_lengths;
 mod sampling_period;
 mod session;
 mod table;
@@ -26,6 +27,7 @@ pub use record::{
     Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
     Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
+pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;
 pub use session::{RunView, Session};
 pub use warning::Warning;

@@ -2,6 +2,7 @@
 
 use crate::check::{Check, ResidualPersistence};
 use crate::document::UnlistedTerm;
+use crate::geometry_deviations::GeometryDeviation;
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +48,8 @@ pub(crate) enum Basis {
     OtherClock(f64),
     /// Calibrated wheels are so many times as large as nominal ones.
     WheelFactor(f64),
+    /// The calibrated geometry is not the stated one.
+    Geometry(GeometryDeviation),
     /// The clock of the instrument is off by so many seconds: of all runs, or of these.
     ClockOffset(f64),
     /// A fault of the records, in words.
@@ -78,4 +81,6 @@ pub(crate) enum Doubt {
     FaultyRecords,
     /// Some session or kind of path does not have it as the others give it.
     DoesNotCarryOver,
+    /// The geometry that it is found beside is not that of the described robot.
+    OtherGeometry,
 }

@@ -11,6 +11,7 @@ use dataset::{Dataset, RunView};
 use estimation::WheelAngleInterpolator;
 use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
 
+use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
     CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
     MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_COMMON_CLOCK_OFFSET_S,
@@ -107,7 +108,8 @@ struct Profile {
 }
 
 impl Profile {
-    /// Of a run that measures poses often enough; `None` of others, and of one that hardly moves.
+    /// Of a run that measures poses often enough; `None` of others, of one that hardly moves, and of one whose
+    /// log has rows that no wheel makes.
     fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
@@ -118,7 +120,7 @@ impl Profile {
             .filter(|sample| within(sample.t_s))
             .filter_map(|sample| Some((sample.t_s, sample.x_m, sample.y_m, sample.theta_rad()?)))
             .collect();
-        if !run.info().continuous || poses.len() <= MIN_CLOCK_PAIRS {
+        if !run.info().continuous || poses.len() <= MIN_CLOCK_PAIRS || has_outlying_rows(run.run()) {
             return None;
         }
         let stride = poses.len().div_ceil(MAX_CLOCK_PAIRS);

@@ -12,6 +12,7 @@ use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
 use crate::clock_offsets::ClockOffset;
 use crate::document::{UnlistedTerm, Value};
+use crate::geometry_deviations::GeometryDeviation;
 use crate::model_comparison::relative_odds;
 use crate::record_faults::Fault;
 use crate::residual_tests::Checked;
@@ -270,6 +271,22 @@ pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding
     // Logged over true counts: wheels that count twice as often seem half as large.
     let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
     Some(of_causes(vec![cause], 0.0, BTreeMap::from([(size.to_owned(), value)]), Basis::WheelFactor(factor)))
+}
+
+/// Geometry that is not that of the described robot.
+pub(crate) fn of_geometry(deviation: GeometryDeviation, without: &[String]) -> Finding {
+    let ratio_of = |id: &'static str| {
+        let (of, name) = effects::description(id)?.geometry?;
+        (of == deviation.of && !without.iter().any(|out| out == id)).then_some((id, name))
+    };
+    let (cause, parameters) = match CATALOGUE.iter().copied().find_map(ratio_of) {
+        Some((id, name)) => {
+            let value = Value { value: deviation.ratio, sigma: Some(deviation.sigma), unit: "1".to_owned() };
+            (Cause::Effect(id), BTreeMap::from([(name.to_owned(), value)]))
+        }
+        None => (Cause::Unknown, BTreeMap::new()),
+    };
+    of_causes(vec![cause], p_of_chi_square(deviation.chi_square(), 1.0), parameters, Basis::Geometry(deviation))
 }
 
 /// The finding of a clock that is far off.

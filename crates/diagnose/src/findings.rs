@@ -1,12 +1,15 @@
 //! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log;
 //! and the doubts that they cast on each other. [`findings`] lists the stages in their order.
 
+use effects::GeometryRatio;
+
 use crate::carry_over::CarryOver;
 use crate::cause::Doubt;
 use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
+use crate::geometry_deviations::geometry_deviations;
 use crate::mean_structure::MeanStructure;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
@@ -120,7 +123,18 @@ fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
 fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let StageResults { structure, log, spans, faults, without, .. } = *results;
     let wheels = if results.uncorrelated { None } else { wrong_wheels(&structure.base) };
+    let mut deviations = if results.uncorrelated { Vec::new() } else { geometry_deviations(&structure.base) };
+    // Another robot's counts say more than another robot's wheels.
+    deviations.retain(|deviation| wheels.is_none() || deviation.of != GeometryRatio::Wheels);
+    // An effect that is found beside another robot's geometry may be what the geometry is wrong by.
+    if wheels.is_some() || deviations.iter().any(|deviation| !deviation.is_of_skid_steering()) {
+        for finding in findings.iter_mut().filter(|finding| finding.is_sure()) {
+            finding.or_unlisted(1.0, Doubt::OtherGeometry);
+        }
+    }
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
+    let geometry = deviations.into_iter().map(|deviation| finding::of_geometry(deviation, without));
+    let wheels = wheels.into_iter().chain(geometry);
     let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);

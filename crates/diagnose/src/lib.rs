@@ -25,6 +25,7 @@ mod finding;
 mod findings;
 mod fit_cache;
 mod gain;
+mod geometry_deviations;
 mod kinds;
 mod large_errors;
 mod log_rows;

@@ -53,6 +53,11 @@ pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
     Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
 }
 
+/// Whether a run's log has outlying rows: turns over them are none of the robot.
+pub(crate) fn has_outlying_rows(run: &Run) -> bool {
+    of_run(&run.odometry, run.info.continuous).outlying > 0
+}
+
 fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return Rows::default() };
     if !continuous {

@@ -13,8 +13,12 @@ pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
     let candidate = &extended.candidates[index];
     let Candidate::Effect { .. } = candidate else { return true };
     let Some((test, _)) = wald_test(extended, index) else { return false };
-    let scatters = |effect: Effect| scatters_enough(extended, effect.physical().scatter_of_contact_m());
-    effect_of(candidate, &test.estimates).is_some_and(scatters)
+    let is_possible = |effect: Effect| {
+        let effect = effect.physical();
+        scatters_enough(extended, effect.scatter_of_contact_m())
+            && (!effect.needs_row_lengths() || extended.fit.records.go_by_row_lengths())
+    };
+    effect_of(candidate, &test.estimates).is_some_and(is_possible)
 }
 
 /// The effect that a candidate is with some sizes, each with its standard deviation, if there can be one.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
+use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::physical::is_physical;
 use crate::ranking::Entry;
@@ -52,10 +53,12 @@ pub(crate) fn rivals<'a>(
         models
     };
     let mut fits = fit_each(&best_variants);
+    let is_possible =
+        |extended: &AugmentedModel<'_>| is_physical(extended, index) && keeps_wheels(&without.fit, &extended.fit);
     // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
-        fits.iter().filter(is_its).any(|extended| is_physical(extended, index))
+        fits.iter().filter(is_its).any(is_possible)
     };
     contenders.retain(|entry| entry.scored.statistic >= close && !can_be(&fits, entry));
     for variant in 0..MAX_FURTHER_VARIANTS {
@@ -82,7 +85,7 @@ pub(crate) fn rivals<'a>(
     // Unphysical candidates are no causes. Where one explains more than all others, the first of those is
     // doubted.
     let best = named.first().map_or(f64::NEG_INFINITY, |(name, _)| name.log_odds);
-    named.retain(|(_, extended)| is_physical(extended, index));
+    named.retain(|(_, extended)| is_possible(extended));
     if let Some((name, _)) = named.first_mut() {
         name.outdone = best > name.log_odds + log_odds_margin(name.log_odds);
     }

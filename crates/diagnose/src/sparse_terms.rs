@@ -9,6 +9,7 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
+use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{log_bayes_factor, regated};
 use crate::null_distribution::NullDistribution;
 use crate::scan::{Scored, scan};
@@ -191,6 +192,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
         }
         let with = |scored: &Scored| {
             refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
+                .filter(|extended| keeps_wheels(&model.fit, &extended.fit))
         };
         Some(Self {
             model,

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use effects::GeometryRatio;
+
 use crate::alternatives::{Alternative, Status};
 use crate::carry_over::Level;
 use crate::cause::{Basis, Cause, Doubt};
@@ -103,6 +105,9 @@ fn sentence(finding: &Finding) -> String {
             Doubt::TermDoesAsWell => format!("{sentence}; a term that is not in the catalogue explains it as well"),
             Doubt::Incomplete => format!("{sentence}; it does not explain all that is there"),
             Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
+            Doubt::OtherGeometry => {
+                format!("{sentence}; beside a geometry that is not the described robot's, it may be something else")
+            }
             Doubt::FaultyRecords => format!("{sentence}; what is wrong with the records may do the same"),
             Doubt::DoesNotCarryOver => {
                 let why = finding.carry_over.as_ref().map_or("", |of| of.why.as_str());
@@ -147,6 +152,22 @@ fn basis(finding: &Finding) -> String {
         Basis::WheelFactor(factor) => format!(
             "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
         ),
+        Basis::Geometry(deviation) => {
+            let (what, stated) = match deviation.of {
+                GeometryRatio::Wheels => ("calibrated wheels are", "as large as the robot's description says"),
+                GeometryRatio::RightOverLeft => {
+                    ("the right wheel over the left one is", "what the robot's description says")
+                }
+                GeometryRatio::Separation => {
+                    ("the calibrated wheel separation is", "what the robot's description says")
+                }
+            };
+            let why = match deviation.is_of_skid_steering() {
+                true => "as of a robot that skids in turns, or the description is another robot's",
+                false => "the description is another robot's, or the fit is of something else",
+            };
+            format!("{what} {:.2} times {stated}: {why}", deviation.ratio)
+        }
         Basis::ClockOffset(offset_s) => {
             let whose = match finding.runs.as_deref() {
                 None => "all runs".to_owned(),

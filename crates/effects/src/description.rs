@@ -27,8 +27,22 @@ pub struct Description {
     pub goes_by_rows: bool,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
+    /// The ratio of the drive's geometry that it changes, with its size of that meaning; of the geometry that
+    /// every calibration fits only.
+    pub geometry: Option<(GeometryRatio, &'static str)>,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
+}
+
+/// A ratio of the true geometry over the nominal one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GeometryRatio {
+    /// Of both wheels' diameters: their geometric mean.
+    Wheels,
+    /// Of the right wheel's diameter over the left one's.
+    RightOverLeft,
+    /// Of the wheel separation.
+    Separation,
 }
 
 impl Description {
@@ -42,6 +56,7 @@ impl Description {
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
             clock_offset: None,
+            geometry: None,
             benchmark: Benchmark::OF_MEAN,
         }
     }
@@ -183,6 +198,7 @@ mod tests {
             let is_fault = matches!(hypothesis, Hypothesis::Records(_));
             assert!(is_fault || description.record_fault == RecordFault::WITH_A_TRACE, "{id}");
             assert!(!hypothesis.signs().is_empty() || description.isolated_error.is_none(), "{id}");
+            assert_eq!(matches!(hypothesis, Hypothesis::Geometry), description.geometry.is_some(), "{id}");
         }
     }
 }

@@ -131,6 +131,12 @@ pub trait PhysicalEffect {
         Vec::new()
     }
 
+    /// Whether only records can show it whose motions go by the lengths of the log's rows: displacements that
+    /// are measured row by row.
+    fn needs_row_lengths(&self) -> bool {
+        false
+    }
+
     /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is
     /// another than [`Self::from_estimates`] makes of them.
     fn at_scale(values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Self>

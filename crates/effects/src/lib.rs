@@ -29,7 +29,7 @@ mod time_shift;
 pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
 pub use channel::Channel;
 pub use covariate::Covariate;
-pub use description::{Description, Excitation, IsolatedError, RecordFault, Summary};
+pub use description::{Description, Excitation, GeometryRatio, IsolatedError, RecordFault, Summary};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};
@@ -203,6 +203,7 @@ contents! {
     dropped_samples::DroppedSamples,
     counter_wrap::CounterWrap,
     torn_read::TornRead,
+    counter_reset::CounterReset,
     swapped_wheels::SwappedWheels,
     truth_latency::TruthLatency,
     truth_lever_arm::TruthLeverArm,

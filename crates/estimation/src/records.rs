@@ -229,6 +229,13 @@ impl<'a> Records<'a> {
         self
     }
 
+    /// Whether motions were measured row by row of the log: nothing but the lengths of the rows says then how
+    /// long they lasted, where poses have stamps of their own clock.
+    #[must_use]
+    pub fn go_by_row_lengths(&self) -> bool {
+        self.segments.iter().any(Segment::is_displacement)
+    }
+
     /// How many measurements there are.
     #[must_use]
     pub fn measurements(&self) -> usize {

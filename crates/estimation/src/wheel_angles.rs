@@ -5,7 +5,7 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog};
+use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog, row_jitter_s};
 use kinematics::{Count, Twist, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
@@ -46,8 +46,8 @@ pub struct WheelAngleInterpolator<'a> {
     first_rad: Wheels<f64>,
     continuous: bool,
     rates: WheelRates,
-    /// How late each row's stamp is, seconds.
-    late_s: Vec<f64>,
+    /// How late the stamps at the start and at the end of each row's interval are, seconds.
+    late_s: Vec<[f64; 2]>,
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
@@ -98,8 +98,14 @@ impl<'a> WheelAngleInterpolator<'a> {
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         // Of stamps that are exact but for a few, those few are true.
         let beat = if continuous && are_inexact(&odometry.t_s) { SamplingPeriod::of(&odometry.t_s) } else { None };
-        let late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
-        let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
+        let beat_late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
+        let rates = WheelRates::of((&odometry.t_s, &beat_late_s), &turn_rad, quantum_rad, drive, continuous);
+        let late_s = if continuous {
+            beat_late_s.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+        } else {
+            // Which end of a row between gaps is off nobody knows; the length counts.
+            row_jitter_s(&odometry.t_s).into_iter().map(|jitter_s| [-0.5 * jitter_s, 0.5 * jitter_s]).collect()
+        };
         Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })
     }
 
@@ -269,9 +275,8 @@ impl<'a> WheelAngleInterpolator<'a> {
 
     /// How late the stamps are at an instant of a row's interval, seconds.
     fn late_at(&self, row: usize, t_s: f64) -> f64 {
-        let (start, Some(end), Some(next_s)) = (self.late_s[row], self.late_s.get(row + 1), self.t_s.get(row + 1))
-        else {
-            return self.late_s[row];
+        let Some(([start, end], next_s)) = self.late_s.get(row).zip(self.t_s.get(row + 1)) else {
+            return self.late_s.last().map_or(0.0, |[_, end]| *end);
         };
         let share = ((t_s - self.t_s[row]) / (next_s - self.t_s[row])).clamp(0.0, 1.0);
         start + share * (end - start)

@@ -17,7 +17,8 @@ pub struct Interval<'r> {
     /// Length, seconds.
     pub dt_s: f64,
     /// How late the stamps at its start and its end are against the regular beat of the log's rows, seconds;
-    /// between two rows, in proportion.
+    /// between two rows, in proportion. In a log with gaps only their difference has a meaning: by how much
+    /// the row is longer than the usual one, unless by so much that it is true.
     pub late_s: [f64; 2],
     /// Travel of each wheel by its counts and the geometry in force, metres.
     pub travel_m: Wheels<f64>,

@@ -21,6 +21,9 @@ const GROSS: &[Gross] = &[
     ("counter_wrap", &[("bits", 16.0)], 0.0),
     ("torn_read", &[("probability", 0.02), ("jump_counts", 256.0)], 0.0),
     ("torn_read", &[("probability", 0.02), ("jump_counts", 65_536.0)], 0.0),
+    // What a row counted that was never read is known from the rows around, to what a ramp changes it by.
+    ("counter_reset", &[("probability", 0.02), ("persistent", 0.0)], 0.05),
+    ("counter_reset", &[("probability", 0.002), ("persistent", 1.0)], 0.05),
     // What was driven in a gap is not known: at ramps it is guessed from the rows around.
     ("dropped_samples", &[("probability", 0.05)], 0.05),
     ("time_unit", &[("factor", 1e3)], 0.0),

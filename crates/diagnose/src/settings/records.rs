@@ -72,6 +72,18 @@ pub(crate) const MAX_WHEEL_DEVIATION_SIGMAS: f64 = 2.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_SEPARATION_DEVIATION_SIGMAS: f64 = 1.5;
 
+/// Relative. A wheel separation that is calibrated farther from the stated one is a finding.
+/// Convention: as for wheels; effective separations of robots that do not skid are within 2 % of nominal.
+pub(crate) const MAX_SEPARATION_DEVIATION: f64 = 0.1;
+
+/// Ratio. Largest effective wheel separation of a robot that skids in turns over that of its wheels.
+/// Published: multipliers of 1.3 to 2 that users of skid-steered robots set.
+pub(crate) const MAX_SKID_STEERED_SEPARATION: f64 = 2.0;
+
+/// Standard deviations of the estimate. Geometry that is less certainly far from the stated one is no finding.
+/// Convention: five.
+pub(crate) const MIN_DEVIATION_SIGMAS: f64 = 5.0;
+
 /// m/√m. Largest wheel noise of a plausible drive.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_WHEEL_SIGMA_M_PER_SQRT_M: f64 = 0.01;

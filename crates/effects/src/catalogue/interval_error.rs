@@ -1,10 +1,14 @@
 //! `interval_error`: the log's stamps are irregular, and the irregularity is not true.
 //!
 //! Model: a row that is due at t is stamped t + η with η uniform, and read at t + (1 − σ) η: a share σ of the
-//! stamps' irregularity is false.
-//! Signature: an interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω); where speeds
-//! are logged and not counts, by −σξ(v, 0, ω), a negative share.
-//! Observability: a moving robot and an irregular log; measurements between the rows blur it.
+//! stamps' irregularity is false. A negative share is a motion that the row's length makes too long, beside a
+//! displacement that is measured from row to row: speeds that were logged and multiplied by the length, or
+//! counts that are read when the row is stamped beside a displacement of the usual length. At −1 nothing of the
+//! irregularity is in what the instrument measured. Beside poses of a clock of their own there is none: speeds
+//! lead from instant to instant whatever the rows' stamps.
+//! Signature: an interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω).
+//! Observability: a moving robot and an irregular log; measurements between the rows blur it. In a log with
+//! gaps, rows that are longer by far more than the others differ are held to be so in truth.
 //! Alias: wheel noise, but for the slope against ξ.
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
 //! milliseconds.
@@ -13,7 +17,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, HostRobot, Needs};
+use crate::benchmark::{Benchmark, HostRobot, Needs, ParameterValue};
 use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
@@ -24,7 +28,7 @@ use crate::stream::Stream;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalError {
-    /// Share of the irregularity that is false (σ), 0 to 1.
+    /// Share of the irregularity that is false (σ), 0 to 1; to −1 where displacements are measured row by row.
     pub share: f64,
     /// Every stamp is uniform within ± this of its due time, seconds.
     pub jitter_s: f64,
@@ -36,10 +40,14 @@ impl IntervalError {
     pub(crate) const TYPICAL_JITTER_S: f64 = 0.005;
 }
 
+/// A fit may find so much of the irregularity to be false, where there is no more of it than all: the beat is
+/// known from the same stamps, and delays of several rows together are taken for the clock's.
+const MAX_FOUND_SHARE: f64 = 1.5;
+
 impl PhysicalEffect for IntervalError {
     fn check(&self) -> Result<(), EffectError> {
         let id = "interval_error";
-        EffectError::unless((0.0..=1.0).contains(&self.share), id, "share", self.share, "from 0 to 1")?;
+        EffectError::unless((-1.0..=1.0).contains(&self.share), id, "share", self.share, "from -1 to 1")?;
         EffectError::unless_negative(id, [("jitter_s", self.jitter_s)])
     }
 
@@ -66,13 +74,22 @@ impl PhysicalEffect for IntervalError {
         }
     }
 
-    /// A share that was found beyond all of it is all of it; a negative one is of a log of speeds, which the
-    /// simulator does not write.
+    /// A share that was found a little beyond all of it is all of it.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
+        let share = value_of(values, "share").filter(|share| share.abs() <= MAX_FOUND_SHARE)?;
         Some(Self {
-            share: value_of(values, "share")?.min(1.0),
+            share: share.clamp(-1.0, 1.0),
             jitter_s: value_of(values, "jitter_s").unwrap_or(Self::TYPICAL_JITTER_S),
         })
+    }
+
+    /// Counts of a robot beside an instrument with a clock of its own are read before their stamps, not after.
+    fn at_scale(values: &[ParameterValue], _: f64, _: &HostRobot) -> Option<Self> {
+        Self::from_estimates(values).filter(|effect| effect.share >= 0.0)
+    }
+
+    fn needs_row_lengths(&self) -> bool {
+        self.share < 0.0
     }
 
     fn harmless(robot: &HostRobot) -> Option<Self> {
@@ -114,6 +131,12 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        if !interval.run.continuous {
+            // A row between gaps has no neighbours to say how fast the wheels turned at its ends.
+            let longer_s = interval.late_s[1] - interval.late_s[0];
+            gradient[0] = interval.change(interval.speed_m_s.map(|speed_m_s| speed_m_s * longer_s));
+            return;
+        }
         // What a late stamp makes of a travel is gone with the next one: only the ends count.
         let [start_m, end_m] = [0, 1].map(|end| {
             interval.speed_at_ends_m_s[end].map(|speed_m_s| speed_m_s * interval.late_s[end])

@@ -100,7 +100,7 @@ const MAX_ROWS: usize = 2;
 /// are usually an eighth of a jump out of line with their neighbours, and jumps that are not undone, are none
 /// of this fault.
 fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
-    let step = jump as f64;
+    let (step, as_read) = (jump as f64, ticks.to_vec());
     let increment = |k: usize| (ticks[k + 1] - ticks[k]) as f64;
     let last = ticks.len().saturating_sub(1);
     let out_of_line = |k: usize| {
@@ -109,18 +109,20 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
         increment(k) - rate * (t_s[k + 1] - t_s[k])
     };
     let all: Vec<f64> = (0..last).map(out_of_line).collect();
+    let usual = median(all.iter().map(|off| off.abs()).filter(|off| *off > 0.0).collect()).unwrap_or(0.0);
     let typical = median(all.iter().map(|off| off.abs()).collect()).unwrap_or(f64::INFINITY);
     if typical > step / 8.0 {
         return Restored::default();
     }
     let jumps: Vec<f64> = all
-        .into_iter()
+        .iter()
         .map(|off| {
             let jumps = (off / step).round();
             if (off - jumps * step).abs() < step / 4.0 { jumps } else { 0.0 }
         })
         .collect();
     let mut restored = 0;
+    let mut misses = Vec::new();
     let (mut at, mut used, mut first_used) = (0, 0, false);
     while at < last {
         // A wheel that starts or stops is out of line as well, but what a tear does is undone a row or two
@@ -137,9 +139,15 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
             continue;
         }
         first_used |= at == 0;
+        misses.extend(all[at..].iter().zip(jumps).map(|(off, jumps)| (off - jumps * step).abs()));
         restored += put_back(&mut ticks[at + 1..], jumps, jump);
         at += back + 1;
         used = at;
+    }
+    // A byte that is torn leaves just its step; what jumps by about as much is something else.
+    if median(misses).is_some_and(|miss| miss > MAX_MISS_RATIO * usual.max(MIN_MISS_COUNTS)) {
+        ticks.copy_from_slice(&as_read);
+        return Restored::default();
     }
     // Of a log that has torn samples, the first and the last may be torn too; nothing comes before or after
     // to undo them.
@@ -162,6 +170,12 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     }
     Restored { samples: restored, clear: if typical < step / CLEAR_JUMP_RATIO { restored } else { 0 } }
 }
+
+/// Torn samples miss the step of a byte by what increments are out of line usually, and by so many times that
+/// for half of them at the most: tears come in ramps as well.
+const MAX_MISS_RATIO: f64 = 8.0;
+/// Increments are out of line by as much usually at the least, counts: rounding.
+const MIN_MISS_COUNTS: f64 = 1.0;
 
 /// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that
 /// jitter make some that measurement alike.
@@ -242,4 +256,27 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         })
     };
     TORN_STEPS_COUNTS.into_iter().filter_map(without).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jumps_of_about_a_byte_s_step_are_no_torn_byte() {
+        let t_s: Vec<f64> = (0..1500).map(|row| 0.02 * f64::from(row)).collect();
+        let whole: Vec<i64> = (0..1500).map(|row| 46 * row).collect();
+        let rows = [1100, 1150, 1200, 1250, 1300, 1350, 1400, 1450];
+        let mended = |jump: fn(i64) -> i64| {
+            let mut ticks = whole.clone();
+            rows.into_iter().for_each(|row: usize| ticks[row] += jump(ticks[row]));
+            (mend(&t_s, &mut ticks, 1 << 16), ticks)
+        };
+        let (restored, ticks) = mended(|_| 1 << 16);
+        assert_eq!((restored.samples, restored.clear, ticks), (8, 8, whole.clone()));
+        // Counts of 50,600 to 66,700 that read zero, within a quarter of 2¹⁶. Rejects that quarter alone.
+        let (restored, ticks) = mended(|count| -count);
+        assert_eq!(restored, Restored::default());
+        assert!(rows.into_iter().all(|row: usize| ticks[row] == 0), "they stay as they were read");
+    }
 }

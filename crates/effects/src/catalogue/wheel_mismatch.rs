@@ -9,7 +9,7 @@
 use kinematics::{DriveGeometry, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::description::Description;
+use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
 
@@ -40,7 +40,7 @@ impl PhysicalEffect for WheelMismatch {
     }
 
     fn description() -> Description {
-        Description::of("the wheels differ in diameter")
+        Description { geometry: Some((GeometryRatio::RightOverLeft, "right_over_left")), ..Description::of("the wheels differ in diameter") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

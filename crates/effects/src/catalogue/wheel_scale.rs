@@ -10,7 +10,7 @@
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
-use crate::description::Description;
+use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
 
@@ -38,7 +38,7 @@ impl PhysicalEffect for WheelScale {
     }
 
     fn description() -> Description {
-        Description::of("both wheels are larger or smaller than nominal, by one factor")
+        Description { geometry: Some((GeometryRatio::Wheels, "scale")), ..Description::of("both wheels are larger or smaller than nominal, by one factor") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

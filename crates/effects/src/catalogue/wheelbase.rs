@@ -9,7 +9,7 @@
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
-use crate::description::Description;
+use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
 
@@ -35,7 +35,7 @@ impl PhysicalEffect for Wheelbase {
     }
 
     fn description() -> Description {
-        Description::of("the effective wheelbase is larger or smaller than nominal")
+        Description { geometry: Some((GeometryRatio::Separation, "ratio")), ..Description::of("the effective wheelbase is larger or smaller than nominal") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
