@@ -2,9 +2,9 @@
 //!
 //! Drivers read encoders by a timer and stamp them when a scheduler, a bus or a receiver gets to it. Rows
 //! have numbers on the beat: one more from row to row, more where rows were lost, the same where a row came
-//! by itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts itself,
-//! and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each path with
-//! its own idea of how late rows usually are, so that a clock need not keep one beat all day.
+//! by itself. A lost row shifts all later stamps against the count of rows for good; a late one shifts
+//! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
+//! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
 use std::collections::HashMap;
 
@@ -192,8 +192,8 @@ fn step_cost(ticks: i64) -> f64 {
     }
 }
 
-/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows; by
-/// all gaps where rows come in bunches.
+/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows;
+/// by all gaps where rows come in bunches.
 fn jitter(t_s: &[f64], period_s: f64) -> f64 {
     let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
     // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
@@ -369,8 +369,9 @@ mod tests {
 
     #[test]
     fn lost_rows_are_counted_among_stamps_that_jitter() {
-        // A fifth of the beat. A lost row and a late one look alike until the next stamps: a wrong number costs
-        // two wrong steps, and one row in a hundred is later than two standard deviations beside a lost one.
+        // A fifth of the beat. A lost row and a late one look alike until the next stamps: a wrong number
+        // costs two wrong steps, and one row in a hundred is later than two standard deviations beside a lost
+        // one.
         let all = stamps(3000, 0.03, |draws| 2e-3 * draws.normal());
         // Rejects numbers by the rounding of each gap, which are wrong for 0.012 of the rows.
         assert!(wrong_steps(&all) < 3e-3, "{}", wrong_steps(&all));

@@ -63,9 +63,9 @@ fn grown<'a>(
     None
 }
 
-/// The model without the effects that only cancel each other: two that were found in the place of a third stay
-/// significant beside it, each given the other. Of all subsets of the effects, the smallest that the log Bayes
-/// factor does not discriminate from the best.
+/// The model without the effects that only cancel each other: two that were found in the place of a third
+/// stay significant beside it, each given the other. Of all subsets of the effects, the smallest that the log
+/// Bayes factor does not discriminate from the best.
 fn without_what_cancels<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     model: AugmentedModel<'a>,

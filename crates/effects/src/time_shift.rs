@@ -1,6 +1,6 @@
-//! How a robot moved from one instant to a later one, for terms whose measurements are of another instant than
-//! their stamp says: its recorded motion where that instant is past, its speed and acceleration on where it is
-//! not recorded yet.
+//! How a robot moved from one instant to a later one, for terms whose measurements are of another instant
+//! than their stamp says: its recorded motion where that instant is past, its speed and acceleration on where
+//! it is not recorded yet.
 
 use std::collections::VecDeque;
 
@@ -37,8 +37,8 @@ impl TimeShift {
         }
     }
 
-    /// What the instrument sees in place of the robot of the stamp where it sees that of `ago_s` before, or of
-    /// a later instant where that is negative: a pose in the frame of the stamp's.
+    /// What the instrument sees in place of the robot of the stamp where it sees that of `ago_s` before, or
+    /// of a later instant where that is negative: a pose in the frame of the stamp's.
     pub(crate) fn seen(&self, measurement: &Measurement<'_>, ago_s: f64) -> Pose {
         let ago_s = ago_s.clamp(-LONGEST_S, LONGEST_S);
         let now = (measurement.t_s, measurement.twist);

@@ -359,8 +359,8 @@ mod tests {
 
     #[test]
     fn rows_of_one_number_on_the_beat_have_rates() {
-        // Stamps that jitter by 2 ms and a quarter of them by 8, none of it true: beats are missed, and rows are
-        // due at once.
+        // Stamps that jitter by 2 ms and a quarter of them by 8, none of it true: beats are missed, and rows
+        // are due at once.
         let draws = (0..400_u32).map(|row| f64::from(row.wrapping_mul(2_654_435_761) >> 16) / 65_536.0);
         let t_s: Vec<f64> = draws
             .enumerate()

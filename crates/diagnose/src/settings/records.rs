@@ -76,7 +76,8 @@ pub(crate) const MAX_SEPARATION_DEVIATION: f64 = 0.1;
 /// Published: multipliers of 1.3 to 2 that users of skid-steered robots set.
 pub(crate) const MAX_SKID_STEERED_SEPARATION: f64 = 2.0;
 
-/// Standard deviations of the estimate. Geometry that is less certainly far from the stated one is no finding.
+/// Standard deviations of the estimate. Geometry that is less certainly far from the stated one is no
+/// finding.
 /// Convention: five.
 pub(crate) const MIN_DEVIATION_SIGMAS: f64 = 5.0;
 
@@ -98,8 +99,8 @@ pub(crate) const UNCORRELATED_NOISE_FACTOR: f64 = 3.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const UNCORRELATED_MEASUREMENT_SIGMA: f64 = 0.3;
 
-/// Relative standard deviation. Where all measurements together determine both wheels' sizes better than this,
-/// odometry is correlated with them however imprecise single ones are.
+/// Relative standard deviation. Where all measurements together determine both wheels' sizes better than
+/// this, odometry is correlated with them however imprecise single ones are.
 /// Budgeted: by accident wheels that do not move the robot are as large as stated to 2 % once in fifty times.
 pub(crate) const MAX_CORRELATED_WHEEL_SIGMA: f64 = 0.02;
 

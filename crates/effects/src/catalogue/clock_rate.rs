@@ -70,8 +70,8 @@ impl Forward for State {
     }
 }
 
-/// The motion from the stamp on to the instant by the true clock, over the rate: its twist times the time since
-/// the run's start where there is none yet.
+/// The motion from the stamp on to the instant by the true clock, over the rate: its twist times the time
+/// since the run's start where there is none yet.
 #[derive(Clone, Default)]
 struct Term {
     rate: f64,
