@@ -90,8 +90,8 @@ impl Draws {
     }
 }
 
-/// Speeds row by row of a log with gaps, beside displacements that last as long as the rows but for a share of
-/// what these differ by. One row in a hundred is longer by far, in truth.
+/// Speeds row by row of a log with gaps, beside displacements that last as long as the rows but for a share
+/// of what these differ by. One row in a hundred is longer by far, in truth.
 fn of_speeds(false_share: f64) -> Dataset {
     let robot = NominalRobot {
         left_wheel_diameter_m: 0.041,
@@ -153,8 +153,8 @@ fn a_khepera_has_rows_of_false_length_and_wheels_of_its_published_size() {
     let imported = importer.read(&folder.join("l90.tuple")).expect("a log").remove(0);
     let document = diagnosed(&imported.dataset);
     let found = document.findings.iter().find(|finding| finding.names[0] == "interval_error").expect("it is named");
-    // Its displacements by least squares, rows that are 20 ms too long or short set aside, give −0.95; half of
-    // the displacements are left here, and 0.1 is a little more than a standard deviation of theirs.
+    // Its displacements by least squares, rows that are 20 ms too long or short set aside, give −0.95; half
+    // of the displacements are left here, and 0.1 is a little more than a standard deviation of theirs.
     let share = found.parameters["share"].value;
     assert!((share + 0.95).abs() < 0.1, "{share}");
     // At one speed a loss per second is as good as smaller wheels: 23 mm of 41.

@@ -5,15 +5,15 @@
 
 /// Rows from which on there is a usual length.
 const MIN_ROWS: usize = 24;
-/// Share of the rows whose lengths depart by jitter alone, at the least. The median would not do: lengths often
-/// come in two sorts, of which the more frequent hardly departs.
+/// Share of the rows whose lengths depart by jitter alone, at the least. The median would not do: lengths
+/// often come in two sorts, of which the more frequent hardly departs.
 const JITTER_SHARE: f64 = 0.9;
 /// Departures beyond so many times that quantile are true: 4.9 standard deviations of normal lengths.
 const MAX_JITTER_RATIO: f64 = 3.0;
 
-/// For each row but the first, by how much it is longer than the usual one, seconds. What departs by more than
-/// the others' jitter is true, and its jitter is against the rows that depart by about as much; 0 where there
-/// are none, and of rows too few to say.
+/// For each row but the first, by how much it is longer than the usual one, seconds. What departs by more
+/// than the others' jitter is true, and its jitter is against the rows that depart by about as much; 0 where
+/// there are none, and of rows too few to say.
 #[must_use]
 pub fn row_jitter_s(t_s: &[f64]) -> Vec<f64> {
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();

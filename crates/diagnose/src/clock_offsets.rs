@@ -108,8 +108,8 @@ struct Profile {
 }
 
 impl Profile {
-    /// Of a run that measures poses often enough; `None` of others, of one that hardly moves, and of one whose
-    /// log has rows that no wheel makes.
+    /// Of a run that measures poses often enough; `None` of others, of one that hardly moves, and of one
+    /// whose log has rows that no wheel makes.
     fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);

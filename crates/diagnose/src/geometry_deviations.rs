@@ -23,7 +23,8 @@ impl GeometryDeviation {
         (self.ratio.ln() * self.ratio / self.sigma).powi(2)
     }
 
-    /// Whether a robot whose wheels skid in turns has it: its effective separation is larger than the wheels'.
+    /// Whether a robot whose wheels skid in turns has it: its effective separation is larger than the
+    /// wheels'.
     pub(crate) fn is_of_skid_steering(&self) -> bool {
         self.of == GeometryRatio::Separation && (1.0..=MAX_SKID_STEERED_SEPARATION).contains(&self.ratio)
     }
@@ -62,9 +63,9 @@ pub(crate) fn geometry_deviations(fit: &ModelFit<'_>) -> Vec<GeometryDeviation> 
     .collect()
 }
 
-/// Whether an effect leaves the wheels as large as a robot of the description may have them, or no farther off
-/// than they are without it: with one of which wheels and effect are determined together alone, as a loss per
-/// second at a single speed, neither is.
+/// Whether an effect leaves the wheels as large as a robot of the description may have them, or no farther
+/// off than they are without it: with one of which wheels and effect are determined together alone, as a loss
+/// per second at a single speed, neither is.
 pub(crate) fn keeps_wheels(without: &ModelFit<'_>, with: &ModelFit<'_>) -> bool {
     let limit = (MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA).ln_1p();
     let off = |fit: &ModelFit<'_>| {

@@ -80,7 +80,8 @@ pub(crate) const MAX_SEPARATION_DEVIATION: f64 = 0.1;
 /// Published: multipliers of 1.3 to 2 that users of skid-steered robots set.
 pub(crate) const MAX_SKID_STEERED_SEPARATION: f64 = 2.0;
 
-/// Standard deviations of the estimate. Geometry that is less certainly far from the stated one is no finding.
+/// Standard deviations of the estimate. Geometry that is less certainly far from the stated one is no
+/// finding.
 /// Convention: five.
 pub(crate) const MIN_DEVIATION_SIGMAS: f64 = 5.0;
 

@@ -1,7 +1,7 @@
 //! `counter_reset`: a counter reads zero, for a row or from then on.
 //!
-//! Model: with some probability a counter's register is cleared between two rows. It reads zero in one row and
-//! comes back in the next, or it counts on from zero.
+//! Model: with some probability a counter's register is cleared between two rows. It reads zero in one row
+//! and comes back in the next, or it counts on from zero.
 //! Signature: a row of zero among large counts; or a jump to about zero from which the counts go on. A gross
 //! fault, tried before any fit: the records without it have such rows between their neighbours, or the counts
 //! carried on.
@@ -110,8 +110,8 @@ const MAX_ROWS: usize = 2;
 /// and counts of a wheel that sets off.
 const FAR_INCREMENTS: f64 = 4.0;
 const FAR_COUNTS: f64 = 16.0;
-/// A counter comes back to where it was if it counts no more meanwhile than this share of it; one that counts on
-/// from zero has lost all of it.
+/// A counter comes back to where it was if it counts no more meanwhile than this share of it; one that counts
+/// on from zero has lost all of it.
 const MAX_COUNTED_SHARE: f64 = 0.5;
 /// Widths of counters whose end is no reset, bits.
 const WRAP_BITS: [u32; 4] = [8, 16, 24, 32];
@@ -130,8 +130,8 @@ impl<'c> Rates<'c> {
         Self { t_s, increments }
     }
 
-    /// What the wheel may count from a row to the next, by the increments around it but the two largest: it may
-    /// set off there, and a reset is one of them.
+    /// What the wheel may count from a row to the next, by the increments around it but the two largest: it
+    /// may set off there, and a reset is one of them.
     fn may_count(&self, row: usize) -> f64 {
         let near = row.saturating_sub(NEIGHBOUR_ROWS)..(row + NEIGHBOUR_ROWS + 1).min(self.increments.len());
         let mut sizes: Vec<f64> = near.map(|k| self.increments[k].abs()).collect();

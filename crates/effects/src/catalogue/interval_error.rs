@@ -3,9 +3,9 @@
 //! Model: a row that is due at t is stamped t + η with η uniform, and read at t + (1 − σ) η: a share σ of the
 //! stamps' irregularity is false. A negative share is a motion that the row's length makes too long, beside a
 //! displacement that is measured from row to row: speeds that were logged and multiplied by the length, or
-//! counts that are read when the row is stamped beside a displacement of the usual length. At −1 nothing of the
-//! irregularity is in what the instrument measured. Beside poses of a clock of their own there is none: speeds
-//! lead from instant to instant whatever the rows' stamps.
+//! counts that are read when the row is stamped beside a displacement of the usual length. At −1 nothing of
+//! the irregularity is in what the instrument measured. Beside poses of a clock of their own there is none:
+//! speeds lead from instant to instant whatever the rows' stamps.
 //! Signature: an interval whose length departs from the usual one by ξ is off by σξ(v, 0, ω).
 //! Observability: a moving robot and an irregular log; measurements between the rows blur it. In a log with
 //! gaps, rows that are longer by far more than the others differ are held to be so in truth.
@@ -28,7 +28,8 @@ use crate::stream::Stream;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalError {
-    /// Share of the irregularity that is false (σ), 0 to 1; to −1 where displacements are measured row by row.
+    /// Share of the irregularity that is false (σ), 0 to 1; to −1 where displacements are measured row by
+    /// row.
     pub share: f64,
     /// Every stamp is uniform within ± this of its due time, seconds.
     pub jitter_s: f64,
@@ -83,7 +84,8 @@ impl PhysicalEffect for IntervalError {
         })
     }
 
-    /// Counts of a robot beside an instrument with a clock of its own are read before their stamps, not after.
+    /// Counts of a robot beside an instrument with a clock of its own are read before their stamps, not
+    /// after.
     fn at_scale(values: &[ParameterValue], _: f64, _: &HostRobot) -> Option<Self> {
         Self::from_estimates(values).filter(|effect| effect.share >= 0.0)
     }
