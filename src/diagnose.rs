@@ -58,7 +58,7 @@ fn reservations(document: &Document) -> String {
             Some(false) => "is left out, as it does not carry over",
             None => "may not carry over to other sessions and kinds of path",
         };
-        finding.of_the_mean.then(|| format!("# {} {what}: {}\n", finding.id, finding.carries_over_why))
+        finding.of_the_mean.then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), finding.carries_over_why))
     };
     document.findings.iter().filter_map(of).collect()
 }
