@@ -19,8 +19,8 @@ fn shape(turns_rad: impl Fn(u32) -> Wheels<f64>) -> PathShape {
 
 #[test]
 fn a_path_is_measured_along_and_in_its_turns() {
-    // Wheels of 0.08 m: 0.2 m a row along, 0.08 m of one wheel beyond the other. Not exact to the last place, as
-    // twelve rows are summed.
+    // Wheels of 0.08 m: 0.2 m a row along, 0.08 m of one wheel beyond the other. Not exact to the last
+    // place, as twelve rows are summed.
     let circle = shape(|_| Wheels { left: 2.0, right: 3.0 });
     assert!((circle.distance_m - 2.4).abs() < 1e-9 && (circle.turn_travel_m - 0.48).abs() < 1e-9, "{circle:?}");
     assert!((circle.net_turn_share - 1.0).abs() < 1e-9 && circle.curvature_spread < 1e-6, "{circle:?}");
