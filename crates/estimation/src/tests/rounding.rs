@@ -73,75 +73,28 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
     }
 }
 
-/// Counts stand while a robot is measured n times: what that says of the pose that its counts stand for is no
-/// better than a count. By hand: P = Q = R = 1, n = 2: P − P²/(P + Q + R/n) = 0.6, and z⁺ = ȳ·P/(P + Q +
-/// R/n).
-#[test]
-fn a_standstill_does_not_average_rounding_out() {
-    use crate::covariances::{Covariance, Covariances};
-    use crate::derivatives::Derivatives;
-    use crate::filter_state::FilterState;
-    use crate::rounding::Rounding;
-    use nalgebra::{Matrix3, Vector3};
-
-    // Along the robot alone: a base so wide that its heading knows no rounding.
-    let model = Model { m_per_rad: Wheels::both(1.0), separation_m: 1e9, ..MODEL };
-    // Of the centre, a quarter of both wheels' q²/12.
-    let quantum_rad = Wheels::both(24_f64.sqrt());
-    let mut rounding = Rounding::new(quantum_rad, 1);
-    let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(1));
-    by.set(0, Vector3::new(1.0, 0.0, 0.0));
-    let mut covariance = Covariance::of([&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-9))]);
-    let mut covariance_by = Covariances::ZERO;
-    let mut pose_by_noise = [[0.0; 4]; 3];
-    for measured in [2.0, 4.0] {
-        let mut state = FilterState {
-            pose: &mut pose,
-            covariance: &mut covariance,
-            by: &mut by,
-            covariance_by: &mut covariance_by,
-            pose_by_noise: &mut pose_by_noise,
-        };
-        rounding.enter(&mut state, [1.0, 1.0], Wheels::both(0.0), &model);
-        let (h, v) = (Vector3::x(), measured - pose.x_m);
-        let ph = Vector3::from(covariance.along(&h).map(|[along]| along));
-        let gain = ph / (h.dot(&ph) + 1.0);
-        covariance.lower(&gain, &ph);
-        by.add(gain, &[-by.x[0]]);
-        pose.x_m += gain.x * v;
-    }
-    let mut state = FilterState {
-        pose: &mut pose,
-        covariance: &mut covariance,
-        by: &mut by,
-        covariance_by: &mut covariance_by,
-        pose_by_noise: &mut pose_by_noise,
-    };
-    rounding.leave(&mut state, false);
-    // Rejects rounding that is new at each measurement, 1 − 1/(1 + 2/2) = 0.5, and none at all, 1/3.
-    assert!((covariance.matrix(0)[(0, 0)] - 0.6).abs() < 1e-12, "{}", covariance.matrix(0));
-    assert!((pose.x_m - 3.0 / 2.5).abs() < 1e-12 && (by.x[0] - 0.6).abs() < 1e-12, "{} {}", pose.x_m, by.x[0]);
-}
-
-/// A robot that goes on within a row takes the error of that row along, and what the counts say of it goes on
-/// as far.
-#[test]
-fn a_rows_error_goes_along_with_the_robot() {
+/// Where a robot is by its counts, the variance of that, and its derivative by a parameter that moves it by as
+/// much, once it was measured twice within a row with an error of 1: each time after going on so far.
+/// Everything is along the robot: P = Q = R = 1.
+fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
     use crate::covariances::{Covariance, Covariances};
     use crate::derivatives::Derivatives;
     use crate::filter_state::{FilterState, Step};
     use crate::rounding::Rounding;
     use nalgebra::{Matrix3, Vector3};
 
+    // A base so wide that its heading knows no rounding.
     let model = Model { m_per_rad: Wheels::both(1.0), separation_m: 1e9, ..MODEL };
-    let mut rounding = Rounding::new(Wheels::both(24_f64.sqrt()), 8);
-    let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(8));
+    let columns = Column::BASE.len();
+    // Of the centre, a quarter of both wheels' q²/12.
+    let mut rounding = Rounding::new(Wheels::both(24_f64.sqrt()), columns);
+    let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(columns));
+    by.set(0, Vector3::new(1.0, 0.0, 0.0));
     let mut covariance = Covariance::of([&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-9))]);
     let mut covariance_by = Covariances::ZERO;
     let mut pose_by_noise = [[0.0; 4]; 3];
     let none = Derivatives::zeros(0);
-    // Measured at 2, then 7 after five metres: the same as two measurements of 2 at the first place.
-    for (moved_m, measured) in [(0.0, 2.0), (5.0, 7.0)] {
+    let mut on_state = |of: &mut dyn FnMut(&mut Rounding, &mut FilterState<'_>)| {
         let mut state = FilterState {
             pose: &mut pose,
             covariance: &mut covariance,
@@ -149,6 +102,9 @@ fn a_rows_error_goes_along_with_the_robot() {
             covariance_by: &mut covariance_by,
             pose_by_noise: &mut pose_by_noise,
         };
+        of(&mut rounding, &mut state);
+    };
+    for (moved_m, measured) in moved_and_measured {
         let step = Step {
             motion: Pose::new(moved_m, 0.0, 0.0),
             by_geometry: [Vector3::zeros(); 3],
@@ -157,24 +113,40 @@ fn a_rows_error_goes_along_with_the_robot() {
             variance: [0.0; 2],
             noise_score: false,
         };
-        rounding.advance(&step);
-        state.advance(&step);
-        rounding.enter(&mut state, [1.0, 1.0], Wheels::both(0.0), &model);
-        let (h, v) = (Vector3::x(), measured - pose.x_m);
-        let ph = Vector3::from(covariance.along(&h).map(|[along]| along));
-        let gain = ph / (h.dot(&ph) + 1.0);
-        covariance.lower(&gain, &ph);
-        pose.x_m += gain.x * v;
+        on_state(&mut |rounding, state| {
+            rounding.advance(&step);
+            state.advance(&step);
+            rounding.enter(state, [1.0, 1.0], Wheels::both(0.0), &model);
+            let (h, v) = (Vector3::x(), measured - state.pose.x_m);
+            let ph = Vector3::from(state.covariance.along(&h).map(|[along]| along));
+            let gain = ph / (h.dot(&ph) + 1.0);
+            state.covariance.lower(&gain, &ph);
+            let by: Vec<f64> = state.by.x.iter().map(|by| -by).collect();
+            state.by.add(gain, &by);
+            state.pose.x_m += gain.x * v;
+        });
     }
-    let mut state = FilterState {
-        pose: &mut pose,
-        covariance: &mut covariance,
-        by: &mut by,
-        covariance_by: &mut covariance_by,
-        pose_by_noise: &mut pose_by_noise,
-    };
-    rounding.leave(&mut state, false);
-    // As above: z⁺ = 5 + ȳ P/(P + Q + R/2). Rejects counts that stay where they were: 0.4 of five metres.
-    assert!((pose.x_m - (5.0 + 2.0 / 2.5)).abs() < 1e-6, "{}", pose.x_m);
-    assert!((covariance.matrix(0)[(0, 0)] - 0.6).abs() < 1e-6, "{}", covariance.matrix(0));
+    on_state(&mut |rounding, state| rounding.leave(state, false));
+    [pose.x_m, covariance.matrix(0)[(0, 0)], by.x[0]]
+}
+
+/// Counts stand while a robot is measured n times: what that says of the pose that its counts stand for is no
+/// better than a count. By hand for n = 2: P − P²/(P + Q + R/n) = 0.6, and z⁺ = ȳ·P/(P + Q + R/n).
+#[test]
+fn a_standstill_does_not_average_rounding_out() {
+    let [x_m, variance, by] = measured_twice([(0.0, 2.0), (0.0, 4.0)]);
+    // Rejects rounding that is new at each measurement, 1 − 1/(1 + 2/2) = 0.5, and none at all, 1/3.
+    assert!((variance - 0.6).abs() < 1e-12, "{variance}");
+    assert!((x_m - 3.0 / 2.5).abs() < 1e-12 && (by - 0.6).abs() < 1e-12, "{x_m} {by}");
+}
+
+/// A robot that goes on within a row takes the error of that row along, and what the counts say of it goes on
+/// as far.
+#[test]
+fn a_rows_error_goes_along_with_the_robot() {
+    // Measured at 2, then at 7 after five metres: as two measurements of 2 at the first place.
+    let [x_m, variance, _] = measured_twice([(0.0, 2.0), (5.0, 7.0)]);
+    // Rejects counts that stay where they were: 0.4 of five metres. The heading's variance of 1e-9 adds its
+    // 25-fold across.
+    assert!((x_m - (5.0 + 2.0 / 2.5)).abs() < 1e-6 && (variance - 0.6).abs() < 1e-6, "{x_m} {variance}");
 }
