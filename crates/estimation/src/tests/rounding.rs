@@ -73,8 +73,8 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
     }
 }
 
-/// Where a robot is by its counts, the variance of that, and its derivative by a parameter that moves it by as
-/// much, once it was measured twice within a row with an error of 1: each time after going on so far.
+/// Where a robot is by its counts, the variance of that, and its derivative by a parameter that moves it by
+/// as much, once it was measured twice within a row with an error of 1: each time after going on so far.
 /// Everything is along the robot: P = Q = R = 1.
 fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
     use crate::covariances::{Covariance, Covariances};
