@@ -9,7 +9,7 @@
 //! exactly when a/b > ½: the contrast a − ½ b decides. A unit is asked where the others determine b, and
 //! where a = b would show.
 //!
-//! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979; Cochran 1954 (Q).
+//! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use crate::settings::carry_over::{
     MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
 };
 use crate::settings::levels::MIN_RUNS;
-use crate::statistics::{holm, p_of_chi_square, p_of_z};
+use crate::statistics::{holm, p_of_z};
 
 /// What is a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,8 +84,6 @@ impl Units {
 pub(crate) struct SizesByUnit {
     level: Level,
     units: Vec<UnitShare>,
-    /// p-value of units that differ by as much, were they alike.
-    pub(crate) p_of_differing: f64,
 }
 
 /// One unit's share, and how it stands against the others.
@@ -227,20 +225,7 @@ fn sizes_by_unit(model: &AugmentedModel<'_>, candidate: usize, units: &Units, le
         .enumerate()
         .map(|(unit, name)| UnitShare { name: name.clone(), own: share(unit), contrast: contrast(unit) })
         .collect();
-    let known: Vec<(f64, f64)> = of_units.iter().filter_map(|unit| unit.own).collect();
-    Some(SizesByUnit { level, units: of_units, p_of_differing: p_of_differing(&known) })
-}
-
-/// Cochran's Q of values with their standard deviations.
-fn p_of_differing(values: &[(f64, f64)]) -> f64 {
-    if values.len() < 2 {
-        return 1.0;
-    }
-    let weight = |sigma: f64| sigma.powi(-2);
-    let total: f64 = values.iter().map(|(_, sigma)| weight(*sigma)).sum();
-    let mean = values.iter().map(|(value, sigma)| weight(*sigma) * value).sum::<f64>() / total;
-    let q: f64 = values.iter().map(|(value, sigma)| weight(*sigma) * (value - mean).powi(2)).sum();
-    p_of_chi_square(q, values.len() as f64 - 1.0)
+    Some(SizesByUnit { level, units: of_units })
 }
 
 /// The runs' normal equations by the columns that all units share, and along the size found of one candidate.
@@ -319,7 +304,7 @@ mod tests {
     }
 
     fn sessions(units: Vec<UnitShare>) -> SizesByUnit {
-        SizesByUnit { level: Level::Session, units, p_of_differing: 1.0 }
+        SizesByUnit { level: Level::Session, units }
     }
 
     #[test]
@@ -353,12 +338,5 @@ mod tests {
         // The ridge changes them by 1e-11.
         assert!((shares[0] - 1.5).abs() < 1e-9 && (shares[1] - 0.5).abs() < 1e-9, "{shares}");
         assert!((covariance[(0, 0)] - 0.25).abs() < 1e-9 && covariance[(0, 1)].abs() < 1e-9, "{covariance}");
-    }
-
-    #[test]
-    fn units_that_differ_are_told_by_q() {
-        // 1 ± 0.1 and 0 ± 0.1: Q = 50 with one degree of freedom. Rejects unweighted squares, 0.5.
-        assert!((p_of_differing(&[(1.0, 0.1), (0.0, 0.1)]) / p_of_chi_square(50.0, 1.0) - 1.0).abs() < 1e-9);
-        assert_eq!(p_of_differing(&[(1.0, 0.1)]), 1.0);
     }
 }

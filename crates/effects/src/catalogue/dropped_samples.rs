@@ -8,7 +8,7 @@
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{SamplingPeriod, Dataset, Odometry, WheelLog};
+use dataset::{Dataset, Odometry, SamplingPeriod, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
