@@ -5,11 +5,11 @@
 //! campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis ordinary_logs -- --nocapture`.
 #![allow(clippy::print_stdout)] // every case with its seed
 
-use diagnose::{Document, Options, diagnose};
+use diagnose::{Document, Finding, Options, diagnose};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::plain_robot::{PlainRobot, Reports, Stamps};
+use crate::plain_robot::{Event, PlainRobot, Reports, Stamps};
 
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -146,6 +146,63 @@ fn what_is_wrong_is_named_and_nothing_else() {
         println!("{} {fault}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
         if !is_right {
             complaints.push(format!("{fault}, seed {seed}"));
+        }
+    }
+    assert!(complaints.is_empty(), "{complaints:#?}");
+}
+
+/// What does not belong, the run in which it happens, and the causes that are right.
+const EVENTS: &[(&str, Change, &[&str])] = &[
+    (
+        "pushed aside by 0.2 m",
+        |of| of.events = vec![(5, Event::Pushed { from_s: 4.0, for_s: 0.5, by: [0.12, -0.15, 0.3] })],
+        &["robot_displaced"],
+    ),
+    ("lifted for 2 s", |of| of.events = vec![(5, Event::Lifted { from_s: 3.0, for_s: 2.0 })], &["robot_displaced"]),
+    (
+        "the frame jumps by 0.3 m",
+        |of| of.events = vec![(5, Event::FrameJump { at_s: 5.0, by: [0.2, 0.25, 0.1] })],
+        &["truth_jump"],
+    ),
+    (
+        "frames jump by 0.1 m in four runs",
+        |of| {
+            let jump = |at_s, by| Event::FrameJump { at_s, by };
+            of.events = vec![
+                (2, jump(5.0, [0.08, 0.06, -0.05])),
+                (6, jump(3.0, [-0.1, 0.02, 0.05])),
+                (9, jump(6.0, [0.05, -0.12, 0.02])),
+                (11, jump(4.0, [0.07, 0.07, 0.0])),
+            ];
+        },
+        &["truth_jump", "robot_displaced"],
+    ),
+    (
+        "a marker put on otherwise",
+        |of| of.events = vec![(7, Event::OtherMarker { at: [0.01, 0.02, 0.12] })],
+        &["truth_yaw", "truth_lever_arm"],
+    ),
+];
+
+#[test]
+fn what_happens_in_single_runs_is_named_with_them_and_nothing_else_is_found() {
+    let of_kind = std::env::var("YAIR_KIND").unwrap_or_default();
+    let events = EVENTS.iter().filter(|(event, ..)| event.contains(&of_kind));
+    let events: Vec<_> = events.map(|(event, change, ids)| ((*event, *ids), *change)).collect();
+    let mut complaints = Vec::new();
+    for (event, seed, found) in diagnosed_all(&events) {
+        let (event, ids) = event;
+        let is_right = found.as_ref().is_ok_and(|document| {
+            let is_of_runs = |finding: &Finding| finding.runs.is_some() && ids.contains(&finding.names[0].as_str());
+            !document.findings.is_empty() && document.findings.iter().all(is_of_runs)
+        });
+        let shown = found.as_ref().map_or_else(
+            |error| vec![error.clone()],
+            |document| [shown(document), document.findings.iter().map(|of| of.sentence.clone()).collect()].concat(),
+        );
+        println!("{} {event}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
+        if !is_right {
+            complaints.push(format!("{event}, seed {seed}"));
         }
     }
     assert!(complaints.is_empty(), "{complaints:#?}");

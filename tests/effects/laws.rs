@@ -56,6 +56,12 @@ const SPECIMENS: &[[&str; 4]] = &[
         "stick_speed_m_s = 0.1, breakaway_m = -2e-3",
     ],
     ["bumps", "per_m = 0.0, height_m = 0.01", "per_m = 5.0, height_m = 0.01", "per_m = -1.0, height_m = 0.01"],
+    [
+        "robot_displaced",
+        "rate_hz = 0.0, duration_s = 0.5, distance_m = 0.1, turn_rad = 0.1",
+        "rate_hz = 0.5, duration_s = 0.5, distance_m = 0.1, turn_rad = 0.1",
+        "rate_hz = 0.5, duration_s = 0.0, distance_m = 0.1, turn_rad = 0.1",
+    ],
     ["turn_rate_wheelbase", "beta_s = 0.0", "beta_s = 0.02", "beta_s = nan"],
     ["lateral_skid", "skid_s = 0.0", "skid_s = 0.02", "skid_s = nan"],
     [
@@ -121,6 +127,12 @@ const SPECIMENS: &[[&str; 4]] = &[
         "probability = 0.0, jump_m = 0.05, jump_rad = 0.1",
         "probability = 1.0, jump_m = 0.05, jump_rad = 0.1",
         "probability = 1.5, jump_m = 0.05, jump_rad = 0.1",
+    ],
+    [
+        "truth_jump",
+        "rate_hz = 0.0, jump_m = 0.1, jump_rad = 0.1",
+        "rate_hz = 5.0, jump_m = 0.1, jump_rad = 0.1",
+        "rate_hz = -1.0, jump_m = 0.1, jump_rad = 0.1",
     ],
 ];
 
@@ -196,7 +208,7 @@ fn every_effect_has_a_specimen() {
 }
 
 /// The names that datasets, scenarios and findings use: what makes real wheel odometry deviate, by kind.
-const NAMES: [&[&str]; 8] = [
+const NAMES: [&[&str]; 9] = [
     &["wheel_scale", "wheel_mismatch", "wheelbase"],
     &[
         "swapped_wheels",
@@ -237,6 +249,7 @@ const NAMES: [&[&str]; 8] = [
         "truth_correlated_noise",
     ],
     &["thermal_drift", "wear"],
+    &["robot_displaced", "truth_jump"],
 ];
 
 #[test]
@@ -247,16 +260,23 @@ fn the_catalogue_is_whole_and_every_effect_says_how_data_show_it() {
     catalogue.sort_unstable();
     assert_eq!(catalogue, names);
     for id in CATALOGUE {
-        let [geometry, gross, .., noise, _, _] = NAMES;
+        let [geometry, gross, .., noise, _, _, displaced] = NAMES;
         let is = match effects::hypothesis(id).expect("in the catalogue") {
             Hypothesis::Geometry => geometry.contains(id),
             Hypothesis::Records(_) => gross.contains(id),
             Hypothesis::Silent => noise.contains(id),
-            Hypothesis::Terms(variants) => !variants.is_empty() && ![geometry, gross, noise].concat().contains(id),
-            Hypothesis::TermsAndScatter(variants, signs) => {
-                !variants.is_empty() && !signs.is_empty() && ![geometry, gross, noise].concat().contains(id)
+            Hypothesis::UnknownMotion { is_of_instrument } => {
+                displaced.contains(id) && is_of_instrument == id.starts_with("truth")
             }
-            Hypothesis::Scatter(signs) => !signs.is_empty() && ![geometry, gross, noise].concat().contains(id),
+            Hypothesis::Terms(variants) => {
+                !variants.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
+            }
+            Hypothesis::TermsAndScatter(variants, signs) => {
+                !variants.is_empty() && !signs.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
+            }
+            Hypothesis::Scatter(signs) => {
+                !signs.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
+            }
         };
         assert!(is, "{id}");
     }

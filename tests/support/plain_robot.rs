@@ -30,6 +30,19 @@ pub(crate) enum Stamps {
     Received(f64),
 }
 
+/// What happens in one run and is no property of the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Event {
+    /// Something moves the robot in the room: metres and radians, steadily.
+    Pushed { from_s: f64, for_s: f64, by: [f64; 3] },
+    /// The wheels turn without the floor.
+    Lifted { from_s: f64, for_s: f64 },
+    /// The instrument's frame jumps, and stays: metres and radians about the robot.
+    FrameJump { at_s: f64, by: [f64; 3] },
+    /// The marker is elsewhere on the robot.
+    OtherMarker { at: [f64; 3] },
+}
+
 /// A robot and its log; everything else about it is ordinary.
 #[derive(Debug, Clone)]
 pub(crate) struct PlainRobot {
@@ -46,6 +59,8 @@ pub(crate) struct PlainRobot {
     pub(crate) latency_s: f64,
     /// One run whose truth is off by so much time, seconds, by index.
     pub(crate) late_run: Option<(usize, f64)>,
+    /// Events, by the index of their run.
+    pub(crate) events: Vec<(usize, Event)>,
     /// Random error of a wheel's travel, m/√m.
     pub(crate) wheel_sigma_m_per_sqrt_m: f64,
     /// Amplitude of the right wheel's eccentricity, relative to its radius.
@@ -75,6 +90,7 @@ impl PlainRobot {
             reports: Reports::Poses,
             latency_s: 0.0,
             late_run: None,
+            events: Vec::new(),
             wheel_sigma_m_per_sqrt_m: 3e-4,
             eccentricity: 0.0,
             lost_rows: 0.0,
@@ -110,7 +126,7 @@ impl PlainRobot {
             write!(described, "[[run]]\nid = \"{id}\"\nprotocol = \"{protocol}\"\nstart_s = {start_s}\n")
                 .expect("text");
             world.at = [draws.normal(), draws.normal(), PI * (2.0 * draws.uniform() - 1.0)];
-            let path = world.drive(legs, self, (base_m, radius_m, phase_rad), &mut draws);
+            let path = world.drive(legs, (self, number), (base_m, radius_m, phase_rad), &mut draws);
             self.log_rows(id, &path, &mut odometry, &mut draws);
             self.log_truth(number, id, &path, &mut truth, &mut draws);
         }
@@ -125,6 +141,37 @@ impl PlainRobot {
         fs::write(folder.join("dataset.toml"), text).expect("written");
         fs::write(folder.join("odometry.csv"), odometry).expect("written");
         fs::write(folder.join("truth.csv"), truth).expect("written");
+    }
+
+    fn of_run(&self, number: usize) -> impl Iterator<Item = Event> {
+        self.events.iter().filter(move |(run, _)| *run == number).map(|(_, event)| *event)
+    }
+
+    /// What the instrument sees of the robot.
+    fn seen(&self, number: usize, t_s: f64, at: [f64; 3], jumped_at: &mut [f64; 3]) -> [f64; 3] {
+        let mut seen = at;
+        for event in self.of_run(number) {
+            match event {
+                Event::OtherMarker { at: [x_m, y_m, rad] } => {
+                    let (sin, cos) = at[2].sin_cos();
+                    seen = [at[0] + cos * x_m - sin * y_m, at[1] + sin * x_m + cos * y_m, at[2] + rad];
+                }
+                Event::FrameJump { at_s, by } if t_s >= at_s => {
+                    if jumped_at.iter().all(|of| of.is_nan()) {
+                        *jumped_at = at;
+                    }
+                    let (sin, cos) = by[2].sin_cos();
+                    let (x_m, y_m) = (at[0] - jumped_at[0], at[1] - jumped_at[1]);
+                    seen = [
+                        jumped_at[0] + by[0] + cos * x_m - sin * y_m,
+                        jumped_at[1] + by[1] + sin * x_m + cos * y_m,
+                        at[2] + by[2],
+                    ];
+                }
+                _ => {}
+            }
+        }
+        seen
     }
 
     fn log_rows(&self, id: &str, path: &Path1kHz, odometry: &mut String, draws: &mut Draws) {
@@ -160,9 +207,10 @@ impl PlainRobot {
             _ => (0..path.samples.len()).step_by(every).map(|step| step + between).filter(|s| *s <= last).collect(),
         };
         let off_s = self.latency_s + self.late_run.filter(|(run, _)| *run == number).map_or(0.0, |(_, off_s)| off_s);
+        let mut jumped_at = [f64::NAN; 3];
         for step in steps {
-            let seen = (step as f64 - 1000.0 * off_s).round().clamp(0.0, last as f64) as usize;
-            let [x_m, y_m, theta_rad] = path.samples[seen].at;
+            let at = (step as f64 - 1000.0 * off_s).round().clamp(0.0, last as f64) as usize;
+            let [x_m, y_m, theta_rad] = self.seen(number, 1e-3 * step as f64, path.samples[at].at, &mut jumped_at);
             let (x_m, y_m) = (x_m + self.truth_sigma_m * draws.normal(), y_m + self.truth_sigma_m * draws.normal());
             let theta_rad = theta_rad + self.truth_sigma_rad * draws.normal();
             let theta = if self.reports == Reports::Positions { String::new() } else { format!("{theta_rad:.9}") };
@@ -249,7 +297,7 @@ impl World {
     fn drive(
         &mut self,
         legs: &[Part],
-        robot: &PlainRobot,
+        (robot, number): (&PlainRobot, usize),
         (base_m, radius_m, phase_rad): (f64, [f64; 2], f64),
         draws: &mut Draws,
     ) -> Path1kHz {
@@ -295,11 +343,24 @@ impl World {
                 let turn_rad = (rolled_m[1] - rolled_m[0]) / base_m;
                 let middle_rad = self.at[2] + 0.5 * turn_rad;
                 let ahead_m = 0.5 * (rolled_m[0] + rolled_m[1]);
-                self.at = [
-                    self.at[0] + ahead_m * middle_rad.cos(),
-                    self.at[1] + ahead_m * middle_rad.sin(),
-                    self.at[2] + turn_rad,
-                ];
+                let rolls = robot.of_run(number).all(
+                    |event| !matches!(event, Event::Lifted { from_s, for_s } if t_s > from_s && t_s < from_s + for_s),
+                );
+                if rolls {
+                    self.at = [
+                        self.at[0] + ahead_m * middle_rad.cos(),
+                        self.at[1] + ahead_m * middle_rad.sin(),
+                        self.at[2] + turn_rad,
+                    ];
+                }
+                for event in robot.of_run(number) {
+                    if let Event::Pushed { from_s, for_s, by } = event
+                        && t_s > from_s
+                        && t_s < from_s + for_s
+                    {
+                        self.at.iter_mut().zip(by).for_each(|(at, by)| *at += by * DT_S / for_s);
+                    }
+                }
                 samples.push(Sample { at: self.at, wheels_rad: self.wheels_rad });
             }
         }

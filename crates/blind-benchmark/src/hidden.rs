@@ -33,7 +33,7 @@ pub(crate) fn hideable() -> Vec<(&'static str, EffectKind)> {
             Hypothesis::Terms(_) => Some((*id, EffectKind::Mean)),
             Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => Some((*id, EffectKind::Scatter)),
             Hypothesis::Records(_) => Some((*id, EffectKind::Gross)),
-            Hypothesis::Geometry | Hypothesis::Silent => None,
+            Hypothesis::Geometry | Hypothesis::UnknownMotion { .. } | Hypothesis::Silent => None,
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 use crate::check::{Check, ResidualPersistence};
 use crate::document::UnlistedTerm;
 use crate::geometry_deviations::GeometryDeviation;
+use crate::unknown_motion::Anomaly;
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +53,8 @@ pub(crate) enum Basis {
     Geometry(GeometryDeviation),
     /// The clock of the instrument is off by so many seconds: of all runs, or of these.
     ClockOffset(f64),
+    /// Stretches of runs that do not belong, the largest first.
+    Anomalies(Vec<Anomaly>),
     /// A fault of the records, in words.
     RecordFault(String),
     /// So many isolated errors of the instrument among so many measurements.

@@ -24,6 +24,7 @@ use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions
 use crate::residuals::{Residuals, residuals};
 use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
 use crate::text;
+use crate::unknown_motion::unknown_motions;
 
 /// What to leave out of the catalogue, and the limits of the next experiment.
 #[derive(Debug, Clone, Default)]
@@ -110,6 +111,9 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     let clocks = clock_offsets(datasets);
     let (datasets, clocks) =
         clocks.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.offsets[..]));
+    let odd = unknown_motions(datasets);
+    let (datasets, anomalies) =
+        odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
     let outlying = as_recorded.as_ref().is_ok_and(|base| {
@@ -156,6 +160,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         spans: spans.as_ref(),
         faults: &faults,
         clocks,
+        anomalies,
         uncorrelated,
         without: &options.without,
         carry_over: &carry_over,

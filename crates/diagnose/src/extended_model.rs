@@ -78,6 +78,10 @@ impl ExtendedModel {
             let id = effect.id();
             match effect.hypothesis().ok_or(ExtendedModelError::NoTerm { id })? {
                 Hypothesis::Geometry | Hypothesis::Silent => {}
+                Hypothesis::UnknownMotion { .. } => {
+                    remarks
+                        .push(format!("{id} happens without a trace in the counts: dead reckoning cannot follow it"));
+                }
                 Hypothesis::Scatter(_) => {
                     remarks.push(format!("{id} only scatters: dead reckoning does without it"));
                 }

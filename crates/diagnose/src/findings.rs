@@ -16,6 +16,7 @@ use crate::record_faults::{Fault, wrong_wheels};
 use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
 use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
+use crate::unknown_motion::Anomaly;
 use crate::wald::wald_test;
 
 fn is_scatter(finding: &Finding) -> bool {
@@ -35,6 +36,8 @@ pub(crate) struct StageResults<'e, 'a> {
     pub(crate) spans: Option<&'e TestResult>,
     pub(crate) faults: &'e [&'e Fault],
     pub(crate) clocks: &'e [ClockOffset],
+    /// Runs and intervals that do not belong.
+    pub(crate) anomalies: &'e [Anomaly],
     /// The odometry is uncorrelated with what the instrument measured.
     pub(crate) uncorrelated: bool,
     /// Effects that are not to be named.
@@ -55,10 +58,11 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 12] = [
+    let stages: [Stage; 13] = [
         record_faults,
         mean_effects,
         clocks,
+        anomalies,
         sparse_terms,
         noise_effects,
         faults_of_the_log,
@@ -93,6 +97,12 @@ fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
             findings.push(found);
         }
     }
+    findings
+}
+
+/// Intervals across which nothing was compared, and runs that were left out.
+fn anomalies(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.extend(finding::of_anomalies(results.anomalies, results.without));
     findings
 }
 

@@ -36,6 +36,7 @@ mod null_distribution;
 mod outlier_attribution;
 mod physical;
 mod plan;
+mod pose_windows;
 mod profile;
 mod ranking;
 mod record_faults;
@@ -49,6 +50,7 @@ mod settings;
 mod sparse_terms;
 mod statistics;
 mod text;
+mod unknown_motion;
 mod wald;
 
 pub use alternatives::{Alternative, Status};

@@ -10,6 +10,7 @@ use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
 use crate::document::{self, Gain, UnlistedTerm, Value, Verdict};
 use crate::finding::Finding;
+use crate::unknown_motion::{Anomaly, AnomalyKind};
 
 /// A finding as scripts get it.
 pub(crate) fn finding(finding: &Finding) -> document::Finding {
@@ -180,6 +181,7 @@ fn basis(finding: &Finding) -> String {
                 if *offset_s > 0.0 { "before" } else { "after" }
             )
         }
+        Basis::Anomalies(all) => anomalies(all),
         Basis::RecordFault(sentence) => sentence.clone(),
         Basis::IsolatedErrors(isolated, of) => {
             format!("{isolated} of {of} measurements are isolated outliers: the next ones agree with odometry again")
@@ -195,6 +197,38 @@ fn basis(finding: &Finding) -> String {
             "measurement errors are autocorrelated (lag-one coefficient {coefficient:.2}), and no term that was tried explains it"
         ),
         Basis::TurnScatter(sigma) => format!("headings scatter with the turn, by {:.1} mrad/√rad", 1e3 * sigma),
+    }
+}
+
+/// Where something does not belong, the largest events first.
+fn anomalies(all: &[Anomaly]) -> String {
+    const SHOWN: usize = 3;
+    let event = |anomaly: &Anomaly| {
+        let Anomaly { run, span_s: [from_s, to_s], displaced, .. } = anomaly;
+        let by = format!(
+            "{:.0} mm ahead, {:.0} mm to the left, {:.1}°",
+            1e3 * displaced.x_m,
+            1e3 * displaced.y_m,
+            displaced.theta_rad.to_degrees()
+        );
+        match anomaly.kind {
+            AnomalyKind::Frame | AnomalyKind::RobotOrFrame => format!("run {run}, {from_s:.2} s to {to_s:.2} s: {by}"),
+            AnomalyKind::MountingPlace | AnomalyKind::MountingHeading => format!("run {run}: {by}"),
+        }
+    };
+    let mut shown: Vec<String> = all.iter().take(SHOWN).map(event).collect();
+    if all.len() > SHOWN {
+        shown.push(format!("{} more", all.len() - SHOWN));
+    }
+    let shown = shown.join("; ");
+    match all.first().map(|anomaly| anomaly.kind) {
+        Some(AnomalyKind::Frame) => format!(
+            "the instrument's poses jump as no robot moves, and stay displaced; nothing is compared across it ({shown})"
+        ),
+        Some(AnomalyKind::RobotOrFrame) => format!(
+            "between two poses the robot moved, or the instrument's frame did, as its wheels do not say; nothing is compared across it ({shown})"
+        ),
+        _ => format!("the instrument was mounted otherwise than in the other runs; the run is left out ({shown})"),
     }
 }
 

@@ -27,11 +27,22 @@ pub struct Description {
     pub goes_by_rows: bool,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
+    /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
+    pub mounting: Option<Mounting>,
     /// The ratio of the drive's geometry that it changes, with its size of that meaning; of the geometry that
     /// every calibration fits only.
     pub geometry: Option<(GeometryRatio, &'static str)>,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
+}
+
+/// A part of the instrument's mounting on the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mounting {
+    /// Where it is.
+    Place,
+    /// How it is turned.
+    Heading,
 }
 
 /// A ratio of the true geometry over the nominal one.
@@ -56,6 +67,7 @@ impl Description {
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
             clock_offset: None,
+            mounting: None,
             geometry: None,
             benchmark: Benchmark::OF_MEAN,
         }

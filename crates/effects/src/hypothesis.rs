@@ -23,6 +23,12 @@ pub enum Hypothesis {
     Scatter(&'static [Sign]),
     /// Both: a mean, and a variance beside it.
     TermsAndScatter(Vec<Variant>, &'static [Sign]),
+    /// It leaves open how the robot moved between some measurements: sought before any fit, as motion that no
+    /// wheel makes.
+    UnknownMotion {
+        /// The robot did not move at all: its instrument did.
+        is_of_instrument: bool,
+    },
     /// Innocent, or not told from data alone.
     Silent,
 }

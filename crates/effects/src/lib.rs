@@ -29,7 +29,7 @@ mod time_shift;
 pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
 pub use channel::Channel;
 pub use covariate::Covariate;
-pub use description::{Description, Excitation, GeometryRatio, IsolatedError, RecordFault, Summary};
+pub use description::{Description, Excitation, GeometryRatio, IsolatedError, Mounting, RecordFault, Summary};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};
@@ -184,6 +184,7 @@ contents! {
     traction_loss::TractionLoss,
     stick_slip::StickSlip,
     bumps::Bumps,
+    robot_displaced::RobotDisplaced,
     turn_rate_wheelbase::TurnRateWheelbase,
     lateral_skid::LateralSkid,
     castor_kick::CastorKick,
@@ -210,6 +211,7 @@ contents! {
     truth_yaw::TruthYaw,
     truth_correlated_noise::TruthCorrelatedNoise,
     truth_outliers::TruthOutliers,
+    truth_jump::TruthJump,
 }
 
 /// Puts effects into the order in which they act, so that a scenario's order does not matter; terms outside

@@ -44,7 +44,7 @@ This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test -p eff
 type Holds = fn(&Hypothesis) -> bool;
 
 /// By what an effect is shown, what that is, and which hypotheses are so.
-const SHOWN_BY: [(&str, &str, Holds); 5] = [
+const SHOWN_BY: [(&str, &str, Holds); 6] = [
     ("geometry", "the three geometry parameters of the drive, which every calibration fits", |of| {
         matches!(of, Hypothesis::Geometry)
     }),
@@ -58,6 +58,9 @@ const SHOWN_BY: [(&str, &str, Holds); 5] = [
     }),
     ("scatter", "no mean, or not one alone: checks of a fit show it", |of| {
         matches!(of, Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..))
+    }),
+    ("unknown motion", "motion that no wheel makes, between two measurements, sought before any fit", |of| {
+        matches!(of, Hypothesis::UnknownMotion { .. })
     }),
     ("nothing", "innocent, in the noise model", |of| matches!(of, Hypothesis::Silent)),
 ];
@@ -184,7 +187,7 @@ fn benchmark(id: &str, description: &Description) -> Option<String> {
         jitter_s: 0.005,
     };
     let law = match (hypothesis(id)?, benchmark.values) {
-        (Hypothesis::Geometry | Hypothesis::Silent, _) => return None,
+        (Hypothesis::Geometry | Hypothesis::UnknownMotion { .. } | Hypothesis::Silent, _) => return None,
         (_, ParameterLaw::Direction { .. }) if benchmark.max_scale == 1.0 => "up to a large size".to_owned(),
         (_, ParameterLaw::Direction { .. }) => format!("up to {} times a large size", number(benchmark.max_scale)),
         (_, ParameterLaw::Scatter(law)) => {

@@ -1,9 +1,9 @@
 //! Runs as segments: how the wheels turned between measurements, and what the instrument measured.
 //!
 //! Poses and positions make one segment a run, with a free start at the first measurement. A gap of the log
-//! between two measurements begins a new segment. A displacement is a segment of its own, which starts at the
-//! origin of its own frame. Displacements of a run go on from each other: the heading in the room and the
-//! state of terms are carried from one to the next.
+//! between two measurements, or a motion that the counts do not tell, begins a new segment. A displacement is
+//! a segment of its own, which starts at the origin of its own frame. Displacements of a run go on from each
+//! other: the heading in the room and the state of terms are carried from one to the next.
 
 use dataset::{Run, RunInfo, Session, TruthSample};
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
@@ -211,7 +211,7 @@ impl<'a> Records<'a> {
                         quantum_rad: track.quantum_rad(),
                         session_m,
                     };
-                    add_poses(&mut records.segments, &base, &track, measured_poses(run, reference));
+                    add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
                     session_m += track.distance_m(session.robot);
                 }
@@ -400,6 +400,7 @@ fn add_poses<'a>(
     segments: &mut Vec<Segment<'a>>,
     base: &Segment<'a>,
     track: &WheelAngleInterpolator<'_>,
+    run: &Run,
     measurements: Vec<MeasuredPose>,
 ) {
     let mut cursor = track.cursor();
@@ -419,7 +420,8 @@ fn add_poses<'a>(
             continue;
         };
         let joined = segment.as_mut().is_some_and(|segment| {
-            let reaches = cursor.intervals(before_s, measured.t_s, &mut segment.intervals);
+            let reaches = !run.is_motion_unknown(before_s, measured.t_s)
+                && cursor.intervals(before_s, measured.t_s, &mut segment.intervals);
             if reaches {
                 segment.measurements.push(MeasuredPose { after: segment.intervals.len(), ..measured });
             }
@@ -451,6 +453,9 @@ fn add_displacements<'a>(
     let mut cursor = track.cursor();
     let mut last_s = f64::NEG_INFINITY;
     for measured in &run.displacements {
+        if run.is_motion_unknown(measured.t0_s, measured.t1_s) {
+            continue;
+        }
         let Some(turned_rad) = cursor.angle_rad(measured.t0_s) else { continue };
         let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
         let mut intervals = Vec::new();

@@ -166,6 +166,7 @@ fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
             displacements,
             point_readings,
             wheel_reference,
+            unknown_motion: Vec::new(),
         })
 }
 

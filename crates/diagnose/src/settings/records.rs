@@ -168,3 +168,69 @@ pub(crate) const LOG_ROWS_LEVEL: f64 = 1e-6;
 /// Ratio. A log whose span differs from that of the measurements by more is of another clock.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_CLOCK_RATIO: f64 = 30.0;
+
+/// Wheel separations. Distance over which windows between measured poses calibrate the wheels before any fit.
+/// Convention: a half; over less, noise of the instrument is most of it.
+pub(crate) const WINDOW_DISTANCE_SEPARATIONS: f64 = 0.5;
+
+/// Numbers of measurements that a window spans.
+/// Convention: octaves; from a step between two measurements to a push of seconds.
+pub(crate) const WINDOW_SPANS: [usize; 6] = [1, 2, 4, 8, 16, 32];
+
+/// Number of measured poses. A run with fewer says nothing of windows.
+/// Convention: ten.
+pub(crate) const MIN_WINDOW_POSES: usize = 10;
+
+/// Number of iterations of reweighting by the absolute residual.
+/// Convention: the gain of a step is below 1 % after ten.
+pub(crate) const REWEIGHTINGS: usize = 15;
+
+/// Wheel separations. Motion along that no wheel has missed, where it is far beyond the noise.
+/// Budgeted: ten times what a bump of a tenth of a wheel's radius, or a slip at full acceleration, costs
+/// between two measurements.
+pub(crate) const MIN_UNKNOWN_ALONG_SEPARATIONS: f64 = 0.1;
+
+/// Wheel separations. The same of motion across, which rolling wheels cannot make.
+/// Budgeted: a skid of 10 ms at 1 m/s and 1 rad/s is 1 mm in 0.1 s.
+pub(crate) const MIN_UNKNOWN_ACROSS_SEPARATIONS: f64 = 0.05;
+
+/// Radians. The same of heading.
+/// Budgeted: three times a large kick of a castor, 2 degrees.
+pub(crate) const MIN_UNKNOWN_TURN_RAD: f64 = 0.1;
+
+/// Standard deviations, by the 90 % quantile of all windows of that span.
+/// Convention: beyond what normal errors do in any log.
+pub(crate) const MIN_UNKNOWN_SIGMAS: f64 = 10.0;
+
+/// Share of all pairs of measurements. Where more are beyond the wheels, the noise is, or the model.
+/// Convention: a tenth.
+pub(crate) const MAX_UNKNOWN_SHARE: f64 = 0.1;
+
+/// Events in all runs for each run, or for each minute, whichever are more.
+/// Convention: a robot that is pushed twice a minute is no subject of a calibration.
+pub(crate) const MAX_UNKNOWN_EVENTS_PER_RUN: f64 = 2.0;
+
+/// Ratio to the fastest motion of the log. What is faster than so many times that is the instrument's.
+/// Convention: twice.
+pub(crate) const IMPLAUSIBLE_SPEED_RATIO: f64 = 2.0;
+
+/// Radians. A run whose instrument is turned on the robot by more than in the other runs is of another
+/// mounting.
+/// Convention: a degree; a clip-on marker is put back to about that.
+pub(crate) const MIN_OTHER_MOUNTING_RAD: f64 = 0.02;
+
+/// Wheel separations. The same of its place.
+/// Convention: a fiftieth, 7 mm of 363 mm.
+pub(crate) const MIN_OTHER_MOUNTING_SEPARATIONS: f64 = 0.02;
+
+/// Standard deviations, of the run's own mounting and of how mountings scatter over the runs.
+/// Convention: beyond what normal errors do in any log.
+pub(crate) const MIN_OTHER_MOUNTING_SIGMAS: f64 = 8.0;
+
+/// Number of runs, or parts of runs, of which one can be the odd one.
+/// Convention: five.
+pub(crate) const MIN_MOUNTINGS: usize = 5;
+
+/// Number of windows that determine the mounting of a run.
+/// Convention: twice its unknowns.
+pub(crate) const MIN_WINDOWS_PER_MOUNTING: usize = 8;

@@ -3,12 +3,13 @@
 //! Model: a row is lost with some probability; where the log adds up increments, the counts since the row
 //! before are lost with it.
 //! Signature: gaps in time over which a moving robot seems to crawl. A gross fault, tried before any fit: the
-//! records without it have the counts of each gap carried on from the rows around it.
+//! records without it have the counts of each gap carried on from the rows around it. That is rough: where
+//! measurements are dense enough to spare those across gaps, nothing is compared across them.
 //! Observability: gaps while the robot moves.
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{Dataset, Odometry, SamplingPeriod, WheelLog};
+use dataset::{Dataset, Odometry, Run, SamplingPeriod, UnknownMotion, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +100,8 @@ const ROWS_AROUND: usize = 3;
 const MAX_LATE_SHARE: f64 = 0.25;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
+/// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
+const MAX_SPOILED_PAIRS: f64 = 0.5;
 
 /// What was missing of some runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -130,19 +133,34 @@ fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
     Some((lengths_s.iter().map(rows).collect(), false))
 }
 
+/// Share of the pairs of successive measurements of some runs whose motion the counts leave open.
+fn spoiled_pairs(runs: &[Run]) -> f64 {
+    let (mut spoiled, mut pairs) = (0.0, 0.0);
+    for run in runs {
+        let poses = run.truth.windows(2).map(|pair| (pair[0].t_s, pair[1].t_s));
+        let displacements = run.displacements.iter().map(|displacement| (displacement.t0_s, displacement.t1_s));
+        for (from_s, to_s) in poses.chain(displacements) {
+            pairs += 1.0;
+            spoiled += f64::from(u8::from(run.is_motion_unknown(from_s, to_s)));
+        }
+    }
+    if pairs > 0.0 { spoiled / pairs } else { 1.0 }
+}
+
 /// Carries the counts of every gap on, and says what was missing.
 ///
 /// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the
 /// acceleration is constant; the row after it shows less.
-fn fill(odometry: &mut Odometry) -> Missing {
+fn fill(run: &mut Run) -> Missing {
     let mut missing = Missing::default();
-    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return missing };
+    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &mut run.odometry else { return missing };
     let Some((rows, uncertain)) = rows_after(t_s) else { return missing };
     missing.uncertain = uncertain;
     let shown =
         ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
     let is_row = |k: &usize| rows[*k] == 1.0;
     let mut lost = Wheels::both(0.0);
+    let mut spans = Vec::new();
     for (k, &of_gap) in rows.iter().enumerate() {
         if of_gap > 1.0 {
             let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
@@ -167,6 +185,7 @@ fn fill(odometry: &mut Odometry) -> Missing {
                 for side in Side::BOTH {
                     lost[side] += due[side] - shown[side][k];
                 }
+                spans.push(UnknownMotion { from_s: t_s[k], to_s: t_s[k + 1] });
                 missing.lost += 1;
                 missing.rows += of_gap.round() - 1.0;
             } else {
@@ -177,6 +196,7 @@ fn fill(odometry: &mut Odometry) -> Missing {
             ticks[side][k + 1] += lost[side].round() as i64;
         }
     }
+    run.add_unknown_motion(spans);
     missing
 }
 
@@ -184,7 +204,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let mut records = dataset.clone();
     let (mut missing, mut rows) = (Missing::default(), 0.0);
     for run in &mut records.runs {
-        let of_run = fill(&mut run.odometry);
+        let of_run = fill(run);
         missing.rows += of_run.rows;
         missing.lost += of_run.lost;
         missing.kept += of_run.kept;
@@ -194,6 +214,11 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     }
     if missing.lost == 0 {
         return Vec::new();
+    }
+    if spoiled_pairs(&records.runs) > MAX_SPOILED_PAIRS {
+        for (run, recorded) in records.runs.iter_mut().zip(&dataset.runs) {
+            run.unknown_motion.clone_from(&recorded.unknown_motion);
+        }
     }
     vec![RecordCorrection {
         values: vec![("probability", missing.rows / (missing.rows + rows))],
@@ -233,10 +258,13 @@ mod tests {
 
     #[test]
     fn counts_of_lost_rows_are_carried_on_through_ramps_and_jitter() {
-        let (mut record, whole) = odometry(&[9, 30, 31, 50], true);
-        let missing = fill(&mut record);
+        let (record, whole) = odometry(&[9, 30, 31, 50], true);
+        let mut run = Run { odometry: record, ..Run::default() };
+        let missing = fill(&mut run);
         assert_eq!((missing.rows, missing.lost, missing.kept), (4.0, 3, 0));
-        let WheelLog::Ticks(ticks) = &record.wheels else { panic!("counts") };
+        let spans = run.unknown_motion.len();
+        assert!(spans == 3 && run.is_motion_unknown(0.4, 0.5) && !run.is_motion_unknown(0.6, 1.0), "{spans}");
+        let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("counts") };
         for (restored, counted) in ticks.left.iter().zip(&whole) {
             // 250 counts a row at full speed; a corner of the ramp bends the speed by 12 counts a row at the
             // most.
@@ -246,8 +274,9 @@ mod tests {
 
     #[test]
     fn a_gap_over_which_the_counters_went_on_is_left_alone() {
-        let (mut record, whole) = odometry(&[9, 30, 31, 50], false);
-        assert_eq!(fill(&mut record).lost, 0);
-        assert_eq!(record.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole }));
+        let (record, whole) = odometry(&[9, 30, 31, 50], false);
+        let mut run = Run { odometry: record, ..Run::default() };
+        assert_eq!(fill(&mut run).lost, 0);
+        assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole }));
     }
 }

@@ -1,0 +1,304 @@
+//! Windows between measured poses, and what calibrated wheels leave of the motion over each: before any fit.
+//!
+//! With m the motion that the instrument reports from one pose to another, seen from the first, d the same by
+//! dead reckoning of the wheels, θ_s and ℓ where the instrument is on the robot, and g the scale of the
+//! wheels: R(θ_s) m g = d + (R(Δθ) − 1) ℓ, linear in g cos θ_s, g sin θ_s and ℓ. The turn is linear in the
+//! travel of both wheels. Both are fitted by the sum of absolute residuals, to which single windows say
+//! little. Reference: Censi et al. 2013, eq. 17–20 (the linear form); Holland & Welsch 1977 (iterative
+//! reweighting).
+
+use dataset::Dataset;
+use estimation::WheelAngleInterpolator;
+use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector3, Vector4};
+
+use crate::log_rows::has_outlying_rows;
+use crate::settings::records::{MIN_WINDOW_POSES, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS, WINDOW_SPANS};
+
+/// The measured poses of a run, and the travel of its wheels between them by nominal lengths.
+pub(crate) struct PoseTrack {
+    pub(crate) run: (usize, usize),
+    pub(crate) t_s: Vec<f64>,
+    measured: Vec<Pose>,
+    /// Travel row by row, metres.
+    steps_m: Vec<Wheels<f64>>,
+    /// For each pose the number of steps before it.
+    after: Vec<usize>,
+}
+
+impl PoseTrack {
+    /// Of all runs that measure enough poses with headings, and whose counts are those of wheels.
+    pub(crate) fn of_all(datasets: &[Dataset]) -> Vec<Self> {
+        let mut tracks = Vec::new();
+        for (session, dataset) in datasets.iter().enumerate() {
+            for (position, run) in dataset.session().runs.iter().enumerate() {
+                tracks.extend(Self::of(run, dataset, (session, position)));
+            }
+        }
+        tracks
+    }
+
+    fn of(run: &dataset::RunView<'_>, dataset: &Dataset, number: (usize, usize)) -> Option<Self> {
+        if !run.info().continuous || run.run().truth.len() < MIN_WINDOW_POSES || has_outlying_rows(run.run()) {
+            return None;
+        }
+        let m_per_rad = dataset.robot.geometry().ok()?.m_per_rad();
+        let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
+        let rows_s = &run.odometry().t_s;
+        let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
+        let angles = |row: usize| track.turns().as_ref().map(|turns| turns[row]);
+        let between = |t_s: f64| {
+            let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
+            let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
+            angles(row).zip_with(angles(row + 1), |start, end| start + share * (end - start))
+        };
+        let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![] };
+        let (mut last, mut row) = (Wheels::both(0.0), 0);
+        for sample in run.run().truth.iter().filter(|sample| (first_s..=last_s).contains(&sample.t_s)) {
+            let pose = Pose::new(sample.x_m, sample.y_m, sample.theta_rad()?);
+            if of.t_s.is_empty() {
+                last = between(sample.t_s);
+                row = rows_s.partition_point(|row_s| *row_s <= sample.t_s);
+            }
+            let mut go = |to: Wheels<f64>| {
+                let turned = to.zip_with(last, |to, last| to - last);
+                of.steps_m.push(turned.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad));
+                last = to;
+            };
+            while row < rows_s.len() && rows_s[row] <= sample.t_s {
+                go(angles(row));
+                row += 1;
+            }
+            go(between(sample.t_s));
+            of.t_s.push(sample.t_s);
+            of.measured.push(pose);
+            of.after.push(of.steps_m.len());
+        }
+        (of.t_s.len() >= MIN_WINDOW_POSES).then_some(of)
+    }
+
+    /// How many poses.
+    pub(crate) fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Travel of both wheels from one pose to another, metres.
+    fn travel_m(&self, (from, to): (usize, usize)) -> Wheels<f64> {
+        let steps = &self.steps_m[self.after[from]..self.after[to]];
+        steps.iter().fold(Wheels::both(0.0), |sum, step| sum.zip_with(*step, |a, b| a + b))
+    }
+
+    /// Motion from one pose to another by the instrument, seen from the first.
+    fn motion(&self, (from, to): (usize, usize)) -> Pose {
+        self.measured[from].to(self.measured[to])
+    }
+
+    /// Poses by dead reckoning of a drive, from the first one.
+    fn dead_reckoned(&self, drive: &Drive) -> Vec<Pose> {
+        let (mut pose, mut done) = (Pose::IDENTITY, self.after[0]);
+        let of = |after: &usize| {
+            for step in &self.steps_m[done..*after] {
+                let travel_m = step.zip_with(drive.scale, |m, scale| m * scale);
+                pose = pose * Increment::from_travel(travel_m, drive.separation_m).arc();
+            }
+            done = *after;
+            pose
+        };
+        self.after.iter().map(of).collect()
+    }
+}
+
+/// Scales of both wheels over nominal, and the separation.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    scale: Wheels<f64>,
+    separation_m: f64,
+}
+
+/// Tracks with wheels that are calibrated to what most windows say.
+pub(crate) struct CalibratedTracks<'t> {
+    pub(crate) tracks: &'t [PoseTrack],
+    /// Numbers of measurements of the windows that calibrated them.
+    pub(crate) span: usize,
+    dead_reckoned: Vec<Vec<Pose>>,
+    /// The instrument on the robot.
+    pub(crate) body_from_sensor: Pose,
+}
+
+/// What wheels leave of the motion over a window: metres along and across the heading at its start, and
+/// radians.
+pub(crate) type Residual = Vector3<f64>;
+
+impl<'t> CalibratedTracks<'t> {
+    /// `None` where the windows do not determine the wheels.
+    pub(crate) fn of(tracks: &'t [PoseTrack], separation_m: f64) -> Option<Self> {
+        let span = span(tracks, separation_m)?;
+        let of_all: Vec<(&PoseTrack, (usize, usize))> =
+            tracks.iter().flat_map(|track| windows(0..track.len(), span).map(move |window| (track, window))).collect();
+        // Turns.
+        let rows: Vec<(Vector2<f64>, f64)> = of_all
+            .iter()
+            .map(|(track, window)| {
+                let Wheels { left, right } = track.travel_m(*window);
+                let nominal_rad = (right - left) / separation_m;
+                (Vector2::new(left, right), wrap_to_pi(track.motion(*window).theta_rad - nominal_rad))
+            })
+            .collect();
+        let mut per_m = Vector2::zeros();
+        for _ in 0..REWEIGHTINGS {
+            let (mut information, mut score) = (Matrix2::identity() * 1e-9, Vector2::zeros());
+            for (row, turn_rad) in &rows {
+                let weight = 1.0 / (turn_rad - row.dot(&per_m)).abs().max(1e-4);
+                information += weight * row * row.transpose();
+                score += weight * row * *turn_rad;
+            }
+            per_m = information.cholesky()?.solve(&score);
+        }
+        let [of_left, of_right] = [1.0 / separation_m - per_m[0], 1.0 / separation_m + per_m[1]];
+        if !(of_left > 0.0 && of_right > 0.0) {
+            return None;
+        }
+        let mean = 0.5 * (of_left + of_right);
+        let mut drive =
+            Drive { scale: Wheels { left: of_left / mean, right: of_right / mean }, separation_m: mean.recip() };
+        // Places.
+        let poses = |drive: &Drive| tracks.iter().map(|track| track.dead_reckoned(drive)).collect::<Vec<_>>();
+        let dead_reckoned = poses(&drive);
+        let rows: Vec<MountingRow> = tracks
+            .iter()
+            .zip(&dead_reckoned)
+            .flat_map(|(track, poses)| windows_rows(track, poses, windows(0..track.len(), span)))
+            .collect();
+        let (mounting, _) = Mounting::of(&rows)?;
+        let scale = mounting.scale();
+        drive.scale = drive.scale.map(|of| of / scale);
+        drive.separation_m /= scale;
+        Some(Self { tracks, span, dead_reckoned: poses(&drive), body_from_sensor: mounting.body_from_sensor() })
+    }
+
+    /// Poses of a track by dead reckoning.
+    pub(crate) fn poses(&self, track: usize) -> &[Pose] {
+        &self.dead_reckoned[track]
+    }
+
+    /// What the wheels leave of the motion over a window of a track.
+    pub(crate) fn residual(&self, track: usize, (from, to): (usize, usize)) -> Residual {
+        let poses = &self.dead_reckoned[track];
+        let (dead_reckoned, measured) = (poses[from].to(poses[to]), self.tracks[track].motion((from, to)));
+        let sensor = self.body_from_sensor;
+        let predicted = sensor.inverse() * dead_reckoned * sensor;
+        let (sin, cos) = sensor.theta_rad.sin_cos();
+        let (x_m, y_m) = (measured.x_m - predicted.x_m, measured.y_m - predicted.y_m);
+        Vector3::new(cos * x_m - sin * y_m, sin * x_m + cos * y_m, wrap_to_pi(measured.theta_rad - predicted.theta_rad))
+    }
+
+    /// The instrument's place on the robot in a part of a track, with its covariance: x, y, heading.
+    pub(crate) fn mounting(&self, track: usize, part: std::ops::Range<usize>) -> Option<(Pose, DMatrix<f64>)> {
+        let rows: Vec<MountingRow> =
+            windows_rows(&self.tracks[track], &self.dead_reckoned[track], windows(part, self.span)).collect();
+        if rows.len() < crate::settings::records::MIN_WINDOWS_PER_MOUNTING {
+            return None;
+        }
+        let (mounting, covariance) = Mounting::of(&rows)?;
+        // The heading is that of (cos, sin).
+        let (of, scale) = (mounting.0, mounting.scale());
+        let to_heading = DVector::from_vec(vec![-of[1] / (scale * scale), of[0] / (scale * scale), 0.0, 0.0]);
+        let mut to = DMatrix::zeros(3, 4);
+        (to[(0, 2)], to[(1, 3)]) = (1.0, 1.0);
+        to.row_mut(2).copy_from(&to_heading.transpose());
+        let covariance = DMatrix::from_fn(4, 4, |row, column| covariance[(row, column)]);
+        Some((mounting.body_from_sensor(), &to * covariance * to.transpose()))
+    }
+}
+
+/// Windows of a span, one after the other.
+fn windows(part: std::ops::Range<usize>, span: usize) -> impl Iterator<Item = (usize, usize)> {
+    let end = part.end;
+    part.step_by(span).map(move |from| (from, from + span)).take_while(move |(_, to)| *to < end)
+}
+
+/// The shortest span whose windows reach so far that wheels show in them, by their median.
+fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
+    let reaches = |span: &usize| {
+        let mut distances_m: Vec<f64> = tracks
+            .iter()
+            .flat_map(|track| {
+                windows(0..track.len(), *span).map(|window| {
+                    let Wheels { left, right } = track.travel_m(window);
+                    left.abs().max(right.abs())
+                })
+            })
+            .collect();
+        distances_m.sort_by(f64::total_cmp);
+        distances_m.get(distances_m.len() / 2).is_some_and(|m| *m > WINDOW_DISTANCE_SEPARATIONS * separation_m)
+    };
+    WINDOW_SPANS.into_iter().find(reaches)
+}
+
+/// One window in the linear equation of the mounting: the motion by the instrument, that by the wheels, and
+/// the turn.
+struct MountingRow {
+    measured: Vector2<f64>,
+    dead_reckoned: Vector2<f64>,
+    turn_rad: f64,
+}
+
+fn windows_rows<'t>(
+    track: &'t PoseTrack,
+    poses: &'t [Pose],
+    windows: impl Iterator<Item = (usize, usize)> + 't,
+) -> impl Iterator<Item = MountingRow> + 't {
+    windows.map(|(from, to)| {
+        let (measured, dead_reckoned) = (track.motion((from, to)), poses[from].to(poses[to]));
+        MountingRow {
+            measured: Vector2::new(measured.x_m, measured.y_m),
+            dead_reckoned: Vector2::new(dead_reckoned.x_m, dead_reckoned.y_m),
+            turn_rad: measured.theta_rad,
+        }
+    })
+}
+
+/// g cos θ_s, g sin θ_s, ℓ_x, ℓ_y.
+struct Mounting(Vector4<f64>);
+
+impl Mounting {
+    /// The mounting of some windows with its covariance by what is left of them.
+    fn of(rows: &[MountingRow]) -> Option<(Self, Matrix4<f64>)> {
+        let design = |row: &MountingRow| {
+            let (m, (sin, cos)) = (row.measured, row.turn_rad.sin_cos());
+            [Vector4::new(m.x, -m.y, 1.0 - cos, sin), Vector4::new(m.y, m.x, -sin, 1.0 - cos)]
+        };
+        let mut of = Vector4::new(1.0, 0.0, 0.0, 0.0);
+        let mut information = Matrix4::identity();
+        let mut squares = 0.0;
+        for _ in 0..REWEIGHTINGS {
+            // What the windows do not determine stays 0: a metre of lever arm is weak enough.
+            information = Matrix4::from_diagonal(&Vector4::new(1e-9, 1e-9, 1e-6, 1e-6));
+            let mut score = Vector4::zeros();
+            squares = 0.0;
+            for row in rows {
+                let [x, y] = design(row);
+                let left = Vector2::new(row.dead_reckoned.x - x.dot(&of), row.dead_reckoned.y - y.dot(&of));
+                let weight = 1.0 / left.norm().max(1e-4);
+                squares += weight * left.norm_squared();
+                for (design, value) in [(x, row.dead_reckoned.x), (y, row.dead_reckoned.y)] {
+                    information += weight * design * design.transpose();
+                    score += weight * design * value;
+                }
+            }
+            of = information.cholesky()?.solve(&score);
+        }
+        let variance = squares / (2 * rows.len()).saturating_sub(4).max(1) as f64;
+        let covariance = information.try_inverse()? * variance;
+        let scale = of[0].hypot(of[1]);
+        (scale > 0.0 && scale.is_finite()).then_some((Self(of), covariance))
+    }
+
+    fn scale(&self) -> f64 {
+        self.0[0].hypot(self.0[1])
+    }
+
+    fn body_from_sensor(&self) -> Pose {
+        Pose::new(self.0[2], self.0[3], self.0[1].atan2(self.0[0]))
+    }
+}
