@@ -29,7 +29,7 @@ const HEAD: &str = "# Settings
 
 Every number that decides something, with its unit, its meaning and where it is from: *derived* from an equation,
 *budgeted* of an error budget, *tuned* on something, or a *convention*. This file is generated from the sources:
-`YAIR_UPDATE_DOCS=1 cargo test --test architecture settings`.
+`YAIR_UPDATE_DOCS=1 cargo test --release --test architecture settings`.
 ";
 
 /// A row of the table.
@@ -213,7 +213,7 @@ fn every_setting_has_a_source_and_the_document_lists_it() {
     let line = found.lines().zip(expected.lines()).position(|(found, expected)| found != expected);
     assert!(
         found == expected,
-        "{DOCUMENT}, line {}: run YAIR_UPDATE_DOCS=1 cargo test --test architecture settings",
+        "{DOCUMENT}, line {}: run YAIR_UPDATE_DOCS=1 cargo test --release --test architecture settings",
         line.unwrap_or_else(|| found.lines().count().min(expected.lines().count())) + 1
     );
 }

@@ -10,10 +10,12 @@
 use dataset::Dataset;
 use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
 
 use crate::log_rows::has_outlying_rows;
-use crate::settings::records::{MIN_WINDOW_POSES, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS, WINDOW_SPANS};
+use crate::settings::records::{
+    MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_MOUNTING, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS, WINDOW_SPANS,
+};
 
 /// The measured poses of a run, and the travel of its wheels between them by nominal lengths.
 pub(crate) struct PoseTrack {
@@ -24,6 +26,8 @@ pub(crate) struct PoseTrack {
     steps_m: Vec<Wheels<f64>>,
     /// For each pose the number of steps before it.
     after: Vec<usize>,
+    /// For each pose the number of rows missing before it, by their times.
+    gaps: Vec<usize>,
 }
 
 impl PoseTrack {
@@ -52,7 +56,11 @@ impl PoseTrack {
             let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
             angles(row).zip_with(angles(row + 1), |start, end| start + share * (end - start))
         };
-        let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![] };
+        let mut lengths_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        lengths_s.sort_by(f64::total_cmp);
+        let gap_s = MIN_GAP_RATIO * lengths_s.get(lengths_s.len() / 2).copied()?;
+        let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![], gaps: vec![] };
+        let mut gaps = 0;
         let (mut last, mut row) = (Wheels::both(0.0), 0);
         for sample in run.run().truth.iter().filter(|sample| (first_s..=last_s).contains(&sample.t_s)) {
             let pose = Pose::new(sample.x_m, sample.y_m, sample.theta_rad()?);
@@ -67,14 +75,23 @@ impl PoseTrack {
             };
             while row < rows_s.len() && rows_s[row] <= sample.t_s {
                 go(angles(row));
+                gaps += usize::from(row > 0 && rows_s[row] - rows_s[row - 1] > gap_s);
                 row += 1;
             }
+            // The row that the pose lies in counts to the window before it and to the one after it.
+            let within = row < rows_s.len() && row > 0 && rows_s[row] - rows_s[row - 1] > gap_s;
             go(between(sample.t_s));
             of.t_s.push(sample.t_s);
             of.measured.push(pose);
             of.after.push(of.steps_m.len());
+            of.gaps.push(gaps + usize::from(within));
         }
         (of.t_s.len() >= MIN_WINDOW_POSES).then_some(of)
+    }
+
+    /// Are rows missing between two poses? What the wheels did meanwhile may be missing with them.
+    pub(crate) fn has_gap(&self, (from, to): (usize, usize)) -> bool {
+        self.gaps[to] > self.gaps[from.saturating_sub(1)]
     }
 
     /// How many poses.
@@ -134,7 +151,7 @@ impl<'t> CalibratedTracks<'t> {
     pub(crate) fn of(tracks: &'t [PoseTrack], separation_m: f64) -> Option<Self> {
         let span = span(tracks, separation_m)?;
         let of_all: Vec<(&PoseTrack, (usize, usize))> =
-            tracks.iter().flat_map(|track| windows(0..track.len(), span).map(move |window| (track, window))).collect();
+            tracks.iter().flat_map(|track| windows(track.len(), span).map(move |window| (track, window))).collect();
         // Turns.
         let rows: Vec<(Vector2<f64>, f64)> = of_all
             .iter()
@@ -167,7 +184,7 @@ impl<'t> CalibratedTracks<'t> {
         let rows: Vec<MountingRow> = tracks
             .iter()
             .zip(&dead_reckoned)
-            .flat_map(|(track, poses)| windows_rows(track, poses, windows(0..track.len(), span)))
+            .flat_map(|(track, poses)| mounting_rows(track, poses, windows(track.len(), span)))
             .collect();
         let (mounting, _) = Mounting::of(&rows)?;
         let scale = mounting.scale();
@@ -182,39 +199,44 @@ impl<'t> CalibratedTracks<'t> {
     }
 
     /// What the wheels leave of the motion over a window of a track.
-    pub(crate) fn residual(&self, track: usize, (from, to): (usize, usize)) -> Residual {
+    pub(crate) fn residual(&self, track: usize, window: (usize, usize)) -> Residual {
+        self.residual_of(self.body_from_sensor, track, window)
+    }
+
+    /// The same where the instrument is elsewhere on the robot.
+    pub(crate) fn residual_of(&self, sensor: Pose, track: usize, (from, to): (usize, usize)) -> Residual {
         let poses = &self.dead_reckoned[track];
         let (dead_reckoned, measured) = (poses[from].to(poses[to]), self.tracks[track].motion((from, to)));
-        let sensor = self.body_from_sensor;
         let predicted = sensor.inverse() * dead_reckoned * sensor;
         let (sin, cos) = sensor.theta_rad.sin_cos();
         let (x_m, y_m) = (measured.x_m - predicted.x_m, measured.y_m - predicted.y_m);
         Vector3::new(cos * x_m - sin * y_m, sin * x_m + cos * y_m, wrap_to_pi(measured.theta_rad - predicted.theta_rad))
     }
 
-    /// The instrument's place on the robot in a part of a track, with its covariance: x, y, heading.
-    pub(crate) fn mounting(&self, track: usize, part: std::ops::Range<usize>) -> Option<(Pose, DMatrix<f64>)> {
-        let rows: Vec<MountingRow> =
-            windows_rows(&self.tracks[track], &self.dead_reckoned[track], windows(part, self.span)).collect();
-        if rows.len() < crate::settings::records::MIN_WINDOWS_PER_MOUNTING {
+    /// The instrument's place on the robot in a track, with its covariance (x, y, heading), by the windows
+    /// that are taken.
+    pub(crate) fn mounting(
+        &self,
+        track: usize,
+        is_taken: impl Fn((usize, usize)) -> bool,
+    ) -> Option<(Pose, Matrix3<f64>)> {
+        let taken = windows(self.tracks[track].len(), self.span).filter(|window| is_taken(*window));
+        let rows: Vec<MountingRow> = mounting_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
+        if rows.len() < MIN_WINDOWS_PER_MOUNTING {
             return None;
         }
         let (mounting, covariance) = Mounting::of(&rows)?;
         // The heading is that of (cos, sin).
-        let (of, scale) = (mounting.0, mounting.scale());
-        let to_heading = DVector::from_vec(vec![-of[1] / (scale * scale), of[0] / (scale * scale), 0.0, 0.0]);
-        let mut to = DMatrix::zeros(3, 4);
-        (to[(0, 2)], to[(1, 3)]) = (1.0, 1.0);
-        to.row_mut(2).copy_from(&to_heading.transpose());
-        let covariance = DMatrix::from_fn(4, 4, |row, column| covariance[(row, column)]);
-        Some((mounting.body_from_sensor(), &to * covariance * to.transpose()))
+        let ([cos, sin, ..], scale) = (mounting.0.data.0[0], mounting.scale());
+        let per = scale * scale;
+        let to = Matrix3x4::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -sin / per, cos / per, 0.0, 0.0);
+        Some((mounting.body_from_sensor(), to * covariance * to.transpose()))
     }
 }
 
 /// Windows of a span, one after the other.
-fn windows(part: std::ops::Range<usize>, span: usize) -> impl Iterator<Item = (usize, usize)> {
-    let end = part.end;
-    part.step_by(span).map(move |from| (from, from + span)).take_while(move |(_, to)| *to < end)
+fn windows(poses: usize, span: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..poses).step_by(span).map(move |from| (from, from + span)).take_while(move |(_, to)| *to < poses)
 }
 
 /// The shortest span whose windows reach so far that wheels show in them, by their median.
@@ -223,7 +245,7 @@ fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
         let mut distances_m: Vec<f64> = tracks
             .iter()
             .flat_map(|track| {
-                windows(0..track.len(), *span).map(|window| {
+                windows(track.len(), *span).map(|window| {
                     let Wheels { left, right } = track.travel_m(window);
                     left.abs().max(right.abs())
                 })
@@ -243,7 +265,7 @@ struct MountingRow {
     turn_rad: f64,
 }
 
-fn windows_rows<'t>(
+fn mounting_rows<'t>(
     track: &'t PoseTrack,
     poses: &'t [Pose],
     windows: impl Iterator<Item = (usize, usize)> + 't,

@@ -63,8 +63,9 @@ pub(crate) fn fault(
             if outlying && !visible_in_log {
                 continue;
             }
-            let own = sessions(&records);
-            let Ok(fit) = PLAIN.fit(&own) else { continue };
+            // Compared by the measurements of the records as they are: what is not compared later counts here.
+            let compared = with_unknown_motion_of(datasets, &records);
+            let Ok(fit) = PLAIN.fit(&sessions(&compared)) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless
             // they show it by themselves. What was lost is not restored to the last count: measurements may
             // still lie off, but far fewer of them.
@@ -101,6 +102,16 @@ pub(crate) fn fault(
         }
     }
     best.map(|(_, fault)| fault)
+}
+
+/// Records whose motion is unknown where that of others is.
+fn with_unknown_motion_of(of: &[Dataset], records: &[Dataset]) -> Vec<Dataset> {
+    let mut records = records.to_vec();
+    let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
+    for (run, other) in runs.zip(of.iter().flat_map(|dataset| &dataset.runs)) {
+        run.unknown_motion.clone_from(&other.unknown_motion);
+    }
+    records
 }
 
 /// How implausible the geometry parameters of a fit are, as a part of its cost.

@@ -38,7 +38,7 @@ paths: what tells two apart is the path.
 an effect unless it says otherwise under *Excited by*. *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or at a
 scale of the sizes given, and where it has another functional form than the catalogue's, in that on one robot in two.
 
-This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test -p effects --test document`.
+This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test --release -p effects --test document`.
 ";
 
 type Holds = fn(&Hypothesis) -> bool;
@@ -281,7 +281,7 @@ fn the_document_is_what_the_catalogue_says() {
         assert_eq!(
             written,
             generated,
-            "docs/effects.md, line {}: run YAIR_UPDATE_DOCS=1 cargo test -p effects --test document",
+            "docs/effects.md, line {}: run YAIR_UPDATE_DOCS=1 cargo test --release -p effects --test document",
             number + 1
         );
     }

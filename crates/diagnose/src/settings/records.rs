@@ -234,3 +234,19 @@ pub(crate) const MIN_MOUNTINGS: usize = 5;
 /// Number of windows that determine the mounting of a run.
 /// Convention: twice its unknowns.
 pub(crate) const MIN_WINDOWS_PER_MOUNTING: usize = 8;
+
+/// Metres and radians. Least standard deviation of windows.
+/// Convention: a tenth of a millimetre; records of simulations may have no noise.
+pub(crate) const MIN_WINDOW_SIGMA: f64 = 1e-4;
+
+/// Share of a run. What is beyond wheels for longer is tried as another mounting.
+/// Convention: a quarter.
+pub(crate) const LASTING_SHARE: f64 = 0.25;
+
+/// Ratio to the least other mounting. A run that determines its own to no better than this says nothing.
+/// Convention: ten times.
+pub(crate) const MAX_LEAST_MOUNTINGS: f64 = 10.0;
+
+/// Median lengths of a row. A row that lasts longer has others missing before it.
+/// Convention: nearer to two than to one, and beyond ordinary jitter.
+pub(crate) const MIN_GAP_RATIO: f64 = 1.8;
