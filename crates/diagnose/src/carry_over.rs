@@ -7,9 +7,11 @@
 //! the geometry that they have in common: one step of Gauss and Newton from the fit, with a covariance that
 //! is robust over runs. With a of the unit and b of all others, the extension lowers the unit's error
 //! exactly when a/b > ½: the contrast a − ½ b decides. A unit is asked where the others determine b, and
-//! where a = b would show.
+//! where a = b would show. What the units have says what another one will have: where their sizes scatter so
+//! that it may well have less than half, none of them need to refute the term for it to stay open.
 //!
-//! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979.
+//! References: Liang & Zeger 1986 (covariance over clusters); Holm 1979; Higgins, Thompson & Spiegelhalter
+//! 2009 (what a new unit will have).
 
 use std::collections::BTreeMap;
 
@@ -18,9 +20,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::AugmentedModel;
 use crate::document::Value;
+use crate::heterogeneity::Heterogeneity;
 use crate::kinds::kinds_of_runs;
 use crate::settings::carry_over::{
-    MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
+    MAX_LESS_THAN_HALF, MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
 };
 use crate::settings::levels::MIN_RUNS;
 use crate::statistics::{holm, p_of_z};
@@ -84,6 +87,7 @@ impl Units {
 pub(crate) struct SizesByUnit {
     level: Level,
     units: Vec<UnitShare>,
+    heterogeneity: Option<Heterogeneity>,
 }
 
 /// One unit's share, and how it stands against the others.
@@ -122,6 +126,11 @@ pub(crate) struct CarryOver {
 }
 
 impl CarryOver {
+    /// How the sizes differ between the units of each level that has enough of them.
+    pub(crate) fn heterogeneity(&self) -> impl Iterator<Item = (Level, Heterogeneity)> {
+        self.by_level.iter().filter_map(|sizes| Some((sizes.level, sizes.heterogeneity?)))
+    }
+
     /// Sizes of each parameter by the units of a level: of units that determine them.
     pub(crate) fn sizes(
         &self,
@@ -170,7 +179,16 @@ fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
             return (Some(false), format!("{noun} {name} has less than half of the size that the others give it"));
         }
         let of = sizes.units.len();
-        if testable.len() >= MIN_TESTABLE_UNITS && testable.iter().all(|(_, contrast)| z(contrast) > SUPPORTED_SIGMAS) {
+        let scatters = sizes.heterogeneity.filter(|of| of.less_than_half > MAX_LESS_THAN_HALF && of.tau > 0.0);
+        if let Some(Heterogeneity { tau, less_than_half, .. }) = scatters {
+            open.push(format!(
+                "sizes scatter by {:.0} % over each {noun}: another one has less than half with a probability of {:.2}",
+                100.0 * tau,
+                less_than_half
+            ));
+        } else if testable.len() >= MIN_TESTABLE_UNITS
+            && testable.iter().all(|(_, contrast)| z(contrast) > SUPPORTED_SIGMAS)
+        {
             supported.push(format!("{} of {of} by {noun}", testable.len()));
         } else {
             let plain =
@@ -225,7 +243,8 @@ fn sizes_by_unit(model: &AugmentedModel<'_>, candidate: usize, units: &Units, le
         .enumerate()
         .map(|(unit, name)| UnitShare { name: name.clone(), own: share(unit), contrast: contrast(unit) })
         .collect();
-    Some(SizesByUnit { level, units: of_units })
+    let determined: Vec<(f64, f64)> = of_units.iter().filter_map(|unit| unit.own).collect();
+    Some(SizesByUnit { level, units: of_units, heterogeneity: Heterogeneity::of(&determined) })
 }
 
 /// The runs' normal equations by the columns that all units share, and along the size found of one candidate.
@@ -304,7 +323,7 @@ mod tests {
     }
 
     fn sessions(units: Vec<UnitShare>) -> SizesByUnit {
-        SizesByUnit { level: Level::Session, units }
+        SizesByUnit { level: Level::Session, units, heterogeneity: None }
     }
 
     #[test]
@@ -320,6 +339,13 @@ mod tests {
         assert_eq!(verdict(&[sessions(vec![agree(), weak])]).0, None);
         assert_eq!(verdict(&[sessions(vec![agree(), unit("b", (0.5, 0.1), (0.0, 0.1))])]).0, None);
         assert_eq!(verdict(&[]).0, None);
+        // Units that all have more than half, but differ so that another may not.
+        let units = || vec![unit("a", (0.6, 0.02), (0.1, 0.02)), unit("b", (2.0, 0.02), (1.5, 0.02)), agree()];
+        assert_eq!(verdict(&[sessions(units())]).0, Some(true));
+        let heterogeneity = Heterogeneity::of(&[(0.6, 0.02), (2.0, 0.02), (1.0, 0.1)]);
+        let (found, why) = verdict(&[SizesByUnit { heterogeneity, ..sessions(units()) }]);
+        assert_eq!(found, None);
+        assert!(why.contains("another one has less than half"), "{why}");
     }
 
     #[test]

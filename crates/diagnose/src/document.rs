@@ -118,6 +118,25 @@ pub struct Finding {
     pub by_session: BTreeMap<String, BTreeMap<String, Value>>,
     /// The same for each kind of path.
     pub by_kind: BTreeMap<String, BTreeMap<String, Value>>,
+    /// How the sizes differ between sessions, and between kinds of path, where there are three or more.
+    pub heterogeneity: Vec<Differences>,
+}
+
+/// How the sizes of a term differ between the units of one level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Differences {
+    /// The level.
+    pub level: GainLevel,
+    /// How many units determine their size.
+    pub units: usize,
+    /// Cochran's Q; χ² of one degree less than units where all have one size.
+    pub cochran_q: f64,
+    /// Its p-value.
+    pub p_value: f64,
+    /// Standard deviation of the units' own sizes, as a share of the size found in all.
+    pub tau: f64,
+    /// Probability that a new unit has less than half of the mean size.
+    pub less_than_half_probability: f64,
 }
 
 /// A size.

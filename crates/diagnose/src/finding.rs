@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use effects::{CATALOGUE, Hypothesis, Mounting, Sign, hypothesis};
+use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
 use estimation::{ModelFit, NoiseComponent};
 
 use crate::candidate::Candidate;
@@ -24,8 +24,7 @@ use crate::settings::findings::{
 use crate::settings::levels::{
     LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
 };
-use crate::statistics::{p_of_chi_square, p_of_z, sidak, z_of_p};
-use crate::unknown_motion::{Anomaly, AnomalyKind};
+use crate::statistics::{p_of_chi_square, sidak, z_of_p};
 use crate::wald::Test;
 
 /// Something that the calibrated model gets wrong.
@@ -303,61 +302,6 @@ pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
     let basis = Basis::ClockOffset(offset.offset_s);
     let found = of_causes(vec![cause], p_of_chi_square(2.0 * offset.gain, 1.0), parameters, basis);
     Finding { runs: offset.runs.clone(), ..found }
-}
-
-/// Runs and intervals that do not belong, those of one kind together.
-pub(crate) fn of_anomalies(anomalies: &[Anomaly], without: &[String]) -> Vec<Finding> {
-    let mut kinds: Vec<AnomalyKind> = anomalies.iter().map(|anomaly| anomaly.kind).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    let of_kind = |kind: AnomalyKind| {
-        let mut own: Vec<Anomaly> = anomalies.iter().filter(|anomaly| anomaly.kind == kind).cloned().collect();
-        own.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
-        let mut runs: Vec<String> = own.iter().map(|anomaly| anomaly.run.clone()).collect();
-        runs.sort();
-        runs.dedup();
-        let largest = own.first()?;
-        let displaced = largest.displaced;
-        let value =
-            |name: &str, value: f64, unit: &str| (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() });
-        let parameters = match kind {
-            AnomalyKind::Frame | AnomalyKind::RobotOrFrame => vec![
-                value("events", own.len() as f64, "1"),
-                value("from_s", largest.span_s[0], "s"),
-                value("to_s", largest.span_s[1], "s"),
-                value("along_m", displaced.x_m, "m"),
-                value("across_m", displaced.y_m, "m"),
-                value("turn_rad", displaced.theta_rad, "rad"),
-            ],
-            AnomalyKind::MountingPlace | AnomalyKind::MountingHeading => vec![
-                value("lever_x_m", displaced.x_m, "m"),
-                value("lever_y_m", displaced.y_m, "m"),
-                value("yaw_rad", displaced.theta_rad, "rad"),
-            ],
-        };
-        let causes: Vec<Cause> = CATALOGUE
-            .iter()
-            .copied()
-            .filter(|id| is_of(kind, id) && !without.iter().any(|out| out == id))
-            .map(Cause::Effect)
-            .collect();
-        let p_value = p_of_z(largest.sigmas);
-        let found = of_causes(causes, p_value, parameters.into_iter().collect(), Basis::Anomalies(own));
-        Some(Finding { runs: Some(runs), ..found })
-    };
-    kinds.into_iter().filter_map(of_kind).collect()
-}
-
-/// Whether an effect of the catalogue is an anomaly of that kind.
-fn is_of(kind: AnomalyKind, id: &str) -> bool {
-    let mounting = || effects::description(id).and_then(|description| description.mounting);
-    match (kind, hypothesis(id)) {
-        (AnomalyKind::Frame, Some(Hypothesis::UnknownMotion { is_of_instrument })) => is_of_instrument,
-        (AnomalyKind::RobotOrFrame, Some(Hypothesis::UnknownMotion { .. })) => true,
-        (AnomalyKind::MountingPlace, _) => mounting() == Some(Mounting::Place),
-        (AnomalyKind::MountingHeading, _) => mounting() == Some(Mounting::Heading),
-        _ => false,
-    }
 }
 
 /// Adds what was taken off the clock before the fit to what was found of it after.

@@ -3,6 +3,7 @@
 
 use effects::GeometryRatio;
 
+use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
 use crate::cause::Doubt;
 use crate::check::TestResult;
@@ -102,7 +103,7 @@ fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
 
 /// Intervals across which nothing was compared, and runs that were left out.
 fn anomalies(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    findings.extend(finding::of_anomalies(results.anomalies, results.without));
+    findings.extend(of_anomalies(results.anomalies, results.without));
     findings
 }
 

@@ -8,6 +8,7 @@
 //! docs/diagnose.md says what the numbers mean.
 
 mod alternatives;
+mod anomaly_findings;
 mod augmented_model;
 mod candidate;
 mod carry_over;
@@ -26,6 +27,7 @@ mod findings;
 mod fit_cache;
 mod gain;
 mod geometry_deviations;
+mod heterogeneity;
 mod kinds;
 mod large_errors;
 mod log_rows;
@@ -56,7 +58,7 @@ mod wald;
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
-    Blind, CandidateCause, Check, Compared, Document, Finding, Gain, GainLevel, LevelGain, NextExperiment,
+    Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, LevelGain, NextExperiment,
     PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
 };
 pub use extended_model::{ExtendedModel, ExtendedModelError};

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use effects::GeometryRatio;
 
 use crate::alternatives::{Alternative, Status};
-use crate::carry_over::Level;
+use crate::carry_over::{CarryOver, Level};
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
-use crate::document::{self, Gain, UnlistedTerm, Value, Verdict};
+use crate::document::{self, Gain, GainLevel, UnlistedTerm, Value, Verdict};
 use crate::finding::Finding;
+use crate::heterogeneity::Heterogeneity;
 use crate::unknown_motion::{Anomaly, AnomalyKind};
 
 /// A finding as scripts get it.
@@ -38,6 +39,22 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         of_the_mean: finding.carry_over.is_some(),
         by_session: by(Level::Session),
         by_kind: by(Level::Kind),
+        heterogeneity: finding.carry_over.iter().flat_map(CarryOver::heterogeneity).map(differences).collect(),
+    }
+}
+
+/// How sizes differ between units, as scripts get it.
+fn differences((level, of): (Level, Heterogeneity)) -> document::Differences {
+    document::Differences {
+        level: match level {
+            Level::Session => GainLevel::Sessions,
+            Level::Kind => GainLevel::Kinds,
+        },
+        units: of.units,
+        cochran_q: of.q,
+        p_value: of.p_value,
+        tau: of.tau,
+        less_than_half_probability: of.less_than_half,
     }
 }
 

@@ -242,10 +242,20 @@ fn other_mountings(
             lasts || events[track].iter().all(|event| to <= event.poses.start || from >= event.poses.end - 1)
         };
         let (pose, covariance) = calibrated.mounting(track, is_taken)?;
-        let explains = !lasts || limits.events(calibrated, track, pose).is_empty();
-        explains.then(|| (track, pose, [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt())))
+        if lasts && !limits.events(calibrated, track, pose).is_empty() {
+            return None;
+        }
+        // Windows of noisy headings err together; the halves of a run do not.
+        let middle = calibrated.tracks[track].len() / 2;
+        let half = |first: bool| {
+            let is_of_half = |window: (usize, usize)| is_taken(window) && (window.0 < middle) == first;
+            calibrated.mounting(track, is_of_half).map(|(pose, _)| pose)
+        };
+        let halves = [half(true)?, half(false)?];
+        Some((track, pose, halves, [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt())))
     };
-    let mountings: Vec<(usize, Pose, [f64; 3])> = (0..calibrated.tracks.len()).filter_map(of_track).collect();
+    let mountings: Vec<(usize, Pose, [Pose; 2], [f64; 3])> =
+        (0..calibrated.tracks.len()).filter_map(of_track).collect();
     let least = [limits.place_m(), limits.place_m(), MIN_OTHER_MOUNTING_RAD];
     let reference = calibrated.body_from_sensor;
     let components = |pose: &Pose| {
@@ -258,20 +268,25 @@ fn other_mountings(
     let mut found: Vec<(usize, OtherMounting)> = Vec::new();
     for (axis, least) in least.into_iter().enumerate() {
         // The tracks that determine it.
-        let of: Vec<(usize, f64, f64)> = mountings
+        let of: Vec<(usize, f64, [f64; 2], f64)> = mountings
             .iter()
-            .map(|(track, pose, sigma)| (*track, components(pose)[axis], sigma[axis]))
+            .map(|(track, pose, halves, sigma)| {
+                (*track, components(pose)[axis], halves.map(|half| components(&half)[axis]), sigma[axis])
+            })
             .filter(|(.., sigma)| MIN_OTHER_MOUNTING_SIGMAS * sigma < MAX_LEAST_MOUNTINGS * least)
             .collect();
         if of.len() < MIN_MOUNTINGS {
             continue;
         }
-        let middle = median(of.iter().map(|(_, value, _)| *value).collect());
+        let middle = median(of.iter().map(|(_, value, ..)| *value).collect());
         // 1.4826 times the median of normal deviations is their standard deviation.
-        let scatter = 1.4826 * median(of.iter().map(|(_, value, _)| (value - middle).abs()).collect());
+        let scatter = 1.4826 * median(of.iter().map(|(_, value, ..)| (value - middle).abs()).collect());
         let odd: Vec<(usize, f64, f64)> = of
             .iter()
-            .map(|(track, value, sigma)| (*track, value - middle, (value - middle).abs() / sigma.max(scatter)))
+            .filter(|(_, value, halves, _)| {
+                halves.iter().all(|half| (half - middle) * (value - middle).signum() > 0.5 * (value - middle).abs())
+            })
+            .map(|(track, value, _, sigma)| (*track, value - middle, (value - middle).abs() / sigma.max(scatter)))
             .filter(|(_, off, z)| off.abs() > least && *z > MIN_OTHER_MOUNTING_SIGMAS)
             .collect();
         // Where many runs are odd, none is.
@@ -299,4 +314,139 @@ fn other_mountings(
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use kinematics::{Increment, Wheels};
+
+    use super::*;
+
+    const SEPARATION_M: f64 = 0.36;
+
+    /// What happens in one of the runs.
+    #[derive(Clone, Copy)]
+    enum Happens {
+        /// The robot is carried by so much, in as many rows of 0.1 s.
+        Carried(Pose, usize),
+        /// The instrument's frame moves by so much, about the robot.
+        FrameMoves(Pose),
+        /// One measurement is off by so much.
+        Outlier(Pose),
+        /// The instrument is elsewhere on the robot.
+        Elsewhere(Pose),
+    }
+
+    /// Eight runs of 20 s with turns both ways and measurements that round to a millimetre; something happens
+    /// in the fourth.
+    fn driven(happens: Option<Happens>) -> Dataset {
+        let mounting = Pose::new(0.05, 0.02, 0.1);
+        let run = |number: usize| {
+            let happens = happens.filter(|_| number == 3);
+            let (mut pose, mut frame) = (Pose::new(0.3, -0.2, 0.7), Pose::IDENTITY);
+            let (mut turns, mut truth) = (Wheels::both(vec![0.0]), Vec::new());
+            for row in 0..=200_usize {
+                let t_s = 0.1 * row as f64;
+                if row > 0 {
+                    let turned = Wheels { left: 0.4 + 0.2 * (0.5 * t_s).sin(), right: 0.4 + 0.25 * (0.7 * t_s).cos() };
+                    // The wheels are a little larger than stated.
+                    pose = pose * Increment::from_travel(turned.map(|rad| 0.081 * rad), SEPARATION_M).arc();
+                    turns = turns.zip_with(turned, |mut all, rad| {
+                        all.push(all[row - 1] + rad);
+                        all
+                    });
+                }
+                let mut sensor = mounting;
+                match happens {
+                    Some(Happens::Carried(by, rows)) if (100..100 + rows).contains(&row) => {
+                        let share = 1.0 / rows as f64;
+                        pose = pose * Pose::new(share * by.x_m, share * by.y_m, share * by.theta_rad);
+                    }
+                    Some(Happens::FrameMoves(by)) if row == 100 => frame = pose * by * pose.inverse(),
+                    Some(Happens::Elsewhere(at)) => sensor = at,
+                    _ => {}
+                }
+                let mut seen = frame * pose * sensor;
+                if let Some(Happens::Outlier(by)) = happens.filter(|_| row == 100) {
+                    seen = seen * by;
+                }
+                let [x_m, y_m] = [seen.x_m, seen.y_m].map(|m| 1e-3 * (1e3 * m).round());
+                truth.push(TruthSample::new(t_s, x_m, y_m, Some(seen.theta_rad)));
+            }
+            Run {
+                info: RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() },
+                odometry: Odometry {
+                    t_s: (0..=200).map(|row| 0.1 * f64::from(row)).collect(),
+                    wheels: WheelLog::Angles(turns),
+                    ..Odometry::default()
+                },
+                truth,
+                ..Run::default()
+            }
+        };
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: SEPARATION_M,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: (0..8).map(run).collect(),
+        }
+    }
+
+    fn found(happens: Happens) -> UnknownMotions {
+        unknown_motions(&[driven(Some(happens))]).expect("something happens")
+    }
+
+    #[test]
+    fn what_is_ordinary_and_what_is_undone_at_once_is_no_event() {
+        assert!(unknown_motions(&[driven(None)]).is_none());
+        assert!(unknown_motions(&[driven(Some(Happens::Outlier(Pose::new(0.5, 0.3, 0.4))))]).is_none());
+        // Below what wheels can miss.
+        assert!(unknown_motions(&[driven(Some(Happens::Carried(Pose::new(0.01, 0.0, 0.02), 1)))]).is_none());
+    }
+
+    #[test]
+    fn a_robot_that_is_carried_is_found_with_its_displacement_and_nothing_is_compared_meanwhile() {
+        let by = Pose::new(0.2, -0.1, 0.3);
+        let UnknownMotions { anomalies, records } = found(Happens::Carried(by, 5));
+        let [anomaly] = &anomalies[..] else { panic!("one event, not {}", anomalies.len()) };
+        assert_eq!((anomaly.kind, anomaly.run.as_str()), (AnomalyKind::RobotOrFrame, "run-3"));
+        let [from_s, to_s] = anomaly.span_s;
+        assert!(from_s < 10.0 && to_s >= 10.4 && to_s - from_s < 1.2, "{from_s} to {to_s}");
+        // The robot drives on meanwhile: the displacement is seen from where it was, to a few per cent.
+        let displaced = anomaly.displaced;
+        assert!((displaced.x_m.hypot(displaced.y_m) - 0.05_f64.sqrt()).abs() < 0.03, "{displaced:?}");
+        assert!((displaced.theta_rad - 0.3).abs() < 0.01, "{displaced:?}");
+        assert!(records[0].runs[3].is_motion_unknown(10.0, 10.1));
+        assert!(!records[0].runs[3].is_motion_unknown(8.0, 9.0));
+    }
+
+    #[test]
+    fn a_frame_that_jumps_farther_than_robots_drive_is_the_instruments() {
+        let anomalies = found(Happens::FrameMoves(Pose::new(0.3, 0.2, 0.1))).anomalies;
+        let [anomaly] = &anomalies[..] else { panic!("one event, not {}", anomalies.len()) };
+        assert_eq!(anomaly.kind, AnomalyKind::Frame);
+        // As far as a robot drives in 0.1 s it may be either.
+        let anomalies = found(Happens::FrameMoves(Pose::new(0.0, 0.04, 0.0))).anomalies;
+        assert_eq!(anomalies[0].kind, AnomalyKind::RobotOrFrame);
+    }
+
+    #[test]
+    fn a_run_with_the_instrument_elsewhere_is_left_out() {
+        let UnknownMotions { anomalies, records } = found(Happens::Elsewhere(Pose::new(0.05, 0.02, 0.2)));
+        let [anomaly] = &anomalies[..] else { panic!("one run, not {}", anomalies.len()) };
+        assert_eq!((anomaly.kind, anomaly.run.as_str()), (AnomalyKind::MountingHeading, "run-3"));
+        assert!((anomaly.displaced.theta_rad - 0.1).abs() < 0.01, "{:?}", anomaly.displaced);
+        assert!(records[0].runs.len() == 7 && records[0].runs.iter().all(|run| run.info.id != "run-3"));
+        let place = found(Happens::Elsewhere(Pose::new(0.08, 0.02, 0.1))).anomalies;
+        assert_eq!(place[0].kind, AnomalyKind::MountingPlace);
+        assert!((place[0].displaced.x_m - 0.03).abs() < 0.005, "{:?}", place[0].displaced);
+    }
 }

@@ -36,3 +36,7 @@ pub(crate) const ONE_SENSE_SHARE: f64 = 0.9;
 /// Ratio. Standard deviation of a circle's curvature along its path over the mean.
 /// Convention: a half; a square with corners on the spot has several times its mean.
 pub(crate) const CONSTANT_CURVATURE_SPREAD: f64 = 0.5;
+
+/// Probability. A term stays open where a new unit has less than half of its size more probably.
+/// Convention: 5 %.
+pub(crate) const MAX_LESS_THAN_HALF: f64 = 0.05;
