@@ -78,11 +78,6 @@ impl Quantity {
     pub fn of_key(key: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|quantity| quantity.key() == key)
     }
-
-    /// Whether it is a part of a pose.
-    pub(crate) fn is_of_pose(self) -> bool {
-        self >= Self::X
-    }
 }
 
 /// What a name says.

@@ -22,7 +22,7 @@ mod warning;
 mod write;
 
 pub use column_names::Quantity;
-pub use counter::suspected_wrap;
+pub use counter::{suspected_spike, suspected_wrap};
 pub use error::DatasetError;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
