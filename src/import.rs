@@ -60,7 +60,8 @@ impl FromArgMatches for Format {
 impl Subcommand for Format {
     fn augment_subcommands(command: Command) -> Command {
         let csv = import_csv::Arguments::augment_args(Command::new(CSV));
-        let known = IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name).about(importer.about)));
+        let known =
+            IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name)).about(importer.about));
         command.subcommand(csv).subcommands(known).subcommand_required(true).subcommand_value_name("FORMAT")
     }
 

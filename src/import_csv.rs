@@ -112,7 +112,10 @@ fn diameters(text: &str) -> Result<Wheels<f64>, String> {
 }
 
 /// A value of a fixed list, by its name.
-fn named<T: Copy + Send + Sync + 'static>(all: &[T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T> + use<T> {
+fn named<T: Copy + Send + Sync + 'static>(
+    all: &[T],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> + use<T> {
     let all = all.to_vec();
     PossibleValuesParser::new(all.iter().map(|value| name(*value)).collect::<Vec<_>>())
         .try_map(move |text| all.iter().copied().find(|value| name(*value) == text).ok_or("no such value"))
@@ -179,7 +182,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 impl Arguments {
     fn options(&self) -> Result<Options, Failure> {
         let robot = self.robot.as_ref().map(|file| read_robot(file)).transpose()?;
-        let diameter = |robot: NominalRobot| Wheels { left: robot.left_wheel_diameter_m, right: robot.right_wheel_diameter_m };
+        let diameter =
+            |robot: NominalRobot| Wheels { left: robot.left_wheel_diameter_m, right: robot.right_wheel_diameter_m };
         Ok(Options {
             writing: Writing { delimiter: self.delimiter, decimal: self.decimal, header: self.header },
             map: self.map.clone(),
@@ -207,8 +211,8 @@ fn read_robot(file: &PathBuf) -> Result<NominalRobot, Failure> {
         robot: NominalRobot,
     }
     let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    let with_robot: WithRobot =
-        toml::from_str(&text).map_err(|error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message()))?;
+    let with_robot: WithRobot = toml::from_str(&text)
+        .map_err(|error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message()))?;
     Ok(with_robot.robot)
 }
 

@@ -147,7 +147,8 @@ fn counts_and_poses_in_one_file_calibrate_as_the_dataset_however_they_are_writte
 
     // As a German spreadsheet has it.
     let german = |row: &Row| {
-        let cells = format!("{};{};{};{};{};{}", row.t_s, row.left, row.right, row.x_m, row.y_m, row.theta_rad.to_degrees());
+        let cells =
+            format!("{};{};{};{};{};{}", row.t_s, row.left, row.right, row.x_m, row.y_m, row.theta_rad.to_degrees());
         cells.replace('.', ",")
     };
     table(&at.join("german.csv"), "Zeit [s];Encoder links;Encoder rechts;x [m];y [m];Winkel [°]", &rows, german);
@@ -207,16 +208,41 @@ fn speeds_of_wheels_and_twists_calibrate_as_the_dataset() {
     // A twist of the nominal robot is the same motion.
     let twist = |row: &Row| {
         let [left, right] = [row.left, row.right].map(|rate| rate * WHEEL_M / 2.0);
-        format!("{},{},{},{},{},{}", row.t_s, (left + right) / 2.0, (right - left) / BASE_M, row.x_m, row.y_m, row.theta_rad)
+        format!(
+            "{},{},{},{},{},{}",
+            row.t_s,
+            (left + right) / 2.0,
+            (right - left) / BASE_M,
+            row.x_m,
+            row.y_m,
+            row.theta_rad
+        )
     };
     table(&at.join("twist.csv"), "time,v,omega,gt_x,gt_y,gt_theta", &rows, twist);
     imported(at, &["twist.csv"], &[]);
     same(at, "new", "direct");
 
+    // Turns a minute, and quaternions.
+    let turns = |row: &Row| {
+        let [left, right] = [row.left, row.right].map(|rate| rate * 60.0 / TAU);
+        let (half_sin, half_cos) = (row.theta_rad / 2.0).sin_cos();
+        format!("{},{left},{right},{},{},0,0,{half_sin},{half_cos}", row.t_s, row.x_m, row.y_m)
+    };
+    table(&at.join("turns.csv"), "time,rpm_l,rpm_r,pose.x,pose.y,q.x,q.y,q.z,q.w", &rows, turns);
+    imported(at, &["turns.csv"], &[]);
+    same(at, "new", "direct");
+
     // Of the instant: each interval's mean is that of its ends.
     imported(at, &["motors.csv", "mocap.csv"], &["--rates", "instantaneous"]);
     let odometry = fs::read_to_string(at.join("new/odometry.csv")).expect("read");
-    let third: Vec<f64> = odometry.lines().nth(3).expect("a row").split(',').skip(2).map(|cell| cell.parse().expect("a number")).collect();
+    let third: Vec<f64> = odometry
+        .lines()
+        .nth(3)
+        .expect("a row")
+        .split(',')
+        .skip(2)
+        .map(|cell| cell.parse().expect("a number"))
+        .collect();
     let mean = (rows[1].left + rows[2].left) / 2.0 * WHEEL_M / 2.0;
     assert!((third[0] - mean).abs() < 1e-12, "{third:?} {mean}");
 }
@@ -247,7 +273,10 @@ fn runs_come_from_a_column_from_files_and_from_standstills() {
     let found = document(at, &[&["import", "csv", "rest.csv", "--out", "cut", "--cut", "5"][..], &ROBOT].concat());
     assert_eq!(found["datasets"][0]["runs"], 2);
     // The whole file twice: time restarts.
-    let twice: String = ["t,enc_l,enc_r,x,y,theta\n".to_owned()].into_iter().chain([&there, &there].into_iter().flatten().map(|row| cells(row) + "\n")).collect();
+    let twice: String = ["t,enc_l,enc_r,x,y,theta\n".to_owned()]
+        .into_iter()
+        .chain([&there, &there].into_iter().flatten().map(|row| cells(row) + "\n"))
+        .collect();
     fs::write(at.join("twice.csv"), twice).expect("written");
     let twice = [&["import", "csv", "twice.csv", "--out", "twice"][..], &ROBOT].concat();
     assert!(refusal(at, &twice).contains("--runs-by COLUMN, or --cut SECONDS"));
@@ -263,7 +292,8 @@ fn what_cannot_be_told_is_asked_for_and_nothing_is_written() {
     let cells = |row: &Row| format!("{},{},{},{}", counts(row), row.x_m, row.y_m, row.theta_rad);
     table(&at.join("log.csv"), "t,enc_l,enc_r,x,y,theta", &rows, cells);
     let before = everything_in(at);
-    let refused = |files: &[&str], flags: &[&str]| refusal(at, &[&["import", "csv", "--out", "new"], files, flags].concat());
+    let refused =
+        |files: &[&str], flags: &[&str]| refusal(at, &[&["import", "csv", "--out", "new"], files, flags].concat());
 
     let message = refused(&["log.csv"], &[]);
     let typed = "yair import csv --out new log.csv --wheel DIAMETER_M --base SEPARATION_M --ticks-per-rev COUNTS";
@@ -273,7 +303,10 @@ fn what_cannot_be_told_is_asked_for_and_nothing_is_written() {
     let message = refused(&["log.csv"], &[&ROBOT[..], &["--map", "left=encoder"]].concat());
     assert!(message.contains("no column \"encoder\"") && message.contains("t, enc_l, enc_r"), "{message}");
     // Wheels of millimetres are bad usage.
-    assert!(usage(at, &["import", "csv", "log.csv", "--out", "new", "--wheel", "150"]).contains("metres are expected: 0.15"));
+    assert!(
+        usage(at, &["import", "csv", "log.csv", "--out", "new", "--wheel", "150"])
+            .contains("metres are expected: 0.15")
+    );
 
     // Two columns that are as likely, steps of 2 s or of 2 ms, headings of a robot that does not turn.
     let doubled = |row: &Row| format!("{},{}", cells(row), row.x_m);
@@ -291,9 +324,14 @@ fn what_cannot_be_told_is_asked_for_and_nothing_is_written() {
     let straight = drive(&[(0.3, 0.0, 200)]);
     let message = ambiguous("straight.csv", "t,enc_l,enc_r,x,y,theta", &straight, &cells);
     assert!(message.contains("rad or deg") && message.contains("--angle-unit"), "{message}");
-    let rates = |row: &Row| format!("{},{},{},{},{},{}", row.t_s * 40.0, row.left / 1e3, row.right / 1e3, row.x_m, row.y_m, row.theta_rad);
+    let rates = |row: &Row| {
+        format!("{},{},{},{},{},{}", row.t_s * 40.0, row.left / 1e3, row.right / 1e3, row.x_m, row.y_m, row.theta_rad)
+    };
     let message = ambiguous("steps.csv", "t,v,omega,gt_x,gt_y,gt_theta", &rows, &rates);
-    assert!(message.contains("s (rows 2 s apart) or ms (rows 0.002 s apart)") && message.contains("--time-unit"), "{message}");
+    assert!(
+        message.contains("s (rows 2 s apart) or ms (rows 0.002 s apart)") && message.contains("--time-unit"),
+        "{message}"
+    );
     assert_eq!(everything_in(at), before);
 }
 
@@ -304,7 +342,13 @@ fn people_see_what_was_taken_for_what() {
     let cells = |row: &Row| format!("{},{},{},{},7", counts(row), row.x_m, row.y_m, row.theta_rad);
     table(&at.join("log.csv"), "t,enc_l,enc_r,x,y,theta,battery", &log(), cells);
     let shown = succeed(at, &[&["import", "csv", "log.csv", "--out", "new"][..], &ROBOT].concat()).stdout;
-    for part in ["log.csv: 1221 rows, header in line 1, delimiter comma", "enc_l", "left out: battery", "--length-unit", "times as far as wheels"] {
+    for part in [
+        "log.csv: 1221 rows, header in line 1, delimiter comma",
+        "enc_l",
+        "left out: battery",
+        "--length-unit",
+        "poses reach 1.039 times",
+    ] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
     assert!(shown.ends_with("1 runs, 1221 odometry rows in new\n"), "{shown}");

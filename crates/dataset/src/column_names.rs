@@ -73,6 +73,19 @@ impl Quantity {
         }
     }
 
+    /// Whether it can be in a unit: of a wheel its counts, its angle, its contact's path, or their rates.
+    pub(crate) fn accepts(self, unit: Unit) -> bool {
+        match self {
+            Self::Run | Self::Qx | Self::Qy | Self::Qz | Self::Qw => false,
+            Self::Time => Unit::TIMES.contains(&unit),
+            Self::Left | Self::Right => Unit::WHEELS.contains(&unit) || Unit::LENGTHS.contains(&unit),
+            Self::Speed => unit.is_of_contact(),
+            Self::YawRate => unit.is_rate() && !unit.is_of_contact(),
+            Self::X | Self::Y => Unit::LENGTHS.contains(&unit),
+            Self::Heading => Unit::ANGLES.contains(&unit),
+        }
+    }
+
     /// The quantity of a `--map` name.
     #[must_use]
     pub fn of_key(key: &str) -> Option<Self> {
@@ -98,17 +111,86 @@ pub(crate) struct NameReading {
 const OWN: &[&str] =
     &["odom", "odometry", "odo", "est", "estimate", "estimated", "dr", "reckoned", "ekf", "fused", "filtered"];
 const OUTSIDE: &[&str] = &[
-    "gt", "truth", "true", "ground", "groundtruth", "ref", "reference", "mocap", "vicon", "optitrack", "qualisys", "cam",
-    "camera", "slam", "amcl", "map", "tag", "apriltag", "laser", "lidar", "tracker", "actual", "world",
+    "gt",
+    "truth",
+    "true",
+    "ground",
+    "groundtruth",
+    "ref",
+    "reference",
+    "mocap",
+    "vicon",
+    "optitrack",
+    "qualisys",
+    "cam",
+    "camera",
+    "slam",
+    "amcl",
+    "map",
+    "tag",
+    "apriltag",
+    "laser",
+    "lidar",
+    "tracker",
+    "actual",
+    "world",
 ];
 const NEVER: &[&str] = &[
-    "cmd", "command", "commanded", "set", "setpoint", "target", "desired", "des", "goal", "soll", "acc", "accel",
-    "acceleration", "imu", "mag", "gyro", "cov", "covariance", "sigma", "std", "var", "battery", "voltage", "current",
-    "temp", "temperature", "pwm", "duty", "err", "error", "status", "frame", "seq", "torque", "offset", "dt",
+    "cmd",
+    "command",
+    "commanded",
+    "set",
+    "setpoint",
+    "target",
+    "desired",
+    "des",
+    "goal",
+    "soll",
+    "acc",
+    "accel",
+    "acceleration",
+    "imu",
+    "mag",
+    "gyro",
+    "cov",
+    "covariance",
+    "sigma",
+    "std",
+    "var",
+    "battery",
+    "voltage",
+    "current",
+    "temp",
+    "temperature",
+    "pwm",
+    "duty",
+    "err",
+    "error",
+    "status",
+    "frame",
+    "seq",
+    "torque",
+    "offset",
+    "dt",
 ];
 const TIME: &[&str] = &[
-    "t", "time", "timestamp", "stamp", "ts", "zeit", "zeitstempel", "clock", "uhrzeit", "epoch", "elapsed", "sec", "secs",
-    "seconds", "millis", "micros", "nanos",
+    "t",
+    "time",
+    "timestamp",
+    "stamp",
+    "ts",
+    "zeit",
+    "zeitstempel",
+    "clock",
+    "uhrzeit",
+    "epoch",
+    "elapsed",
+    "sec",
+    "secs",
+    "seconds",
+    "millis",
+    "micros",
+    "nanos",
 ];
 const RUN: &[&str] =
     &["run", "runs", "trial", "lauf", "versuch", "experiment", "lap", "segment", "session", "episode", "bag", "fahrt"];
@@ -116,16 +198,42 @@ const NUMBERED: &[&str] = &["id", "no", "nr", "number", "index", "name", "num"];
 const LEFT: &[&str] = &["left", "l", "lft", "links", "linkes", "linker", "li", "lw", "lh"];
 const RIGHT: &[&str] = &["right", "r", "rgt", "rechts", "rechtes", "rechter", "re", "rw", "rh"];
 const COUNTED: &[&str] = &[
-    "enc", "encoder", "encoders", "tick", "ticks", "count", "counts", "cnt", "pulse", "pulses", "inkremente", "impulse",
+    "enc",
+    "encoder",
+    "encoders",
+    "tick",
+    "ticks",
+    "count",
+    "counts",
+    "cnt",
+    "pulse",
+    "pulses",
+    "inkremente",
+    "impulse",
     "n",
 ];
 const RATE: &[&str] =
     &["vel", "velocity", "speed", "v", "w", "omega", "rate", "rpm", "dot", "geschwindigkeit", "drehzahl", "twist"];
 /// Further words that stand with a side: `lwheel`, `posl`.
-const OF_WHEEL: &[&str] = &["wheel", "rad", "angle", "ang", "pos", "position", "phi", "theta", "motor", "mot", "m", "winkel"];
+const OF_WHEEL: &[&str] =
+    &["wheel", "rad", "angle", "ang", "pos", "position", "phi", "theta", "motor", "mot", "m", "winkel"];
 const HEADING: &[&str] = &[
-    "theta", "th", "yaw", "heading", "psi", "phi", "hdg", "azimuth", "gierwinkel", "winkel", "kurs", "richtung",
-    "orientation", "angle", "rot", "bearing",
+    "theta",
+    "th",
+    "yaw",
+    "heading",
+    "psi",
+    "phi",
+    "hdg",
+    "azimuth",
+    "gierwinkel",
+    "winkel",
+    "kurs",
+    "richtung",
+    "orientation",
+    "angle",
+    "rot",
+    "bearing",
 ];
 const SPEED: &[&str] = &["v", "vx", "vel", "velocity", "speed", "linear", "lin", "geschwindigkeit"];
 const YAW_RATE: &[&str] = &["omega", "w", "wz", "yawrate", "vth", "vtheta", "angular", "gierrate", "turnrate"];
@@ -139,9 +247,8 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
         unit = take_unit(&mut tokens);
     }
     let has = |words: &[&str]| tokens.iter().any(|token| words.contains(&token.as_str()));
-    let reading = |quantity, rank| {
-        Some(NameReading { quantity, unit, rank, is_own: false, is_rate: false, is_counted: false })
-    };
+    let reading =
+        |quantity, rank| Some(NameReading { quantity, unit, rank, is_own: false, is_rate: false, is_counted: false });
     if tokens.is_empty() {
         // "ms" alone is a time; "mm" alone says nothing.
         return unit.filter(|unit| Unit::TIMES.contains(unit)).and_then(|_| reading(Quantity::Time, 2));
@@ -154,18 +261,41 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
     }
     if has(TIME) && !has(&["x", "y", "z"]) {
         let of_header = has(&["header"]) && has(&["stamp"]);
-        return reading(Quantity::Time, if of_header { 4 } else if tokens.len() == 1 { 3 } else { 2 });
+        return reading(
+            Quantity::Time,
+            if of_header {
+                4
+            } else if tokens.len() == 1 {
+                3
+            } else {
+                2
+            },
+        );
     }
     if let Some((quantity, words)) = side(&tokens) {
         let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+        // `rpm_left`; no other word, as a German wheel is a Rad.
+        let unit = unit.or(has(&["rpm"]).then_some(Unit::Rpm));
         let is_counted = unit == Some(Unit::Ticks) || has(COUNTED);
         let is_rate = !is_counted && (unit.is_some_and(Unit::is_rate) || has(RATE));
-        let rank = if is_counted { 3 } else if is_rate { 1 } else { 2 };
+        let rank = if is_counted {
+            3
+        } else if is_rate {
+            1
+        } else {
+            2
+        };
         return Some(NameReading { quantity, unit, rank, is_own: false, is_rate, is_counted });
     }
     let last = tokens.last().map_or("", String::as_str);
     let is_own = has(OWN);
-    let rank = if is_own { 0 } else if has(OUTSIDE) { 2 } else { 1 };
+    let rank = if is_own {
+        0
+    } else if has(OUTSIDE) {
+        2
+    } else {
+        1
+    };
     let pose = |quantity| Some(NameReading { quantity, unit, rank, is_own, is_rate: false, is_counted: false });
     let moving = has(RATE) || has(&["linear", "angular", "lin"]);
     match (last, has(OF_ROTATION)) {
@@ -311,7 +441,10 @@ mod tests {
         assert_eq!(read("left wheel speed (deg/s)"), Some((Left, Some(Unit::DegPerS))));
         assert_eq!(read("right_m_per_s"), Some((Right, Some(Unit::MPerS))));
         assert_eq!(read("left_rpm"), Some((Left, Some(Unit::Rpm))));
-        for (name, quantity) in [("x", X), ("pos_y", Y), ("gt.x", X), ("pose.position.y", Y), ("posX", X), ("yaw", Heading)] {
+        assert_eq!(read("rpm_right"), Some((Right, Some(Unit::Rpm))));
+        for (name, quantity) in
+            [("x", X), ("pos_y", Y), ("gt.x", X), ("pose.position.y", Y), ("posX", X), ("yaw", Heading)]
+        {
             assert_eq!(read(name), Some((quantity, None)), "{name}");
         }
         assert_eq!(read("x_mm"), Some((X, Some(Unit::Mm))));

@@ -76,19 +76,24 @@ fn width_of_jumps(ticks: &[i64]) -> Option<u8> {
 const SPIKE_RATIO: u64 = 1000;
 
 fn spike(ticks: &[i64]) -> Option<usize> {
-    let increments: Vec<i64> = ticks.windows(2).map(|pair| pair[1].wrapping_sub(pair[0])).collect();
-    let (at, _) = increments.iter().enumerate().max_by_key(|(_, increment)| increment.unsigned_abs())?;
+    // Columns may be as large as the memory: nothing is collected.
+    let increment = |row: usize| ticks[row + 1].wrapping_sub(ticks[row]);
+    let rows = ticks.len().checked_sub(1)?;
+    let at = (0..rows).max_by_key(|&row| increment(row).unsigned_abs())?;
     // The largest is the leap away or the leap back.
-    let away = [at, at.wrapping_sub(1)].into_iter().find(|&away| {
-        let pair = increments.get(away).zip(increments.get(away.wrapping_add(1)));
-        pair.is_some_and(|(away, back)| away.signum() * back.signum() < 0)
-    })?;
-    let others = increments.iter().enumerate().filter(|(index, _)| *index != away && *index != away + 1);
-    let usual = others.map(|(_, increment)| increment.unsigned_abs()).max()?.max(1);
-    let leaps = [increments[away], increments[away + 1]];
+    let away = [Some(at), at.checked_sub(1)]
+        .into_iter()
+        .flatten()
+        .find(|&away| away + 1 < rows && increment(away).signum() * increment(away + 1).signum() < 0)?;
+    let others = (0..rows).filter(|row| *row != away && *row != away + 1);
+    let usual = others.map(|row| increment(row).unsigned_abs()).max()?.max(1);
+    let leaps = [increment(away), increment(away + 1)];
     let is_leap = leaps.iter().all(|leap| leap.unsigned_abs() > SPIKE_RATIO.saturating_mul(usual));
     // Twice: the row's own motion is in one of both leaps, and a row may be lost.
-    let wraps = |bits: &u8| leaps.iter().all(|leap| wrapped(*leap, *bits).unsigned_abs() <= usual.saturating_mul(2));
+    let wraps = |bits: &u8| {
+        let is_one = |leap: &i64| leap.unsigned_abs() < 1 << bits;
+        leaps.iter().all(|leap| is_one(leap) && wrapped(*leap, *bits).unsigned_abs() <= usual.saturating_mul(2))
+    };
     (is_leap && !USUAL_BITS.iter().any(wraps)).then_some(away + 1)
 }
 

@@ -208,7 +208,10 @@ pub enum DatasetError {
         hint: String,
     },
     /// A field is not a number.
-    #[error("{file}:{line}: column {column}: \"{found}\" is not a number; expected one like -0.125 or 1e-3{}", with_comma(found))]
+    #[error(
+        "{file}:{line}: column {column}: \"{found}\" is not a number; expected one like -0.125 or 1e-3{}",
+        with_comma(found)
+    )]
     NotANumber {
         /// The file.
         file: PathBuf,

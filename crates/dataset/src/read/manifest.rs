@@ -189,7 +189,8 @@ impl Source<'_> {
     /// The parser's message, with what a person is likely to have done.
     fn in_words(&self, error: &toml::de::Error) -> String {
         let message = error.message().replace('\n', "; ");
-        let of_syntax = !["unknown field", "missing field", "invalid type"].iter().any(|kind| message.starts_with(kind));
+        let of_syntax =
+            !["unknown field", "missing field", "invalid type"].iter().any(|kind| message.starts_with(kind));
         // In a whole file more of it stands behind a fault.
         let in_last_line = error.span().filter(|span| !self.text[span.start..].trim_end().contains('\n'));
         if let Some(span) = in_last_line.filter(|_| of_syntax) {

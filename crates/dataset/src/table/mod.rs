@@ -9,7 +9,7 @@ mod lines;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::column_names::likely_mapping;
+use crate::column_names::{Quantity, likely_mapping};
 use crate::error::{DatasetError, shown};
 use crate::warning::Warning;
 use fields::Fields;
@@ -183,10 +183,11 @@ impl Table {
         {
             return format!("; {delimiter} stand between the fields where commas are expected: {import} reads it");
         }
-        if column == "theta_rad" {
-            return "; it may be empty: a robot whose heading was not seen has run,t_s,x_m,y_m,theta_rad and nothing behind the last comma".to_owned();
+        let mapping = likely_mapping(names);
+        if column == "theta_rad" && mapping.iter().all(|(quantity, _)| *quantity != Quantity::Heading) {
+            return "; where no heading was seen the column stands there and is empty".to_owned();
         }
-        let likely: Vec<String> = likely_mapping(names)
+        let likely: Vec<String> = mapping
             .into_iter()
             .map(|(quantity, name)| format!("{}={}", quantity.key(), shown(name.as_bytes())))
             .collect();

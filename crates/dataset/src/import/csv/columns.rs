@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::options::{MapEntry, Options};
 use super::sheet::Sheet;
 use super::took::{Basis, Sure};
-use super::options::{MapEntry, Options};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
 use crate::unit::Unit;
@@ -63,9 +63,14 @@ pub(super) fn refuse_unknown_columns(sheets: &[Sheet], options: &Options) -> Res
     let columns = options.map.iter().map(|entry| (&entry.column, "--map")).chain(runs_by);
     for (column, flag) in columns {
         if sheets.iter().all(|sheet| mapped(sheet, column).is_none()) {
-            let names: Vec<String> = sheets.iter().map(|sheet| format!("{} has {}", sheet.file.display(), listed(&sheet.names))).collect();
+            let names: Vec<String> =
+                sheets.iter().map(|sheet| format!("{} has {}", sheet.file.display(), listed(&sheet.names))).collect();
             let message = format!("{flag}: no column \"{}\"; {}", shown(column.as_bytes()), names.join("; "));
-            return Err(DatasetError::Foreign { file: sheets[0].file.clone(), line: sheets[0].header_line.unwrap_or(1), message });
+            return Err(DatasetError::Foreign {
+                file: sheets[0].file.clone(),
+                line: sheets[0].header_line.unwrap_or(1),
+                message,
+            });
         }
     }
     Ok(())
@@ -96,12 +101,14 @@ pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetEr
     }
     let reading = |index: usize| -> Option<NameReading> {
         let mut reading = sheet.header_line.and_then(|_| read_name(&sheet.names[index]))?;
-        reading.unit = reading.unit.or(sheet.units[index]);
+        let units = [reading.unit, sheet.units[index]].into_iter().flatten();
+        reading.unit = units.into_iter().find(|unit| reading.quantity.accepts(*unit));
         Some(reading)
     };
     for &(quantity, index, unit) in &given {
         let named = reading(index);
-        let (unit, unit_basis) = match (unit, named.and_then(|named| named.unit)) {
+        let (unit, unit_basis) = match (unit, named.and_then(|named| named.unit).filter(|unit| quantity.accepts(*unit)))
+        {
             (Some(unit), _) => (Some(unit), Basis::new(Sure::Given, "--map")),
             (None, Some(unit)) => (Some(unit), Basis::new(Sure::Certain, "name")),
             (None, None) => (None, Basis::new(Sure::Given, "--map")),
@@ -271,7 +278,8 @@ impl Log {
                 "" => Ok(f64::NAN),
                 text => sheet.decimal.number(text).ok_or_else(|| fault(column, None)),
             };
-            let stamp = sheet.decimal.exact(fields[time]).ok_or_else(|| fault(time, sheet.decimal.number(fields[time])))?;
+            let stamp =
+                sheet.decimal.exact(fields[time]).ok_or_else(|| fault(time, sheet.decimal.number(fields[time])))?;
             log.lines.push(line);
             log.time.push(stamp);
             if let Some(run) = run {

@@ -117,16 +117,15 @@ fn robot(parts: &[Part], options: &Options) -> Result<(NominalRobot, Drive), Dat
     let (Some(diameter_m), Some(wheel_separation_m), true) =
         (given.wheel_diameter_m, given.wheel_separation_m, flags.is_empty())
     else {
-        let names: Vec<String> = with_wheels.roles.of.iter().map(|(quantity, chosen)| {
-            format!("{} is {}", quantity.key(), with_wheels.sheet.names[chosen.index])
-        }).collect();
+        let names: Vec<String> = with_wheels
+            .roles
+            .of
+            .iter()
+            .map(|(quantity, chosen)| format!("{} is {}", quantity.key(), with_wheels.sheet.names[chosen.index]))
+            .collect();
         let what = if counted { ", the wheels are counted" } else { "" };
         let why = format!("{}{what}", names.join(", "));
-        return Err(DatasetError::RobotNotGiven {
-            file: with_wheels.sheet.file.clone(),
-            why,
-            flags: flags.join(" "),
-        });
+        return Err(DatasetError::RobotNotGiven { file: with_wheels.sheet.file.clone(), why, flags: flags.join(" ") });
     };
     let geometry = DriveGeometry::new(diameter_m, wheel_separation_m)
         .map_err(|error| DatasetError::NotWritable { what: format!("--wheel and --base: {error}") })?;
@@ -253,7 +252,13 @@ fn unit_of(quantity: Quantity, roles: &Roles, time: &(Unit, Basis), units: Optio
         Quantity::Left | Quantity::Right | Quantity::Speed | Quantity::YawRate => {
             let unit = match units.wheels {
                 WheelUnits::Wheels(unit) => unit,
-                WheelUnits::Twist([speed, yaw_rate]) => if quantity == Quantity::Speed { speed } else { yaw_rate },
+                WheelUnits::Twist([speed, yaw_rate]) => {
+                    if quantity == Quantity::Speed {
+                        speed
+                    } else {
+                        yaw_rate
+                    }
+                }
             };
             (unit, units.wheels_by.clone())
         }

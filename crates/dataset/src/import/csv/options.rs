@@ -30,6 +30,9 @@ impl std::str::FromStr for MapEntry {
             Some((before, unit)) if Unit::named(unit).is_some() && !before.is_empty() => (before, Unit::named(unit)),
             _ => (column.trim(), None),
         };
+        if let Some(unit) = unit.filter(|unit| !quantity.accepts(*unit)) {
+            return Err(format!("{key} is never in {}", unit.name()));
+        }
         if column.is_empty() { Err(expected()) } else { Ok(Self { quantity, column: column.to_owned(), unit }) }
     }
 }
@@ -104,6 +107,7 @@ mod tests {
         assert_eq!(entry("left=enc[deg]"), Ok(left("enc", Some(Unit::Deg))));
         // A name may have brackets of its own.
         assert_eq!(entry("left=enc[0]"), Ok(left("enc[0]", None)));
+        assert!(entry("x=enc[deg]").is_err_and(|message| message == "x is never in deg"));
         for wrong in ["left", "left=", "wheel=enc_l", "=x"] {
             assert!(entry(wrong).is_err_and(|message| message.contains("run, t, left, right")), "{wrong}");
         }

@@ -47,7 +47,10 @@ pub(super) fn runs(parts: &[Part], options: &Options) -> Result<(Vec<RawRun>, St
         if let (Some(&first), Some(&last)) = (run.rows.first(), run.rows.last()) {
             let (log, truth) = (&parts[run.part].log, &parts[run.truth_part]);
             let (from, to) = (log.time[first], log.time[last]);
-            let shared = many && run.truth_part != run.part && truth.log.run.is_empty() && count_of_truths(parts, &with_wheels) == 1;
+            let shared = many
+                && run.truth_part != run.part
+                && truth.log.run.is_empty()
+                && count_of_truths(parts, &with_wheels) == 1;
             if shared {
                 run.truth_rows.retain(|&row| (from..=to).contains(&truth.log.time[row]));
             }
@@ -193,7 +196,11 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
     let Some([left, right]) = &part.log.wheels else { return vec![run] };
     let rates = part.roles.wheels().is_some_and(|[of, _]| of == Quantity::Speed || part.roles.of[&of].is_rate);
     let stands = |before: usize, row: usize| {
-        if rates { left[row] == 0.0 && right[row] == 0.0 } else { left[row] == left[before] && right[row] == right[before] }
+        if rates {
+            left[row] == 0.0 && right[row] == 0.0
+        } else {
+            left[row] == left[before] && right[row] == right[before]
+        }
     };
     let time = |index: usize| part.log.time[run.rows[index]];
     // Ends of pieces: the index of the first row that belongs to the next.
@@ -221,9 +228,8 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
         let (from, to) = (part.log.time[first], part.log.time[last]);
         // In one file time may restart: its poses stand beside their odometry.
         let is_own = run.truth_part == run.part;
-        let belongs = |row: usize| {
-            (!is_own || (first..=last).contains(&row)) && (from..=to).contains(&truth.log.time[row])
-        };
+        let belongs =
+            |row: usize| (!is_own || (first..=last).contains(&row)) && (from..=to).contains(&truth.log.time[row]);
         let truth_rows: Vec<usize> = run.truth_rows.iter().copied().filter(|&row| belongs(row)).collect();
         if moves && truth_rows.len() >= 2 {
             pieces.push(RawRun { start: from, rows, truth_rows, ..run.clone() });

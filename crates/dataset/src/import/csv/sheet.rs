@@ -1,6 +1,7 @@
 //! One file as a sheet: how its fields and numbers are written, where its header is, what its columns are
 //! called and where its rows begin.
 
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 use super::text::{self, Decimal, Delimiter};
@@ -83,14 +84,21 @@ impl Candidate {
         numeric.iter_mut().zip(filled).for_each(|(numeric, filled)| *numeric &= filled);
         let first = rows.iter().copied().find(|&index| {
             delimiter.split(lines[index].1, &mut fields);
-            fields.iter().zip(&numeric).all(|(field, numeric)| !numeric || is_cell(field))
-                && fields.iter().zip(&numeric).any(|(field, numeric)| *numeric && !field.is_empty())
+            // A row with a fault is a row still: most of its numbers are some.
+            let cells = || fields.iter().zip(&numeric).filter(|(_, numeric)| **numeric).map(|(field, _)| field);
+            2 * cells().filter(|field| is_cell(field)).count() > cells().count()
+                && cells().any(|field| !field.is_empty())
         })?;
         Some(Self { delimiter, decimal, columns, numeric, first })
     }
 
     fn numbers(&self) -> usize {
         self.numeric.iter().filter(|numeric| **numeric).count()
+    }
+
+    /// Less is better: many numbers, and then little else.
+    fn rank(&self) -> (Reverse<usize>, usize) {
+        (Reverse(self.numbers()), self.columns)
     }
 }
 
@@ -101,7 +109,8 @@ fn is_comment(line: &str) -> bool {
 impl Sheet {
     pub(super) fn open(file: &Path, writing: Writing) -> Result<Self, DatasetError> {
         let text = text::read(file)?;
-        let all: Vec<(u64, &str)> = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()).take(PROBED_LINES).collect();
+        let all: Vec<(u64, &str)> =
+            (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()).take(PROBED_LINES).collect();
         let rows: Vec<(u64, &str)> = all.iter().copied().filter(|(_, line)| !is_comment(line)).collect();
         let best = Self::best(file, &rows, writing)?;
         let mut fields = Vec::new();
@@ -126,7 +135,8 @@ impl Sheet {
             }
             if header.is_none() {
                 // The names may stand in a comment right above the rows.
-                let comments = all.iter().take_while(|(number, _)| *number < rows[first].0).filter(|(_, line)| is_comment(line));
+                let comments =
+                    all.iter().take_while(|(number, _)| *number < rows[first].0).filter(|(_, line)| is_comment(line));
                 header = comments.last().and_then(|(number, line)| {
                     let line = line.trim_start_matches(['#', '%', '/']).trim();
                     let names = as_wide(line).or_else(|| {
@@ -152,16 +162,19 @@ impl Sheet {
 
     /// The one way of reading under which most columns are numbers.
     fn best(file: &Path, rows: &[(u64, &str)], writing: Writing) -> Result<Candidate, DatasetError> {
-        let delimiters = Delimiter::ALL.into_iter().filter(|delimiter| writing.delimiter.is_none_or(|it| it == *delimiter));
+        let delimiters =
+            Delimiter::ALL.into_iter().filter(|delimiter| writing.delimiter.is_none_or(|it| it == *delimiter));
         let mut candidates: Vec<Candidate> = delimiters
             .flat_map(|delimiter| Decimal::ALL.map(|decimal| (delimiter, decimal)))
             // Unless the user says so, a comma is one or the other.
             .filter(|(delimiter, decimal)| {
-                writing.decimal.map_or(*delimiter != Delimiter::Comma || *decimal == Decimal::Point, |it| it == *decimal)
+                writing
+                    .decimal
+                    .map_or(*delimiter != Delimiter::Comma || *decimal == Decimal::Point, |it| it == *decimal)
             })
             .filter_map(|(delimiter, decimal)| Candidate::of(rows, delimiter, decimal))
             .collect();
-        candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.numbers()));
+        candidates.sort_by_key(Candidate::rank);
         let mut candidates = candidates.into_iter();
         let Some(best) = candidates.next().filter(|best| best.numbers() >= 2) else {
             let (line, text) = rows.first().copied().unwrap_or((1, ""));
@@ -172,7 +185,12 @@ impl Sheet {
             return Err(DatasetError::Foreign { file: file.to_owned(), line, message });
         };
         // Whole numbers are the same with either decimal mark.
-        let rival = candidates.find(|other| other.numbers() == best.numbers() && other.delimiter != best.delimiter);
+        let is_other = |other: &Candidate| match (best.delimiter, other.delimiter) {
+            // Tabs are spaces too.
+            (Delimiter::Tab, Delimiter::Spaces) => false,
+            (best, other) => best != other,
+        };
+        let rival = candidates.find(|other| other.rank() == best.rank() && is_other(other));
         match rival {
             None => Ok(best),
             Some(rival) => Err(DatasetError::Undecided {
@@ -188,7 +206,11 @@ impl Sheet {
     pub(super) fn first_cells(&self, column: usize) -> Vec<String> {
         const SHOWN: usize = 3;
         let mut fields = Vec::new();
-        let rows = self.text.lines().skip(self.first_row as usize - 1).filter(|line| !line.trim().is_empty() && !is_comment(line));
+        let rows = self
+            .text
+            .lines()
+            .skip(self.first_row as usize - 1)
+            .filter(|line| !line.trim().is_empty() && !is_comment(line));
         let cell = |line| {
             self.delimiter.split(line, &mut fields);
             shown(fields.get(column).copied().unwrap_or_default().as_bytes())
@@ -288,8 +310,13 @@ mod tests {
         assert!(message("t,x\n").contains("no table of numbers"));
         assert!(message("").contains("empty file"));
         let rows = |content: &str| {
-            open(content, Writing::default()).expect("a table").for_each_row(|_, _| Ok(())).expect_err("cut").to_string()
+            open(content, Writing::default())
+                .expect("a table")
+                .for_each_row(|_, _| Ok(()))
+                .expect_err("cut")
+                .to_string()
         };
+        assert_eq!(open("t,x,y\n0,a,1\n1,2,2\n2,3,3\n3,4,4\n", Writing::default()).expect("a table").first_row, 2);
         assert!(rows("t,x\n0,1\n1,2\n2").contains("cut off"));
         let inside = rows("t,x\n0,1\n1\n2,3\n");
         assert!(inside.contains("log.csv:3: 1 field") && !inside.contains("cut off"), "{inside}");

@@ -114,7 +114,8 @@ pub(super) fn unit_of_time(
             Err(undecided(sheet, "s, ms, us or ns", &format!("rows are {step} apart{of}: none is usual")))
         }
         _ => {
-            let names: Vec<_> = left.iter().map(|unit| format!("{} (rows {} s apart)", unit.name(), in_s(step, *unit))).collect();
+            let names: Vec<_> =
+                left.iter().map(|unit| format!("{} (rows {} s apart)", unit.name(), in_s(step, *unit))).collect();
             Err(undecided(sheet, &names.join(" or "), ""))
         }
     }

@@ -126,7 +126,10 @@ pub(super) fn wheel_candidates(part: &Part, options: &Options) -> (Vec<WheelUnit
         return (of(&[Unit::Ticks]), Basis::new(Sure::Likely, "names"));
     }
     if chosen[0].is_rate && chosen[1].is_rate {
-        return (of(&[Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS, Unit::MmPerS]), Basis::new(Sure::Likely, ""));
+        return (
+            of(&[Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS, Unit::MmPerS]),
+            Basis::new(Sure::Likely, ""),
+        );
     }
     let are_whole = part.log.wheels.iter().flatten().flatten().all(|value| value.is_nan() || value.fract() == 0.0);
     if are_whole {
@@ -185,7 +188,8 @@ fn reach(positions: impl Iterator<Item = (f64, f64)>) -> f64 {
 pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &Drive) -> Result<Units, DatasetError> {
     let (part, truth) = (&parts[runs[0].part], &parts[runs[0].truth_part]);
     let (wheels, mut wheels_by) = wheel_candidates(part, options);
-    let (lengths, mut length_by) = known_or(&truth.roles.of[&Quantity::X], options.length_unit, "--length-unit", &Unit::LENGTHS);
+    let (lengths, mut length_by) =
+        known_or(&truth.roles.of[&Quantity::X], options.length_unit, "--length-unit", &Unit::LENGTHS);
     let by_unit: Vec<(WheelUnits, Vec<Vec<Pose>>)> = wheels
         .iter()
         .map(|&units| (units, runs.iter().map(|run| dead_reckoned(parts, run, units, drive)).collect()))
@@ -207,7 +211,11 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
     let fits = |ratio: &Option<f64>, factor: f64| ratio.is_some_and(|ratio| (1.0 / factor..=factor).contains(&ratio));
     let is_open = readings.len() > 1;
     let mut remark = None;
-    let fitting: Vec<_> = if is_open { readings.iter().filter(|reading| fits(&reading.2, SAME_REACH)).collect() } else { readings.iter().collect() };
+    let fitting: Vec<_> = if is_open {
+        readings.iter().filter(|reading| fits(&reading.2, SAME_REACH)).collect()
+    } else {
+        readings.iter().collect()
+    };
     let &&(units, length, ratio, poses) = match &fitting[..] {
         [one] => one,
         _ => return Err(undecided_reach(part, truth, &readings, &fitting)),
@@ -286,7 +294,8 @@ fn angle_unit(
     if let [unit] = candidates[..] {
         return Ok((unit, basis));
     }
-    let theta = |run: &RawRun, row: usize| parts[run.truth_part].log.pose.as_ref().map_or(f64::NAN, |pose| pose.theta[row]);
+    let theta =
+        |run: &RawRun, row: usize| parts[run.truth_part].log.pose.as_ref().map_or(f64::NAN, |pose| pose.theta[row]);
     // By turns between poses.
     let (mut squares, mut turns) = ([0.0, 0.0], 0);
     for (run, reckoned) in runs.iter().zip(reckoned) {
@@ -335,7 +344,10 @@ fn angle_unit(
     }
     Err(DatasetError::Undecided {
         file: truth.sheet.file.clone(),
-        what: format!("the unit of {} (at most {largest}, and the robot hardly turns)", truth.sheet.names[chosen.index]),
+        what: format!(
+            "the unit of {} (at most {largest}, and the robot hardly turns)",
+            truth.sheet.names[chosen.index]
+        ),
         readings: "rad or deg".to_owned(),
         flag: "--angle-unit rad or --angle-unit deg".to_owned(),
     })
