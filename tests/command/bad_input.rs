@@ -361,3 +361,19 @@ fn a_counter_that_wraps_is_refused_and_its_width_named() {
         contains(&ended.stderr, "counter_bits");
     }
 }
+
+#[test]
+fn a_counter_that_leaves_its_place_for_one_row_is_refused_and_the_row_named() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    small_set(at);
+    let rows = (0..80).map(|row: u64| {
+        let left = if row == 40 { 4_000_000_000 } else { 7 * row };
+        format!("a,{row},{left},{row}\nb,{row},{row},{row}\n")
+    });
+    let odometry = "run,t_s,left_ticks,right_ticks\n".to_owned() + &rows.collect::<String>();
+    fs::write(at.join("set/odometry.csv"), odometry).expect("written");
+    let ended = run_in(at, &["calibrate", "set", "--quiet"]);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    contains(&ended.stderr, "run a: the left counter reads 4000000000 at 40 s and is back in the row after: a spike");
+}

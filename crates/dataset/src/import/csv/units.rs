@@ -253,15 +253,18 @@ type Reading<'a> = (WheelUnits, Unit, Option<f64>, &'a Vec<Vec<Pose>>);
 fn undecided_reach(part: &Part, truth: &Part, all: &[Reading<'_>], fitting: &[&Reading<'_>]) -> DatasetError {
     let many_wheels = all.iter().any(|reading| reading.0 != all[0].0);
     let many_lengths = all.iter().any(|reading| reading.1 != all[0].1);
-    let name = |reading: &Reading<'_>| {
-        let wheels = many_wheels.then(|| reading.0.name());
-        let lengths = many_lengths.then(|| format!("x, y in {}", reading.1.name()));
-        wheels.into_iter().chain(lengths).collect::<Vec<_>>().join(" with ")
+    let name = |reading: &Reading<'_>| match (many_wheels, many_lengths) {
+        (true, true) => format!("{} with x, y in {}", reading.0.name(), reading.1.name()),
+        (true, false) => reading.0.name(),
+        (false, _) => reading.1.name().to_owned(),
     };
     let (why, mut readings) = if fitting.is_empty() {
         let first = all[0];
         let why = first.2.map_or("the robot does not go far enough to tell".to_owned(), |ratio| {
-            format!("with {} the poses reach {ratio:.3e} times as far as the wheels by the nominal robot", name(&first))
+            format!(
+                "none fits: with {} the poses reach {ratio:.3} times as far as the wheels by the nominal robot; are --wheel and --ticks-per-rev right?",
+                name(&first)
+            )
         });
         (format!(" ({why})"), all.iter().map(name).collect::<Vec<_>>())
     } else {
@@ -324,7 +327,7 @@ fn angle_unit(
     let rms = squares.map(|square: f64| (square / f64::from(turns.max(1))).sqrt());
     for (unit, own, other) in [(Unit::Rad, rms[0], rms[1]), (Unit::Deg, rms[1], rms[0])] {
         if turns > 0 && CLEARER * own < other {
-            let why = format!("{turns} turns agree with the wheels to {own:.3} rad");
+            let why = format!("turns agree with the wheels to {own:.3} rad, {turns} of them");
             return Ok((unit, Basis::new(Sure::Likely, why)));
         }
     }
@@ -342,12 +345,10 @@ fn angle_unit(
     if leaps > std::f64::consts::PI && largest <= std::f64::consts::TAU {
         return Ok((Unit::Rad, Basis::new(Sure::Likely, format!("it leaps by {leaps:.3}, a whole turn"))));
     }
+    let why = if turns > 0 { "turns agree with the wheels' in neither" } else { "the robot hardly turns" };
     Err(DatasetError::Undecided {
         file: truth.sheet.file.clone(),
-        what: format!(
-            "the unit of {} (at most {largest}, and the robot hardly turns)",
-            truth.sheet.names[chosen.index]
-        ),
+        what: format!("the unit of {} (at most {largest}, and {why})", truth.sheet.names[chosen.index]),
         readings: "rad or deg".to_owned(),
         flag: "--angle-unit rad or --angle-unit deg".to_owned(),
     })
