@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use dataset::import::csv::{
-    self, Decimal, Delimiter, FromCsv, MapEntry, Options, Rates, RobotGiven, Sure, Took, TookFile, Writing,
+    self, Confidence, Decimal, Delimiter, FromCsv, MapEntry, Options, Rates, RobotGiven, Took, TookFile, Writing,
 };
 use dataset::{DatasetError, NominalRobot, Unit};
 use kinematics::Wheels;
@@ -20,7 +20,8 @@ use crate::terminal::{Failure, Terminal, table};
 /// One file may hold all, or odometry and truth have a file each; several files of odometry are a run each.
 /// Delimiter, decimal mark, columns, units and runs are found and shown with the reason and the flag that
 /// changes each. Where two readings are nearly as likely, nothing is written and the flag that settles it is
-/// named. The robot's own numbers stand in no log: --wheel and --base, and --ticks-per-rev for counted wheels.
+/// named. The robot's own numbers stand in no log: --wheel and --base, and --ticks-per-rev for counted
+/// wheels.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Files of one robot and one session.
@@ -234,12 +235,12 @@ fn show(took: &Took, terminal: &Terminal) -> Result<(), Failure> {
         terminal.say(&format!("{file}: {rows} rows, {header}, delimiter {delimiter}, decimal {decimal}"))?;
         let mut lines = table(&["as", "column", "unit", "first rows", "unit: how sure, and why", "changed by"], 6);
         for column in columns {
-            let why = match column.unit_by.sure {
+            let why = match column.unit_by.confidence {
                 _ if column.unit_by.why.is_empty() => String::new(),
-                sure => format!("{}: {}", sure.name(), column.unit_by.why),
+                confidence => format!("{}: {}", confidence.name(), column.unit_by.why),
             };
             let name = if header_line.is_some() { column.column.clone() } else { format!("number {}", column.number) };
-            let name = if column.chosen.sure == Sure::Given { format!("{name} (given)") } else { name };
+            let name = if column.chosen.confidence == Confidence::Given { format!("{name} (given)") } else { name };
             lines.add_row([column.quantity, &name, column.unit, &column.first.join("  "), &why, column.flag]);
         }
         terminal.say(&lines.to_string())?;
@@ -248,7 +249,7 @@ fn show(took: &Took, terminal: &Terminal) -> Result<(), Failure> {
         }
     }
     if let Some(rates) = &took.rates {
-        terminal.say(&format!("a row's speed: {}, {} (--rates)", rates.why, rates.sure.name()))?;
+        terminal.say(&format!("a row's speed: {}, {} (--rates)", rates.why, rates.confidence.name()))?;
     }
     terminal.say(&format!("runs: {} (--runs-by, --cut)", took.runs_by))?;
     terminal.say("a column is changed by --map, with its unit if need be: --map t=stamp,left=enc_l[deg]")

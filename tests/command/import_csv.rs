@@ -202,7 +202,7 @@ fn speeds_of_wheels_and_twists_calibrate_as_the_dataset() {
     table(&at.join("mocap.csv"), "time_s,x,y,yaw", &rows, pose);
     let took = imported(at, &["motors.csv", "mocap.csv"], &[]);
     assert_eq!((unit(&took, "t"), unit(&took, "left")), ("ms".to_owned(), "deg/s".to_owned()));
-    assert_eq!((&took["rates"]["why"], &took["rates"]["sure"]), (&"interval-end".into(), &"assumed".into()));
+    assert_eq!((&took["rates"]["why"], &took["rates"]["confidence"]), (&"interval-end".into(), &"assumed".into()));
     same(at, "new", "direct");
 
     // A twist of the nominal robot is the same motion.

@@ -142,7 +142,8 @@ impl<'a> RunView<'a> {
     /// pose at the first row.
     ///
     /// `m_per_rad` and `wheel_separation_m` are the geometry to be used; the nominal robot gives the ticks of
-    /// a turn and, for a robot that reports only speeds or its twist, the geometry from which its wheels are rebuilt.
+    /// a turn and, for a robot that reports only speeds or its twist, the geometry from which its wheels are
+    /// rebuilt.
     pub fn dead_reckon(
         &self,
         robot: &NominalRobot,

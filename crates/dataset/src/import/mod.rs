@@ -1,8 +1,8 @@
 //! Other people's logs: one file a format, and this table of contents.
 //!
 //! An importer gives [`Dataset`](crate::Dataset)s and changes nothing that was measured: units and signs are
-//! brought into the format's, counts are summed, and that is all. [`csv`] is for files of no format: it has to
-//! be told what no file says, and so it is none of [`IMPORTERS`].
+//! brought into the format's, counts are summed, and that is all. [`csv`] is for files of no format: it has
+//! to be told what no file says, and so it is none of [`IMPORTERS`].
 
 mod censi;
 pub mod csv;

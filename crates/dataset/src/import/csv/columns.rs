@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::options::{MapEntry, Options};
 use super::sheet::Sheet;
-use super::took::{Basis, Sure};
+use super::took::{Basis, Confidence};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
 use crate::unit::Unit;
@@ -109,12 +109,12 @@ pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetEr
         let named = reading(index);
         let (unit, unit_basis) = match (unit, named.and_then(|named| named.unit).filter(|unit| quantity.accepts(*unit)))
         {
-            (Some(unit), _) => (Some(unit), Basis::new(Sure::Given, "--map")),
-            (None, Some(unit)) => (Some(unit), Basis::new(Sure::Certain, "name")),
-            (None, None) => (None, Basis::new(Sure::Given, "--map")),
+            (Some(unit), _) => (Some(unit), Basis::new(Confidence::Given, "--map")),
+            (None, Some(unit)) => (Some(unit), Basis::new(Confidence::Certain, "name")),
+            (None, None) => (None, Basis::new(Confidence::Given, "--map")),
         };
         let (is_rate, is_counted) = named.map_or((false, false), |named| (named.is_rate, named.is_counted));
-        let basis = Basis::new(Sure::Given, "--map");
+        let basis = Basis::new(Confidence::Given, "--map");
         roles.of.insert(quantity, Chosen { index, unit, basis, unit_basis, is_rate, is_counted });
     }
     let mut by_name: BTreeMap<Quantity, Vec<(usize, NameReading)>> = BTreeMap::new();
@@ -145,8 +145,8 @@ pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetEr
             });
         }
         if let Some(&(index, NameReading { unit, is_rate, is_counted, .. })) = chosen.first() {
-            let basis = Basis::new(Sure::Likely, "name");
-            let unit_basis = Basis::new(Sure::Certain, "name");
+            let basis = Basis::new(Confidence::Likely, "name");
+            let unit_basis = Basis::new(Confidence::Certain, "name");
             roles.of.insert(quantity, Chosen { index, unit, basis, unit_basis, is_rate, is_counted });
         }
     }

@@ -21,7 +21,7 @@ use kinematics::DriveGeometry;
 pub use options::{MapEntry, Options, Rates, RobotGiven};
 pub use sheet::Writing;
 pub use text::{Decimal, Delimiter};
-pub use took::{Basis, Sure, Took, TookColumn, TookFile};
+pub use took::{Basis, Confidence, Took, TookColumn, TookFile};
 
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
@@ -31,7 +31,7 @@ use crate::unit::Unit;
 use columns::{Log, Roles};
 use runs::{Part, RawRun};
 use sheet::Sheet;
-use times::Evidence;
+use times::KnownMotion;
 use units::{Drive, Units, WheelUnits};
 
 /// A dataset from CSV files, and what was taken for what.
@@ -150,17 +150,17 @@ fn settle_times(parts: &mut [Part], options: &Options, drive: &Drive) -> Result<
     let mut truth = 0;
     for number in order {
         let Part { sheet, roles, log } = &parts[number];
-        let mut evidence = Evidence::default();
+        let mut known = KnownMotion::default();
         if roles.has_wheels() {
             if let [units] = units::wheel_candidates(&parts[number], options).0[..] {
-                evidence.speed_m_per_unit = units::speed_m_per_unit(&parts[number], units, drive);
+                known.speed_m_per_unit = units::speed_m_per_unit(&parts[number], units, drive);
             }
         } else {
             let paired = odometry_s.get(truth).copied().filter(|_| truths == odometry_s.len());
-            evidence.odometry_s = paired.or_else(|| (odometry_s.len() == 1).then(|| odometry_s[0]));
+            known.odometry_s = paired.or_else(|| (odometry_s.len() == 1).then(|| odometry_s[0]));
             truth += 1;
         }
-        let (unit, basis) = times::unit_of_time(sheet, roles, log, options, evidence)?;
+        let (unit, basis) = times::unit_of_time(sheet, roles, log, options, known)?;
         times::to_picoseconds(&mut parts[number].log, unit);
         let log = &parts[number].log;
         if parts[number].roles.has_wheels() {
@@ -235,8 +235,8 @@ fn tell(
         WheelUnits::Twist(_) => true,
     });
     let rates = has_rates.then(|| match options.rates {
-        Some(rates) => Basis::new(Sure::Given, rates.name()),
-        None => Basis::new(Sure::Assumed, Rates::IntervalEnd.name()),
+        Some(rates) => Basis::new(Confidence::Given, rates.name()),
+        None => Basis::new(Confidence::Assumed, Rates::IntervalEnd.name()),
     });
     let mut remarks: Vec<String> = units.iter().filter_map(|units| units.remark.clone()).collect();
     remarks.dedup();
@@ -245,7 +245,7 @@ fn tell(
 
 /// The unit in which a column was taken.
 fn unit_of(quantity: Quantity, roles: &Roles, time: &(Unit, Basis), units: Option<&Units>) -> (Unit, Basis) {
-    let none = (Unit::Text, Basis::new(Sure::Certain, ""));
+    let none = (Unit::Text, Basis::new(Confidence::Certain, ""));
     let Some(units) = units else { return none };
     match quantity {
         Quantity::Time => time.clone(),
@@ -265,7 +265,7 @@ fn unit_of(quantity: Quantity, roles: &Roles, time: &(Unit, Basis), units: Optio
         Quantity::X | Quantity::Y => (units.length, units.length_by.clone()),
         Quantity::Heading => (units.angle, units.angle_by.clone()),
         Quantity::Qx | Quantity::Qy | Quantity::Qz | Quantity::Qw if roles.has(Quantity::Qw) => {
-            (Unit::One, Basis::new(Sure::Certain, "a quaternion"))
+            (Unit::One, Basis::new(Confidence::Certain, "a quaternion"))
         }
         _ => none,
     }

@@ -5,7 +5,7 @@ use super::columns::{Log, Roles};
 use super::options::Options;
 use super::sheet::Sheet;
 use super::text::EXACT_SCALE;
-use super::took::{Basis, Sure};
+use super::took::{Basis, Confidence};
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
 use crate::unit::Unit;
@@ -25,7 +25,7 @@ const SPAN_RATIO: f64 = 3.0;
 
 /// What is known of a log besides its stamps.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Evidence {
+pub(super) struct KnownMotion {
     /// How far the wheels went in one unit of time while they moved, metres.
     pub(super) speed_m_per_unit: Option<f64>,
     /// How long the odometry is that this truth belongs to, seconds.
@@ -62,14 +62,14 @@ pub(super) fn unit_of_time(
     roles: &Roles,
     log: &Log,
     options: &Options,
-    evidence: Evidence,
+    known: KnownMotion,
 ) -> Result<(Unit, Basis), DatasetError> {
     let chosen = &roles.of[&Quantity::Time];
-    if let Some(unit) = chosen.unit.filter(|_| chosen.unit_basis.sure == Sure::Given) {
+    if let Some(unit) = chosen.unit.filter(|_| chosen.unit_basis.confidence == Confidence::Given) {
         return Ok((unit, chosen.unit_basis.clone()));
     }
     if let Some(unit) = options.time_unit {
-        return Ok((unit, Basis::new(Sure::Given, "--time-unit")));
+        return Ok((unit, Basis::new(Confidence::Given, "--time-unit")));
     }
     if let Some(unit) = chosen.unit {
         return Ok((unit, chosen.unit_basis.clone()));
@@ -78,7 +78,7 @@ pub(super) fn unit_of_time(
     let in_s = |value: f64, unit: Unit| value / per_second(unit) as f64;
     let first = log.time.first().copied().map_or(0.0, raw);
     if let Some(unit) = Unit::TIMES.into_iter().find(|unit| EPOCH_S.contains(&in_s(first, *unit))) {
-        return Ok((unit, Basis::new(Sure::Certain, format!("a date in {} since 1970", unit.name()))));
+        return Ok((unit, Basis::new(Confidence::Certain, format!("a date in {} since 1970", unit.name()))));
     }
     let mut steps: Vec<f64> = log
         .time
@@ -93,21 +93,21 @@ pub(super) fn unit_of_time(
     let middle = steps.len() / 2;
     let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let span = log.time.iter().max().zip(log.time.iter().min()).map_or(0.0, |(last, first)| raw(last - first));
-    if let Some(odometry_s) = evidence.odometry_s {
+    if let Some(odometry_s) = known.odometry_s {
         let agrees = |unit: &Unit| (1.0 / SPAN_RATIO..=SPAN_RATIO).contains(&(in_s(span, *unit) / odometry_s));
         if let Some(unit) = Unit::TIMES.into_iter().find(agrees) {
             let why = format!("as long as the odometry, {:.3} s", in_s(span, unit));
-            return Ok((unit, Basis::new(Sure::Likely, why)));
+            return Ok((unit, Basis::new(Confidence::Likely, why)));
         }
     }
     let by_step: Vec<Unit> = Unit::TIMES.into_iter().filter(|unit| STEPS_S.contains(&in_s(step, *unit))).collect();
-    let speed = |unit: Unit| evidence.speed_m_per_unit.map(|speed| speed * per_second(unit) as f64);
+    let speed = |unit: Unit| known.speed_m_per_unit.map(|speed| speed * per_second(unit) as f64);
     let is_plausible = |unit: &Unit| speed(*unit).is_none_or(|speed| SPEEDS_M_S.contains(&speed));
     let left: Vec<Unit> = by_step.iter().copied().filter(is_plausible).collect();
     match left[..] {
         [unit] => {
             let at = speed(unit).map_or(String::new(), |speed| format!(", wheels at {speed:.2} m/s"));
-            Ok((unit, Basis::new(Sure::Likely, format!("rows {:.4} s apart{at}", in_s(step, unit)))))
+            Ok((unit, Basis::new(Confidence::Likely, format!("rows {:.4} s apart{at}", in_s(step, unit)))))
         }
         [] => {
             let of = speed(Unit::S).map_or(String::new(), |speed| format!(", in seconds wheels at {speed:.3e} m/s"));

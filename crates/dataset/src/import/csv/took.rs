@@ -5,7 +5,7 @@ use serde::Serialize;
 /// How sure a decision is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Sure {
+pub enum Confidence {
     /// The user said so.
     Given,
     /// Written in the file.
@@ -16,7 +16,7 @@ pub enum Sure {
     Assumed,
 }
 
-impl Sure {
+impl Confidence {
     /// The word for people.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -33,14 +33,14 @@ impl Sure {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Basis {
     /// How sure it is.
-    pub sure: Sure,
+    pub confidence: Confidence,
     /// By what.
     pub why: String,
 }
 
 impl Basis {
-    pub(super) fn new(sure: Sure, why: impl Into<String>) -> Self {
-        Self { sure, why: why.into() }
+    pub(super) fn new(confidence: Confidence, why: impl Into<String>) -> Self {
+        Self { confidence, why: why.into() }
     }
 }
 

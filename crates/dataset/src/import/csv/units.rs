@@ -7,7 +7,7 @@ use super::columns::Chosen;
 use super::options::{Options, Rates};
 use super::runs::{Part, RawRun};
 use super::times::seconds;
-use super::took::{Basis, Sure};
+use super::took::{Basis, Confidence};
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
 use crate::unit::Unit;
@@ -16,8 +16,8 @@ use crate::unit::Unit;
 /// wheels differ by a few per cent; units differ by at least 1.45 (rad/s and m against deg/s and inches).
 const SAME_REACH: f64 = 1.2;
 
-/// From here on a user should look, though the units are known: counts of a turn are mistaken by a factor of 2
-/// or 4, diameters and radii by 2.
+/// From here on a user should look, though the units are known: counts of a turn are mistaken by a factor of
+/// 2 or 4, diameters and radii by 2.
 const STRANGE_REACH: f64 = 1.5;
 
 /// Below this reach, metres, wheels say nothing of the unit of length: a spin wanders so far.
@@ -27,8 +27,8 @@ const LEAST_REACH_M: f64 = 0.1;
 /// headings, and not so long that the nominal robot's error passes for another turn.
 const TELLING_TURN_RAD: std::ops::RangeInclusive<f64> = 0.2..=12.0;
 
-/// The residuals of the right unit of angle are this many times smaller than the other's: those of a wrong one
-/// are as large as the turns (radians in degrees) or random (degrees in radians).
+/// The residuals of the right unit of angle are this many times smaller than the other's: those of a wrong
+/// one are as large as the turns (radians in degrees) or random (degrees in radians).
 const CLEARER: f64 = 3.0;
 
 /// Drive and counts by which wheels become motion.
@@ -102,40 +102,44 @@ pub(super) fn speed_m_per_unit(part: &Part, units: WheelUnits, drive: &Drive) ->
 
 /// What a run's wheels may be, before poses are looked at.
 pub(super) fn wheel_candidates(part: &Part, options: &Options) -> (Vec<WheelUnits>, Basis) {
-    let Some(pair) = part.roles.wheels() else { return (Vec::new(), Basis::new(Sure::Assumed, "")) };
+    let Some(pair) = part.roles.wheels() else { return (Vec::new(), Basis::new(Confidence::Assumed, "")) };
     let chosen = pair.map(|quantity| &part.roles.of[&quantity]);
     if pair[0] == Quantity::Speed {
         let of = |chosen: &Chosen, usual| chosen.unit.unwrap_or(usual);
         let units = [of(chosen[0], Unit::MPerS), of(chosen[1], Unit::RadPerS)];
         let known = chosen.iter().all(|chosen| chosen.unit.is_some());
-        let basis = if known { chosen[0].unit_basis.clone() } else { Basis::new(Sure::Likely, "usual for a twist") };
+        let basis =
+            if known { chosen[0].unit_basis.clone() } else { Basis::new(Confidence::Likely, "usual for a twist") };
         return (vec![WheelUnits::Twist(units)], basis);
     }
     let of = |units: &[Unit]| units.iter().copied().map(WheelUnits::Wheels).collect::<Vec<_>>();
-    let given = chosen[0].unit.filter(|_| chosen[0].unit_basis.sure == Sure::Given);
+    let given = chosen[0].unit.filter(|_| chosen[0].unit_basis.confidence == Confidence::Given);
     if let Some(unit) = given {
         return (of(&[unit]), chosen[0].unit_basis.clone());
     }
     if let Some(unit) = options.wheel_unit {
-        return (of(&[unit]), Basis::new(Sure::Given, "--wheel-unit"));
+        return (of(&[unit]), Basis::new(Confidence::Given, "--wheel-unit"));
     }
     if let Some(unit) = chosen[0].unit.or(chosen[1].unit) {
         return (of(&[unit]), chosen[0].unit_basis.clone());
     }
     if chosen[0].is_counted && chosen[1].is_counted {
-        return (of(&[Unit::Ticks]), Basis::new(Sure::Likely, "names"));
+        return (of(&[Unit::Ticks]), Basis::new(Confidence::Likely, "names"));
     }
     if chosen[0].is_rate && chosen[1].is_rate {
         return (
             of(&[Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS, Unit::MmPerS]),
-            Basis::new(Sure::Likely, ""),
+            Basis::new(Confidence::Likely, ""),
         );
     }
     let are_whole = part.log.wheels.iter().flatten().flatten().all(|value| value.is_nan() || value.fract() == 0.0);
     if are_whole {
-        return (of(&[Unit::Ticks]), Basis::new(Sure::Likely, "whole numbers"));
+        return (of(&[Unit::Ticks]), Basis::new(Confidence::Likely, "whole numbers"));
     }
-    (of(&[Unit::Rad, Unit::Deg, Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS]), Basis::new(Sure::Likely, ""))
+    (
+        of(&[Unit::Rad, Unit::Deg, Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS]),
+        Basis::new(Confidence::Likely, ""),
+    )
 }
 
 /// Poses by the wheels at the instants of the truth, from the first of them on.
@@ -194,7 +198,7 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
         .iter()
         .map(|&units| (units, runs.iter().map(|run| dead_reckoned(parts, run, units, drive)).collect()))
         .collect();
-    let mut readings: Vec<(WheelUnits, Unit, Option<f64>, &Vec<Vec<Pose>>)> = Vec::new();
+    let mut readings: Vec<Reading<'_>> = Vec::new();
     for (units, poses) in &by_unit {
         let (mut seen, mut reckoned) = (0.0, 0.0);
         for (run, poses) in runs.iter().zip(poses) {
@@ -223,10 +227,10 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
     if let Some(ratio) = ratio {
         let why = format!("poses reach {ratio:.3} times as far as wheels");
         if lengths.len() > 1 {
-            length_by = Basis::new(Sure::Likely, why.clone());
+            length_by = Basis::new(Confidence::Likely, why.clone());
         }
         if wheels.len() > 1 {
-            wheels_by = Basis::new(Sure::Likely, why);
+            wheels_by = Basis::new(Confidence::Likely, why);
         }
         if !is_open && !fits(&Some(ratio), STRANGE_REACH) {
             remark = Some(format!(
@@ -241,13 +245,15 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
 /// A unit that is said or named, or all that it may be.
 fn known_or(chosen: &Chosen, flag: Option<Unit>, name: &str, all: &[Unit]) -> (Vec<Unit>, Basis) {
     match (chosen.unit, flag) {
-        (Some(unit), _) if chosen.unit_basis.sure == Sure::Given => (vec![unit], chosen.unit_basis.clone()),
-        (_, Some(unit)) => (vec![unit], Basis::new(Sure::Given, name)),
+        (Some(unit), _) if chosen.unit_basis.confidence == Confidence::Given => (vec![unit], chosen.unit_basis.clone()),
+        (_, Some(unit)) => (vec![unit], Basis::new(Confidence::Given, name)),
         (Some(unit), None) => (vec![unit], chosen.unit_basis.clone()),
-        (None, None) => (all.to_vec(), Basis::new(Sure::Likely, "")),
+        (None, None) => (all.to_vec(), Basis::new(Confidence::Likely, "")),
     }
 }
 
+/// Units of wheels and positions, how many times as far the poses then reach, and the poses by the wheels of
+/// each run.
 type Reading<'a> = (WheelUnits, Unit, Option<f64>, &'a Vec<Vec<Pose>>);
 
 fn undecided_reach(part: &Part, truth: &Part, all: &[Reading<'_>], fitting: &[&Reading<'_>]) -> DatasetError {
@@ -291,7 +297,7 @@ fn angle_unit(
     let truth = &parts[runs[0].truth_part];
     let Some(chosen) = truth.roles.of.get(&Quantity::Heading) else {
         let why = if truth.roles.has(Quantity::Qw) { "a quaternion" } else { "no heading" };
-        return Ok((Unit::Rad, Basis::new(Sure::Certain, why)));
+        return Ok((Unit::Rad, Basis::new(Confidence::Certain, why)));
     };
     let (candidates, basis) = known_or(chosen, options.angle_unit, "--angle-unit", &Unit::ANGLES);
     if let [unit] = candidates[..] {
@@ -328,7 +334,7 @@ fn angle_unit(
     for (unit, own, other) in [(Unit::Rad, rms[0], rms[1]), (Unit::Deg, rms[1], rms[0])] {
         if turns > 0 && CLEARER * own < other {
             let why = format!("turns agree with the wheels to {own:.3} rad, {turns} of them");
-            return Ok((unit, Basis::new(Sure::Likely, why)));
+            return Ok((unit, Basis::new(Confidence::Likely, why)));
         }
     }
     // By size: a heading that is wrapped stays within a turn.
@@ -340,10 +346,10 @@ fn angle_unit(
     let largest = all.iter().copied().map(f64::abs).fold(0.0, f64::max);
     let leaps = all.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
     if leaps > 180.0 && largest <= 360.0 {
-        return Ok((Unit::Deg, Basis::new(Sure::Likely, format!("it leaps by {leaps:.1}, a whole turn"))));
+        return Ok((Unit::Deg, Basis::new(Confidence::Likely, format!("it leaps by {leaps:.1}, a whole turn"))));
     }
     if leaps > std::f64::consts::PI && largest <= std::f64::consts::TAU {
-        return Ok((Unit::Rad, Basis::new(Sure::Likely, format!("it leaps by {leaps:.3}, a whole turn"))));
+        return Ok((Unit::Rad, Basis::new(Confidence::Likely, format!("it leaps by {leaps:.3}, a whole turn"))));
     }
     let why = if turns > 0 { "turns agree with the wheels' in neither" } else { "the robot hardly turns" };
     Err(DatasetError::Undecided {
