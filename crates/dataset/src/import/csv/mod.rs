@@ -1,8 +1,8 @@
 //! Any CSV file with times, wheels and poses: its way of writing, columns, units and runs are found, and
 //! everything that was decided is told. What cannot be told from the files is asked for, never invented.
 //!
-//! The order of work: [`sheet`] how a file is written → [`columns`] which column is what → [`times`] the unit
-//! of time → [`runs`] → [`units`] by which wheels and poses tell of one motion → [`assemble`].
+//! The order of work, a file each: `sheet` how a file is written → `columns` which column is what →
+//! `times` the unit of time → `runs` → `units` by which wheels and poses tell of one motion → `assemble`.
 
 mod assemble;
 mod columns;

@@ -21,7 +21,7 @@ const SAME_REACH: f64 = 1.2;
 const STRANGE_REACH: f64 = 1.5;
 
 /// Below this reach, metres, wheels say nothing of the unit of length: a spin wanders so far.
-const LEAST_REACH_M: f64 = 0.1;
+const MIN_REACH_M: f64 = 0.1;
 
 /// Turns between two poses that say something of the unit of angle, radians: well above the noise of
 /// headings, and not so long that the nominal robot's error passes for another turn.
@@ -208,7 +208,7 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
             reckoned += reach(poses.iter().map(|pose| (pose.x_m, pose.y_m)));
         }
         for &length in &lengths {
-            let ratio = (reckoned >= LEAST_REACH_M && seen > 0.0).then(|| length.to_si(seen) / reckoned);
+            let ratio = (reckoned >= MIN_REACH_M && seen > 0.0).then(|| length.to_si(seen) / reckoned);
             readings.push((*units, length, ratio, poses));
         }
     }
