@@ -3,22 +3,31 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Args;
-use clap::builder::PossibleValuesParser;
-use dataset::import::{IMPORTERS, Source, importer};
+use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
+use dataset::import::{IMPORTERS, Importer, Source, importer};
 use dataset::{Loaded, read_ahead};
 use serde::Serialize;
 
+use crate::import_csv;
 use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
 
-/// Other people's logs into datasets.
+/// Other people's logs, or your own, into datasets.
 #[derive(Args)]
-#[command(after_help = formats())]
 pub(crate) struct Arguments {
-    /// Format of the source.
-    #[arg(value_parser = PossibleValuesParser::new(IMPORTERS.iter().map(|importer| importer.name)))]
-    format: String,
+    #[command(subcommand)]
+    format: Format,
+}
+
+/// What is imported: a format of the table, or a file of no format.
+enum Format {
+    Known(&'static Importer, Plain),
+    Csv(Box<import_csv::Arguments>),
+}
+
+/// What every format of the table takes.
+#[derive(Args)]
+struct Plain {
     /// File or folder to import.
     source: PathBuf,
     /// Folder for the dataset; a source of several sessions gets one folder a session inside it.
@@ -29,9 +38,40 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
-fn formats() -> String {
-    let lines: Vec<_> = IMPORTERS.iter().map(|importer| format!("  {:10} {}", importer.name, importer.about)).collect();
-    format!("Formats:\n{}", lines.join("\n"))
+/// The name of the format that is none.
+const CSV: &str = "csv";
+
+impl FromArgMatches for Format {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, matches) = matches.subcommand().ok_or_else(missing)?;
+        match importer(name) {
+            Some(importer) => Ok(Self::Known(importer, Plain::from_arg_matches(matches)?)),
+            None => Ok(Self::Csv(Box::new(import_csv::Arguments::from_arg_matches(matches)?))),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Subcommand for Format {
+    fn augment_subcommands(command: Command) -> Command {
+        let csv = import_csv::Arguments::augment_args(Command::new(CSV));
+        let known =
+            IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name)).about(importer.about));
+        command.subcommand(csv).subcommands(known).subcommand_required(true).subcommand_value_name("FORMAT")
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        name == CSV || importer(name).is_some()
+    }
 }
 
 #[derive(Serialize)]
@@ -49,7 +89,13 @@ struct Imported {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let importer = importer(&arguments.format).ok_or("no such format")?;
+    match &arguments.format {
+        Format::Known(importer, arguments) => run_known(importer, arguments, terminal),
+        Format::Csv(arguments) => import_csv::run(arguments, terminal),
+    }
+}
+
+fn run_known(importer: &Importer, arguments: &Plain, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let sources = (importer.open)(&arguments.source)?;
     let dirs = folders(arguments, &sources)?;
     let was_there = arguments.out.exists();
@@ -60,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         }
     })?;
     terminal.document(&Document {
-        format: arguments.format.clone(),
+        format: importer.name.to_owned(),
         source: arguments.source.display().to_string(),
         datasets,
     })?;
@@ -98,7 +144,7 @@ fn write(sources: Vec<Source>, dirs: Vec<PathBuf>, force: bool, terminal: &Termi
 }
 
 /// A folder for each session. Refuses before the first is written, so that an import is done as a whole.
-fn folders(arguments: &Arguments, sessions: &[Source]) -> Result<Vec<PathBuf>, Failure> {
+fn folders(arguments: &Plain, sessions: &[Source]) -> Result<Vec<PathBuf>, Failure> {
     let [_, _, ..] = sessions else { return Ok(vec![arguments.out.clone()]) };
     let dirs: Vec<PathBuf> = sessions.iter().map(|session| arguments.out.join(&session.name)).collect();
     for (position, dir) in dirs.iter().enumerate() {

@@ -9,6 +9,7 @@ mod diagnose;
 mod diagnosis_page;
 mod evaluate;
 mod import;
+mod import_csv;
 mod merge;
 mod plan;
 mod reproduce;

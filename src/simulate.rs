@@ -125,7 +125,7 @@ fn simulate(arguments: &Arguments, scenario: &Scenario, seed: u64) -> Result<Sim
 }
 
 /// Writes a dataset; where one stands in the way, says how it is replaced.
-fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
+pub(crate) fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
     dataset::write(dataset, dir, existing(force)).map_err(|error| say_how_to_replace(error, force))
 }
 

@@ -58,7 +58,7 @@ impl Terminal {
 
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
-        let _ = writeln!(std::io::stderr(), "error: {}", message.replace('\n', "; "));
+        let _ = writeln!(std::io::stderr(), "error: {}", in_plain_words(&message.replace('\n', "; ")));
     }
 
     /// A progress bar over `total` steps with the time left; hidden when quiet or when nobody watches.
@@ -72,6 +72,16 @@ impl Terminal {
         }
         bar
     }
+}
+
+/// What the system says of a mistaken path, as a person would: every reader of files ends here.
+fn in_plain_words(message: &str) -> String {
+    const WORDS: [(&str, &str); 3] = [
+        ("Is a directory (os error 21)", "it is a folder, where a file belongs"),
+        ("Not a directory (os error 20)", "a part of this path is a file, where a folder belongs"),
+        ("entity not found", "there is no folder in which it could be made"),
+    ];
+    WORDS.iter().fold(message.to_owned(), |message, (system, plain)| message.replace(system, plain))
 }
 
 /// Writes a line. A reader that has gone away (`| head`) is no failure, and stops nothing else: files are

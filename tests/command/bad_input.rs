@@ -141,7 +141,9 @@ fn empty_binary_and_absent_files_and_folders_are_refused() {
             &["evaluate", wrong],
             &["calibrate", wrong, "--out", "new"],
         ] {
-            contains(&refused(at, command), wrong);
+            let message = refused(at, command);
+            contains(&message, wrong);
+            assert!(!message.contains("os error 21"), "{message}");
         }
     }
     for file in ["dataset.toml", "odometry.csv", "points.csv"] {
@@ -358,4 +360,20 @@ fn a_counter_that_wraps_is_refused_and_its_width_named() {
         contains(&ended.stderr, &format!("{bits}"));
         contains(&ended.stderr, "counter_bits");
     }
+}
+
+#[test]
+fn a_counter_that_leaves_its_place_for_one_row_is_refused_and_the_row_named() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    small_set(at);
+    let rows = (0..80).map(|row: u64| {
+        let left = if row == 40 { 4_000_000_000 } else { 7 * row };
+        format!("a,{row},{left},{row}\nb,{row},{row},{row}\n")
+    });
+    let odometry = "run,t_s,left_ticks,right_ticks\n".to_owned() + &rows.collect::<String>();
+    fs::write(at.join("set/odometry.csv"), odometry).expect("written");
+    let ended = run_in(at, &["calibrate", "set", "--quiet"]);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    contains(&ended.stderr, "run a: the left counter reads 4000000000 at 40 s and is back in the row after: a spike");
 }

@@ -6,6 +6,7 @@ mod bad_input;
 mod compare;
 mod contract;
 mod correct;
+mod import_csv;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;

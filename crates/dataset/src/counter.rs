@@ -44,6 +44,20 @@ pub(crate) fn unwrap(ticks: &mut [i64], bits: u8) {
 /// nothing: a run that was read at its ends only may have made any number of counts.
 #[must_use]
 pub fn suspected_wrap(ticks: &[i64]) -> Option<u8> {
+    width_of_jumps(ticks).filter(|_| spike(ticks).is_none())
+}
+
+/// The row at which a counter leaves its place, as far as a wrap would, and comes back in the next row, if
+/// there is one such row.
+///
+/// A counter that wraps to and fro does so too, but by increments that, unwrapped, are like its others. So
+/// the row counts only where no width of counter makes both leaps as small as the others.
+#[must_use]
+pub fn suspected_spike(ticks: &[i64]) -> Option<usize> {
+    spike(ticks).filter(|_| width_of_jumps(ticks).is_some())
+}
+
+fn width_of_jumps(ticks: &[i64]) -> Option<u8> {
     let span = ticks.iter().max()?.abs_diff(*ticks.iter().min()?);
     let increments = || ticks.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]));
     let largest = increments().map(i64::unsigned_abs).max()?;
@@ -58,6 +72,31 @@ pub fn suspected_wrap(ticks: &[i64]) -> Option<u8> {
     })
 }
 
+/// Leaps of a spike are so many times larger than any other increment.
+const SPIKE_RATIO: u64 = 1000;
+
+fn spike(ticks: &[i64]) -> Option<usize> {
+    // Columns may be as large as the memory: nothing is collected.
+    let increment = |row: usize| ticks[row + 1].wrapping_sub(ticks[row]);
+    let rows = ticks.len().checked_sub(1)?;
+    let at = (0..rows).max_by_key(|&row| increment(row).unsigned_abs())?;
+    // The largest is the leap away or the leap back.
+    let away = [Some(at), at.checked_sub(1)]
+        .into_iter()
+        .flatten()
+        .find(|&away| away + 1 < rows && increment(away).signum() * increment(away + 1).signum() < 0)?;
+    let others = (0..rows).filter(|row| *row != away && *row != away + 1);
+    let usual = others.map(|row| increment(row).unsigned_abs()).max()?.max(1);
+    let leaps = [increment(away), increment(away + 1)];
+    let is_leap = leaps.iter().all(|leap| leap.unsigned_abs() > SPIKE_RATIO.saturating_mul(usual));
+    // Twice: the row's own motion is in one of both leaps, and a row may be lost.
+    let wraps = |bits: &u8| {
+        let is_one = |leap: &i64| leap.unsigned_abs() < 1 << bits;
+        leaps.iter().all(|leap| is_one(leap) && wrapped(*leap, *bits).unsigned_abs() <= usual.saturating_mul(2))
+    };
+    (is_leap && !USUAL_BITS.iter().any(wraps)).then_some(away + 1)
+}
+
 /// Warnings of all wheels that show a wrap; none when the width is known, as they have been unwrapped then.
 pub(crate) fn wrap_warnings(dataset: &Dataset) -> Vec<Warning> {
     if dataset.robot.counter_bits.is_some() {
@@ -67,7 +106,15 @@ pub(crate) fn wrap_warnings(dataset: &Dataset) -> Vec<Warning> {
     for run in &dataset.runs {
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { continue };
         for side in Side::BOTH {
-            if let Some(bits) = suspected_wrap(&ticks[side]) {
+            if let Some(row) = suspected_spike(&ticks[side]) {
+                warnings.push(Warning::CounterSpike {
+                    run: run.info.id.clone(),
+                    side,
+                    row: row + 1,
+                    t_s: run.odometry.t_s[row],
+                    ticks: ticks[side][row],
+                });
+            } else if let Some(bits) = suspected_wrap(&ticks[side]) {
                 warnings.push(Warning::CounterWraps { run: run.info.id.clone(), side, bits });
             }
         }
@@ -127,6 +174,19 @@ mod tests {
                 prop_assert_eq!(suspected_wrap(stretch), None);
             }
         }
+    }
+
+    #[test]
+    fn a_reading_that_is_back_in_the_next_row_is_a_spike_and_no_wrap() {
+        let mut ticks: Vec<i64> = (0..50).map(|k| 120 * k).collect();
+        assert_eq!(suspected_spike(&ticks), None);
+        ticks[20] = 4_000_000_000;
+        assert_eq!((suspected_spike(&ticks), suspected_wrap(&ticks)), (Some(20), None));
+        ticks[20] = -4_000_000_000;
+        assert_eq!((suspected_spike(&ticks), suspected_wrap(&ticks)), (Some(20), None));
+        // To and fro over the end of 16 bits: both leaps are usual increments, unwrapped.
+        let rattles = [65_530, 65_534, 3, 65_531, 65_529];
+        assert_eq!((suspected_spike(&rattles), suspected_wrap(&rattles)), (None, Some(16)));
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub enum DatasetError {
         source: std::io::Error,
     },
     /// A folder was expected.
-    #[error("{path}: no such folder; expected {expected}")]
+    #[error("{path}: {}; expected {expected}", if path.exists() { "is a file, where a folder belongs" } else { "no such folder" })]
     NotAFolder {
         /// What was given.
         path: PathBuf,
@@ -27,7 +27,7 @@ pub enum DatasetError {
         expected: &'static str,
     },
     /// A file was expected, and this is a folder or a device.
-    #[error("{file}: not a file; expected {expected}")]
+    #[error("{file}: {}; expected {expected}", if file.is_dir() { "is a folder, where a file belongs" } else { "not a file" })]
     NotAFile {
         /// What was given.
         file: PathBuf,
@@ -174,7 +174,7 @@ pub enum DatasetError {
     },
 
     /// A table lacks a column.
-    #[error("{file}:1: missing column {column}; the columns found are: {found_columns}")]
+    #[error("{file}:1: missing column {column}; the columns found are: {found_columns}{hint}")]
     MissingColumn {
         /// The file.
         file: PathBuf,
@@ -182,6 +182,8 @@ pub enum DatasetError {
         column: String,
         /// The header, clipped.
         found_columns: String,
+        /// What was likely meant; empty, or from its separator on.
+        hint: String,
     },
     /// A table names a column twice.
     #[error("{file}:1: column {column} stands there twice; expected each column once")]
@@ -192,7 +194,7 @@ pub enum DatasetError {
         column: String,
     },
     /// A row has more or fewer fields than the header.
-    #[error("{file}:{line}: {found} fields; expected {expected} as in the header (a last line may be cut off)")]
+    #[error("{file}:{line}: {found} fields; expected {expected} as in the header{hint}")]
     WrongFieldCount {
         /// The file.
         file: PathBuf,
@@ -202,9 +204,14 @@ pub enum DatasetError {
         found: usize,
         /// Fields expected.
         expected: usize,
+        /// What may have happened; empty, or from its separator on.
+        hint: String,
     },
     /// A field is not a number.
-    #[error("{file}:{line}: column {column}: \"{found}\" is not a number; expected one like -0.125 or 1e-3")]
+    #[error(
+        "{file}:{line}: column {column}: \"{found}\" is not a number; expected one like -0.125 or 1e-3{}",
+        with_comma(found)
+    )]
     NotANumber {
         /// The file.
         file: PathBuf,
@@ -348,6 +355,29 @@ pub enum DatasetError {
         message: String,
     },
 
+    /// Two readings of a file are nearly as likely.
+    #[error("{file}: {what} may be {readings}, and nothing here tells which; say {flag}")]
+    Undecided {
+        /// The file.
+        file: PathBuf,
+        /// What is open.
+        what: String,
+        /// The readings.
+        readings: String,
+        /// The flag that settles it.
+        flag: String,
+    },
+    /// A log does not say what only its owner knows of the robot.
+    #[error("{file}: {why}, and no log says the robot's own numbers; give {flags}")]
+    RobotNotGiven {
+        /// The file.
+        file: PathBuf,
+        /// What needs them.
+        why: String,
+        /// The flags with what stands behind each.
+        flags: String,
+    },
+
     /// There is something where a dataset was to be written.
     #[error("{path}: already exists and {why}; nothing was written: choose another folder, or move it away")]
     AlreadyExists {
@@ -370,6 +400,12 @@ pub enum DatasetError {
         /// What is wrong.
         what: String,
     },
+}
+
+/// What is said of a number with a decimal comma.
+fn with_comma(found: &str) -> &'static str {
+    let is_decimal = found.contains(',') && found.replacen(',', ".", 1).parse::<f64>().is_ok();
+    if is_decimal { ", with a decimal point and no comma" } else { "" }
 }
 
 /// Longest text of a file that a message shows, characters.

@@ -5,6 +5,7 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
+mod column_names;
 mod counter;
 mod error;
 pub mod import;
@@ -16,10 +17,12 @@ mod row_lengths;
 mod sampling_period;
 mod session;
 mod table;
+mod unit;
 mod warning;
 mod write;
 
-pub use counter::suspected_wrap;
+pub use column_names::Quantity;
+pub use counter::{suspected_spike, suspected_wrap};
 pub use error::DatasetError;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
@@ -30,5 +33,6 @@ pub use record::{
 pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;
 pub use session::{RunView, Session};
+pub use unit::Unit;
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

@@ -252,6 +252,9 @@ pub enum WheelLog {
     Ticks(Wheels<Vec<i64>>),
     /// Cumulative wheel angles, radians.
     Angles(Wheels<Vec<f64>>),
+    /// A robot that reports only the speeds of its wheels' contacts, by its nominal wheels, m/s. The value
+    /// of a row holds over the interval that ends there.
+    Speeds(Wheels<Vec<f64>>),
     /// A robot that reports only its twist. The value of a row holds over the interval that ends there.
     Twist {
         /// Forward speed, m/s.

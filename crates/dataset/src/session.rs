@@ -74,7 +74,7 @@ impl<'a> RunView<'a> {
 
     /// The turn of each wheel from the first row to the last, radians, or `None` when the run has no row.
     ///
-    /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
+    /// A robot that reports only speeds or its twist has its wheels rebuilt from the nominal geometry.
     #[must_use]
     pub fn wheel_turn_rad(&self, robot: &NominalRobot) -> Option<Wheels<f64>> {
         fn ends<C: Count>(column: &[C]) -> Option<f64> {
@@ -86,7 +86,7 @@ impl<'a> RunView<'a> {
                 Some(Wheels { left: ends(&ticks.left)? * rad_per_tick, right: ends(&ticks.right)? * rad_per_tick })
             }
             WheelLog::Angles(angles) => Some(Wheels { left: ends(&angles.left)?, right: ends(&angles.right)? }),
-            WheelLog::Twist { .. } => {
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
                 let angles = self.rebuilt_angles_rad(robot)?;
                 Some(Wheels { left: *angles.left.last()?, right: *angles.right.last()? })
             }
@@ -101,20 +101,33 @@ impl<'a> RunView<'a> {
                 left: ticks.left.last()?.since(*ticks.left.first()?),
                 right: ticks.right.last()?.since(*ticks.right.first()?),
             }),
-            WheelLog::Angles(_) | WheelLog::Twist { .. } => None,
+            WheelLog::Angles(_) | WheelLog::Speeds(_) | WheelLog::Twist { .. } => None,
         }
     }
 
+    /// The contact speeds that a row reports, m/s, for a robot that reports speeds or its twist.
+    #[must_use]
+    pub fn reported_speed_m_s(&self, robot: &NominalRobot, row: usize) -> Option<Wheels<f64>> {
+        match &self.run.odometry.wheels {
+            WheelLog::Speeds(speeds) => Some(Wheels { left: *speeds.left.get(row)?, right: *speeds.right.get(row)? }),
+            WheelLog::Twist { v_mps, omega_radps } => {
+                let twist = kinematics::Twist { v_m_s: *v_mps.get(row)?, omega_rad_s: *omega_radps.get(row)? };
+                Some(robot.geometry().ok()?.wheel_speed_m_s(twist))
+            }
+            WheelLog::Ticks(_) | WheelLog::Angles(_) => None,
+        }
+    }
+
+    /// Wheel angles by the nominal geometry: a row's speeds hold over the interval that ends there.
     fn rebuilt_angles_rad(&self, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
-        let WheelLog::Twist { v_mps, omega_radps } = &self.run.odometry.wheels else { return None };
-        let geometry = robot.geometry().ok()?;
-        let m_per_rad = geometry.m_per_rad();
+        let m_per_rad = robot.geometry().ok()?.m_per_rad();
+        let t_s = &self.run.odometry.t_s;
         let (mut angle_rad, mut previous_s) = (Wheels::both(0.0), None);
-        let mut angles = Wheels { left: Vec::with_capacity(v_mps.len()), right: Vec::with_capacity(v_mps.len()) };
-        for ((&t_s, &v_m_s), &omega_rad_s) in self.run.odometry.t_s.iter().zip(v_mps).zip(omega_radps) {
+        let mut angles = Wheels { left: Vec::with_capacity(t_s.len()), right: Vec::with_capacity(t_s.len()) };
+        for (row, &t_s) in t_s.iter().enumerate() {
             let dt_s = t_s - previous_s.unwrap_or(t_s);
             previous_s = Some(t_s);
-            let speed_m_s = geometry.wheel_speed_m_s(kinematics::Twist { v_m_s, omega_rad_s });
+            let speed_m_s = self.reported_speed_m_s(robot, row)?;
             angle_rad = angle_rad.zip_with(
                 speed_m_s.zip_with(m_per_rad, |speed_m_s, m_per_rad| speed_m_s * dt_s / m_per_rad),
                 |angle, turn| angle + turn,
@@ -129,7 +142,8 @@ impl<'a> RunView<'a> {
     /// pose at the first row.
     ///
     /// `m_per_rad` and `wheel_separation_m` are the geometry to be used; the nominal robot gives the ticks of
-    /// a turn and, for a robot that reports only its twist, the geometry from which its wheels are rebuilt.
+    /// a turn and, for a robot that reports only speeds or its twist, the geometry from which its wheels are
+    /// rebuilt.
     pub fn dead_reckon(
         &self,
         robot: &NominalRobot,
@@ -158,7 +172,7 @@ impl<'a> RunView<'a> {
                 let columns = Wheels { left: &angles.left[..], right: &angles.right[..] };
                 reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);
             }
-            WheelLog::Twist { .. } => {
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
                 let Some(angles) = self.rebuilt_angles_rad(robot) else { return };
                 let columns = Wheels { left: &angles.left[..], right: &angles.right[..] };
                 reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);

@@ -1,6 +1,6 @@
 //! Why there is no fit.
 
-use dataset::{Session, WheelLog, suspected_wrap};
+use dataset::{Session, WheelLog, suspected_spike, suspected_wrap};
 use kinematics::{GeometryError, Side};
 
 /// Why sessions give no maximum-likelihood fit.
@@ -16,6 +16,20 @@ pub enum EstimationError {
     /// The counters wrap and no `counter_bits` says where.
     #[error(transparent)]
     CounterWraps(#[from] WrappedCounter),
+    /// A counter leaves its place for one row: a fit would take both leaps for motion.
+    #[error(
+        "run {run}: the {side} counter reads {ticks} at {t_s} s and is back in the row after: a spike; take that row out of odometry.csv"
+    )]
+    CounterSpike {
+        /// The run's id.
+        run: String,
+        /// `left` or `right`.
+        side: &'static str,
+        /// When, seconds.
+        t_s: f64,
+        /// What it reads.
+        ticks: i64,
+    },
     /// No run has wheels and two measurements.
     #[error("no run has logged wheels and two measurements of an instrument within its log")]
     NoMeasurements,
@@ -50,6 +64,10 @@ pub fn refuse_wrapped_counters(sessions: &[Session<'_>]) -> Result<(), Estimatio
     for view in sessions.iter().flat_map(|session| &session.runs) {
         let WheelLog::Ticks(ticks) = &view.odometry().wheels else { continue };
         for side in Side::BOTH {
+            if let Some(row) = suspected_spike(&ticks[side]) {
+                let (run, t_s) = (view.info().id.clone(), view.odometry().t_s[row]);
+                return Err(EstimationError::CounterSpike { run, side: side.name(), t_s, ticks: ticks[side][row] });
+            }
             if let Some(bits) = suspected_wrap(&ticks[side]) {
                 return Err(WrappedCounter { run: view.info().id.clone(), side: side.name(), bits }.into());
             }

@@ -6,7 +6,7 @@
 //! first row and after the last, the speeds of the interval there go on.
 
 use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog, row_jitter_s};
-use kinematics::{Count, Twist, Wheels};
+use kinematics::{Count, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
 use crate::wheel_rates::{WheelRates, are_inexact, quantum_of_angles};
@@ -54,7 +54,7 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// The wheels of a run; `None` when it has no row, or ticks of a robot that does not say how many make a
     /// turn.
     ///
-    /// A robot that reports only its twist has its wheels rebuilt from the nominal geometry.
+    /// A robot that reports only speeds or its twist has its wheels rebuilt from the nominal geometry.
     #[must_use]
     pub fn of(run: &RunView<'a>, robot: &NominalRobot) -> Option<Self> {
         fn since_first<C: Count>(column: &[C], rad: f64) -> Vec<f64> {
@@ -79,13 +79,12 @@ impl<'a> WheelAngleInterpolator<'a> {
                 quantum_rad = angles.as_ref().map(|column| quantum_of_angles(column));
                 angles.as_ref().map(|column| since_first(column, 1.0))
             }
-            WheelLog::Twist { v_mps, omega_radps } => {
-                let geometry = robot.geometry().ok()?;
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
+                let m_per_rad = robot.geometry().ok()?.m_per_rad();
                 let mut turns = Wheels::both(vec![0.0]);
-                // A row's twist holds over the interval that ends there.
+                // A row's speeds hold over the interval that ends there.
                 for (row, t_s) in odometry.t_s.windows(2).enumerate() {
-                    let twist = Twist { v_m_s: v_mps[row + 1], omega_rad_s: omega_radps[row + 1] };
-                    let speed_rad_s = geometry.wheel_speed_m_s(twist).zip_with(geometry.m_per_rad(), |v, r| v / r);
+                    let speed_rad_s = run.reported_speed_m_s(robot, row + 1)?.zip_with(m_per_rad, |v, r| v / r);
                     turns = turns.zip_with(speed_rad_s, |mut turns: Vec<f64>, speed| {
                         turns.push(turns[row] + speed * (t_s[1] - t_s[0]));
                         turns
@@ -462,13 +461,16 @@ mod tests {
     }
 
     #[test]
-    fn a_twist_is_rebuilt_into_wheels_and_angles_are_taken_as_they_are() {
+    fn twists_and_speeds_are_rebuilt_into_wheels_and_angles_are_taken_as_they_are() {
         let twist = WheelLog::Twist { v_mps: vec![9.0, 1.0, 0.0, 0.0], omega_radps: vec![9.0, 0.0, 0.4, 0.0] };
         // A metre on wheels of 0.1 m and 0.2 m radius, then 0.4 rad over 0.5 m.
-        let found = steps(twist, true, 0.0, 2.0).expect("spanned");
         let expected = [(10.0, 5.0), (-1.0, 0.5)];
-        for (found, expected) in found.iter().zip(expected) {
-            assert!((found.0 - expected.0).abs() < 1e-14 && (found.1 - expected.1).abs() < 1e-14, "{found:?}");
+        let speeds = WheelLog::Speeds(Wheels { left: vec![9.0, 1.0, -0.1, 0.0], right: vec![9.0, 1.0, 0.1, 0.0] });
+        for log in [twist, speeds] {
+            let found = steps(log, true, 0.0, 2.0).expect("spanned");
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found.0 - expected.0).abs() < 1e-14 && (found.1 - expected.1).abs() < 1e-14, "{found:?}");
+            }
         }
         let angles = WheelLog::Angles(Wheels { left: vec![1.0, 2.5, 3.0, 3.0], right: vec![0.0; 4] });
         assert_eq!(steps(angles, true, 0.0, 1.0), Some(vec![(1.5, 0.0)]));

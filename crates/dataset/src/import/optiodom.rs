@@ -221,6 +221,12 @@ struct Motion {
     distance_m: f64,
     /// Net turn, radians.
     turn_rad: f64,
+    /// Length of the path, forward and backward, metres.
+    path_m: f64,
+    /// From the smallest heading to the largest, radians.
+    heading_range_rad: f64,
+    /// How far the heading departs from one that grows evenly with the distance, radians.
+    uneven_rad: f64,
     /// Sum of the turns' sizes, radians.
     turning_rad: f64,
     /// The part of it during which the wheels went in opposite directions, radians.
@@ -231,6 +237,7 @@ impl Motion {
     fn of(ticks: &Wheels<Vec<i64>>, geometry: &DriveGeometry, ticks_per_rev: f64) -> Option<Self> {
         let m_per_count = geometry.m_per_count(ticks_per_rev).ok()?;
         let mut motion = Self::default();
+        let mut course = Vec::with_capacity(ticks.left.len());
         for (left, right) in ticks.left.windows(2).zip(ticks.right.windows(2)) {
             let counts = Wheels { left: left[1].wrapping_sub(left[0]), right: right[1].wrapping_sub(right[0]) };
             let Increment { distance_m, turn_rad } =
@@ -238,60 +245,84 @@ impl Motion {
             motion.distance_m += distance_m;
             motion.turn_rad += turn_rad;
             motion.turning_rad += turn_rad.abs();
+            motion.path_m += distance_m.abs();
+            course.push((motion.distance_m, motion.turn_rad));
             if counts.left.signum() * counts.right.signum() < 0 {
                 motion.on_the_spot_rad += turn_rad.abs();
             }
         }
+        let (mut lowest_rad, mut highest_rad) = (0.0_f64, 0.0_f64);
+        let rad_per_m = motion.turn_rad / motion.distance_m;
+        for (distance_m, turn_rad) in course {
+            (lowest_rad, highest_rad) = (lowest_rad.min(turn_rad), highest_rad.max(turn_rad));
+            motion.uneven_rad = motion.uneven_rad.max((turn_rad - rad_per_m * distance_m).abs());
+        }
+        motion.heading_range_rad = highest_rad - lowest_rad;
         Some(motion)
     }
 }
 
-/// What a run drove.
+/// What a run drove: a label only where all of the run is like it, else `free`.
 ///
-/// | label | rule (turn and distance of the nominal robot) | setting |
+/// | label | rule (by the nominal robot) | setting |
 /// | --- | --- | --- |
-/// | `spin` | less than 0.1 m, and a net turn of at least an eighth of a turn | `turn_rad`: the nearest whole number of half turns |
-/// | `straight` | at least 0.1 m, and a net turn of less than an eighth | `length_m`: signed, to the centimetre |
-/// | `square_*` | a whole turn to within an eighth, most of the turning with the wheels in opposite directions | `side_m`: the metadata's |
-/// | `circle_*` | at least a quarter turn, most of the turning with both wheels forward | `radius_m`: distance over turn, the mean radius of the run, to the millimetre |
+/// | `spin` | a path of less than 0.1 m, and a net turn of at least an eighth of a turn | `turn_rad`: the nearest whole number of half turns |
+/// | `straight` | at least 0.1 m, and all headings within 10° | `length_m`: signed, to the centimetre |
+/// | `square_*` | a whole turn to within an eighth, most of the turning with the wheels in opposite directions, four sides where the metadata says their length | `side_m`: the metadata's |
+/// | `circle_*` | at least a half turn, with both wheels forward, that grows evenly with the distance | `radius_m`: distance over turn, the mean radius of the run, to the millimetre |
 /// | `free` | none of these | |
 ///
-/// The runs of the study's `circular` folder are spirals: half turns of a radius that shrinks from 0.375 m.
-/// Their mean is what one number can say.
+/// All but `free` go one way: forward or backward, left or right. The runs of the study's `circular` folder
+/// are spirals: half turns of a radius that shrinks from 0.375 m. Their mean is what one number can say.
 fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
     const MOVES_M: f64 = 0.1;
     const EIGHTH_RAD: f64 = TAU / 8.0;
+    /// The study's straights keep within 4°.
+    const STRAIGHT_RAD: f64 = TAU / 36.0;
+    /// What of a path or of the headings may go the other way: the study's squares have 2 %.
+    const ONE_WAY: f64 = 0.95;
+    /// The study's spirals are uneven by 0.043 to 0.068 of their turn; a drive of two different arcs by more.
+    const UNEVEN: f64 = 0.1;
+    /// The study's circles turn for 3 % with wheels in opposite directions, as they start and stop.
+    const ON_THE_SPOT: f64 = 0.1;
+    /// The study's squares are 1 % short by the nominal robot.
+    const SIDES: f64 = 0.1;
     let none = ProtocolSettings::default();
-    let moves = motion.distance_m.abs() >= MOVES_M;
-    let turns = motion.turn_rad.abs() >= EIGHTH_RAD;
-    let mostly_on_the_spot = motion.on_the_spot_rad > 0.5 * motion.turning_rad;
+    let free = (Protocol::Free, none);
+    let turn_rad = motion.turn_rad.abs();
+    let turns_one_way = turn_rad >= ONE_WAY * motion.heading_range_rad;
     let clockwise = motion.turn_rad < 0.0;
-    match (moves, turns) {
-        (false, false) => (Protocol::Free, none),
-        (false, true) => {
-            let turn_rad = (motion.turn_rad / PI).round() * PI;
-            (Protocol::Spin, ProtocolSettings { turn_rad: Some(turn_rad), ..none })
+    if motion.path_m < MOVES_M {
+        if turn_rad < EIGHTH_RAD || !turns_one_way {
+            return free;
         }
-        (true, false) => {
-            let length_m = (motion.distance_m * 100.0).round() / 100.0;
-            (Protocol::Straight, ProtocolSettings { length_m: Some(length_m), ..none })
-        }
-        (true, true) if mostly_on_the_spot => {
-            let whole_turn = (motion.turn_rad.abs() - TAU).abs() < EIGHTH_RAD;
-            let protocol = match (whole_turn, clockwise) {
-                (false, _) => return (Protocol::Free, none),
-                (true, true) => Protocol::SquareCw,
-                (true, false) => Protocol::SquareCcw,
-            };
+        let turn_rad = (motion.turn_rad / PI).round() * PI;
+        return (Protocol::Spin, ProtocolSettings { turn_rad: Some(turn_rad), ..none });
+    }
+    if motion.distance_m.abs() < ONE_WAY * motion.path_m {
+        return free;
+    }
+    if motion.heading_range_rad < STRAIGHT_RAD {
+        let length_m = (motion.distance_m * 100.0).round() / 100.0;
+        return (Protocol::Straight, ProtocolSettings { length_m: Some(length_m), ..none });
+    }
+    let sides = side_m.is_none_or(|side_m| (motion.distance_m.abs() / (4.0 * side_m) - 1.0).abs() < SIDES);
+    let is_square = (turn_rad - TAU).abs() < EIGHTH_RAD && motion.on_the_spot_rad > 0.5 * motion.turning_rad && sides;
+    let is_circle = turn_rad >= 4.0 * EIGHTH_RAD
+        && motion.on_the_spot_rad < ON_THE_SPOT * motion.turning_rad
+        && motion.uneven_rad < UNEVEN * turn_rad;
+    match (turns_one_way, is_square, is_circle) {
+        (true, true, _) => {
+            let protocol = if clockwise { Protocol::SquareCw } else { Protocol::SquareCcw };
             (protocol, ProtocolSettings { side_m, ..none })
         }
-        (true, true) if motion.turn_rad.abs() >= 2.0 * EIGHTH_RAD => {
+        (true, false, true) => {
             let radius_m = (motion.distance_m / motion.turn_rad).abs();
             let radius_m = (radius_m * 1000.0).round() / 1000.0;
             let protocol = if clockwise { Protocol::CircleCw } else { Protocol::CircleCcw };
             (protocol, ProtocolSettings { radius_m: Some(radius_m), ..none })
         }
-        (true, true) => (Protocol::Free, none),
+        _ => free,
     }
 }
 
@@ -366,9 +397,12 @@ mod tests {
 
     #[test]
     fn labels_follow_the_rule_on_both_sides_of_its_borders() {
-        let motion = |distance_m, turn_rad: f64, on_the_spot_rad| Motion {
+        let motion = |distance_m: f64, turn_rad: f64, on_the_spot_rad| Motion {
             distance_m,
+            path_m: distance_m.abs() + 0.02,
             turn_rad,
+            heading_range_rad: turn_rad.abs(),
+            uneven_rad: 0.05 * turn_rad.abs(),
             turning_rad: turn_rad.abs() + 0.1,
             on_the_spot_rad,
         };
@@ -385,8 +419,36 @@ mod tests {
             (Protocol::CircleCw, ProtocolSettings { radius_m: Some(0.317), ..Default::default() })
         );
         assert_eq!(labelled(motion(2.98, 6.3, 0.4)).0, Protocol::CircleCcw);
-        assert_eq!(labelled(motion(2.0, 3.0, 2.9)).0, Protocol::Free);
-        assert_eq!(labelled(motion(2.0, 1.0, 0.0)).0, Protocol::Free);
-        assert_eq!(labelled(motion(0.01, 0.1, 0.1)).0, Protocol::Free);
+        // Not a square of these sides, not a whole turn, too short a turn, hardly any motion.
+        for (distance_m, turn_rad, on_the_spot_rad) in
+            [(4.0, 6.3, 5.0), (2.0, 3.0, 2.9), (2.0, 1.0, 0.0), (0.01, 0.1, 0.1)]
+        {
+            assert_eq!(labelled(motion(distance_m, turn_rad, on_the_spot_rad)).0, Protocol::Free, "{distance_m}");
+        }
+    }
+
+    #[test]
+    fn drives_of_several_kinds_are_free() {
+        let geometry = DriveGeometry::new(Wheels::both(0.1), 0.2).expect("a drive");
+        // Rows of wheel counts, 100 a turn, in pieces of so many rows.
+        let drive = |pieces: &[(i64, i64, usize)]| {
+            let mut ticks = Wheels { left: vec![0], right: vec![0] };
+            for &(left, right, rows) in pieces {
+                for _ in 0..rows {
+                    ticks.left.push(ticks.left[ticks.left.len() - 1] + left);
+                    ticks.right.push(ticks.right[ticks.right.len() - 1] + right);
+                }
+            }
+            label(&Motion::of(&ticks, &geometry, 100.0).expect("motion"), None).0
+        };
+        assert_eq!(drive(&[(10, 10, 50)]), Protocol::Straight);
+        assert_eq!(drive(&[(5, 10, 100)]), Protocol::CircleCcw);
+        assert_eq!(drive(&[(-5, 5, 20)]), Protocol::Spin);
+        // A slalom whose net turn is nothing, out and back, two arcs, a circle and a straight, to and fro.
+        assert_eq!(drive(&[(5, 10, 60), (10, 5, 120), (5, 10, 60)]), Protocol::Free);
+        assert_eq!(drive(&[(10, 10, 50), (-10, -10, 30)]), Protocol::Free);
+        assert_eq!(drive(&[(5, 10, 100), (8, 10, 100)]), Protocol::Free);
+        assert_eq!(drive(&[(5, 10, 100), (10, 10, 100)]), Protocol::Free);
+        assert_eq!(drive(&[(-5, 5, 20), (5, -5, 10)]), Protocol::Free);
     }
 }

@@ -182,8 +182,25 @@ impl Source<'_> {
         }
         match toml::from_str::<FormatOnly>(self.text) {
             Ok(found) if *found.format.as_ref() != FORMAT => self.unsupported(&found.format),
-            _ => self.error(&error.span().unwrap_or(0..0), error.message().replace('\n', "; ")),
+            _ => self.error(&error.span().unwrap_or(0..0), self.in_words(error)),
         }
+    }
+
+    /// The parser's message, with what a person is likely to have done.
+    fn in_words(&self, error: &toml::de::Error) -> String {
+        let message = error.message().replace('\n', "; ");
+        let of_syntax =
+            !["unknown field", "missing field", "invalid type"].iter().any(|kind| message.starts_with(kind));
+        // In a whole file more of it stands behind a fault.
+        let in_last_line = error.span().filter(|span| !self.text[span.start..].trim_end().contains('\n'));
+        if let Some(span) = in_last_line.filter(|_| of_syntax) {
+            return format!("the file may be cut off at line {}: {message}", self.line(&span));
+        }
+        let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
+        if unknown.is_some_and(|key| key.contains("radius")) {
+            return format!("{message}; a diameter is twice the radius");
+        }
+        message
     }
 
     fn unsupported(&self, format: &Spanned<i64>) -> DatasetError {

@@ -29,6 +29,12 @@ pub(crate) use truth::{DISPLACEMENT, POINTS, TRUTH, WHEEL_REFERENCE};
 /// What the robot counted.
 pub(crate) const ODOMETRY: &str = "odometry.csv";
 
+/// Wheels of the largest haul trucks have 4 m; a larger one is one in millimetres.
+const LARGEST_WHEEL_M: f64 = 5.0;
+
+/// The widest haul trucks have 10 m; what is wider is in millimetres.
+const LARGEST_SEPARATION_M: f64 = 12.0;
+
 /// A dataset that was read, and what was noticed on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
@@ -103,6 +109,14 @@ impl Opened {
                 key: "ticks_per_rev",
                 why: "odometry.csv has ticks, and a count is no length without it",
             });
+        }
+        let lengths = [
+            ("left_wheel_diameter_m", robot.left_wheel_diameter_m, LARGEST_WHEEL_M),
+            ("right_wheel_diameter_m", robot.right_wheel_diameter_m, LARGEST_WHEEL_M),
+            ("wheel_separation_m", robot.wheel_separation_m, LARGEST_SEPARATION_M),
+        ];
+        for (key, value_m, _) in lengths.into_iter().filter(|(_, value_m, largest_m)| value_m > largest_m) {
+            warnings.push(Warning::NotMetres { file: manifest_file.clone(), key, value_m });
         }
         let truths = truth::open_all(dir, &mut warnings)?;
 

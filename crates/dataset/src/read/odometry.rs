@@ -1,4 +1,4 @@
-//! `odometry.csv`: what the robot counted, in one of three forms.
+//! `odometry.csv`: what the robot counted, in one of four forms.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,16 +19,18 @@ const HEADER: &str = "a header like run,t_s,left_ticks,right_ticks";
 enum Form {
     Ticks,
     Angles,
+    Speeds,
     Twist,
 }
 
 impl Form {
-    const ALL: [Self; 3] = [Self::Ticks, Self::Angles, Self::Twist];
+    const ALL: [Self; 4] = [Self::Ticks, Self::Angles, Self::Speeds, Self::Twist];
 
     const fn columns(self) -> [&'static str; 2] {
         match self {
             Self::Ticks => ["left_ticks", "right_ticks"],
             Self::Angles => ["left_rad", "right_rad"],
+            Self::Speeds => ["left_mps", "right_mps"],
             Self::Twist => ["v_mps", "omega_radps"],
         }
     }
@@ -37,6 +39,7 @@ impl Form {
         match self {
             Self::Ticks => "left_ticks,right_ticks",
             Self::Angles => "left_rad,right_rad",
+            Self::Speeds => "left_mps,right_mps",
             Self::Twist => "v_mps,omega_radps",
         }
     }
@@ -45,6 +48,7 @@ impl Form {
         match self {
             Self::Ticks => WheelLog::Ticks(Wheels::from_sides(|_| exactly(rows))),
             Self::Angles => WheelLog::Angles(Wheels::from_sides(|_| exactly(rows))),
+            Self::Speeds => WheelLog::Speeds(Wheels::from_sides(|_| exactly(rows))),
             Self::Twist => WheelLog::Twist { v_mps: exactly(rows), omega_radps: exactly(rows) },
         }
     }
@@ -170,9 +174,9 @@ impl Columns {
                 ticks.left.push(row.count(self.wheels[0])?);
                 ticks.right.push(row.count(self.wheels[1])?);
             }
-            WheelLog::Angles(angles) => {
-                angles.left.push(row.number(self.wheels[0])?);
-                angles.right.push(row.number(self.wheels[1])?);
+            WheelLog::Angles(columns) | WheelLog::Speeds(columns) => {
+                columns.left.push(row.number(self.wheels[0])?);
+                columns.right.push(row.number(self.wheels[1])?);
             }
             WheelLog::Twist { v_mps, omega_radps } => {
                 v_mps.push(row.number(self.wheels[0])?);
@@ -224,6 +228,7 @@ pub(crate) fn wheel_columns(wheels: &WheelLog) -> [&'static str; 2] {
     match wheels {
         WheelLog::Ticks(_) => Form::Ticks.columns(),
         WheelLog::Angles(_) => Form::Angles.columns(),
+        WheelLog::Speeds(_) => Form::Speeds.columns(),
         WheelLog::Twist { .. } => Form::Twist.columns(),
     }
 }

@@ -40,6 +40,8 @@ pub(crate) struct Line<'a> {
     pub(crate) bytes: &'a [u8],
     /// From 1.
     pub(crate) number: u64,
+    /// Nothing follows, not even the end of the line.
+    pub(crate) is_open_end: bool,
 }
 
 /// The lines of a file that are not empty.
@@ -95,6 +97,7 @@ impl Lines {
     /// The next line that is not empty; `None` at the end of the file.
     pub(crate) fn advance(&mut self) -> Result<Option<Line<'_>>, DatasetError> {
         loop {
+            let mut is_open_end = false;
             let (mut from, mut to) = match memchr::memchr(b'\n', &self.buffer[self.start..self.end]) {
                 Some(length) => {
                     let span = (self.start, self.start + length);
@@ -107,6 +110,7 @@ impl Lines {
                 }
                 None if self.start < self.end => {
                     let span = (self.start, self.end);
+                    is_open_end = true;
                     self.start = self.end;
                     span
                 }
@@ -123,7 +127,7 @@ impl Lines {
                 to -= 1;
             }
             if from < to {
-                return Ok(Some(Line { bytes: &self.buffer[from..to], number: self.number }));
+                return Ok(Some(Line { bytes: &self.buffer[from..to], number: self.number, is_open_end }));
             }
         }
     }
@@ -159,7 +163,7 @@ const SHORT_FILE_LINES: u64 = 1000;
 pub(crate) fn read_all(path: &Path, expected: &'static str) -> Result<Vec<(u64, String)>, DatasetError> {
     let mut lines = Lines::open(path, expected)?;
     let mut all = Vec::new();
-    while let Some(Line { bytes, number }) = lines.advance()? {
+    while let Some(Line { bytes, number, .. }) = lines.advance()? {
         let text =
             std::str::from_utf8(bytes).map_err(|_| DatasetError::NotUtf8 { file: path.to_owned(), line: number })?;
         if number > SHORT_FILE_LINES {

@@ -9,6 +9,7 @@ mod lines;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use crate::column_names::{Quantity, likely_mapping};
 use crate::error::{DatasetError, shown};
 use crate::warning::Warning;
 use fields::Fields;
@@ -19,6 +20,19 @@ pub(crate) use lines::{LINE_LIMIT_BYTES, Position, open as open_file, read_all a
 
 /// The column that says to which run a row belongs.
 pub(crate) const RUN_COLUMN: &str = "run";
+
+/// What may be wrong with a last row that is too short.
+pub(crate) const CUT_OFF: &str = "; it is the last line: the file may be cut off";
+
+const TOO_MANY: &str = "; decimal commas? Numbers need points here: yair import csv reads such a file";
+
+const fn field_count_hint(too_many: bool, is_open_end: bool) -> &'static str {
+    match (too_many, is_open_end) {
+        (true, _) => TOO_MANY,
+        (false, true) => CUT_OFF,
+        (false, false) => "",
+    }
+}
 
 /// Header names that an error lists; a header of garbage may have thousands.
 const LISTED_COLUMNS: usize = 20;
@@ -75,6 +89,9 @@ pub(crate) struct Mark {
     pub(crate) position: Position,
     pub(crate) t_s: f64,
 }
+
+/// Up to here every whole number is a double.
+const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// Rows from one mark to the next: what is read in vain when a cut falls between two is small beside a part,
 /// and marks are small beside the rows.
@@ -152,7 +169,29 @@ impl Table {
             file: self.columns.file.clone(),
             column: column.to_owned(),
             found_columns: found.join(", "),
+            hint: self.hint_of_missing(column),
         }
+    }
+
+    /// What a header that lacks a column may be instead.
+    fn hint_of_missing(&self, column: &str) -> String {
+        let (file, names) = (self.columns.file.display(), &self.columns.names);
+        let import = format!("yair import csv {file} --out DIR");
+        let others = [(';', "semicolons"), ('\t', "tabs"), ('|', "bars"), (' ', "spaces")];
+        if let [only] = &names[..]
+            && let Some((_, delimiter)) = others.into_iter().find(|(delimiter, _)| only.contains(*delimiter))
+        {
+            return format!("; {delimiter} stand between the fields where commas are expected: {import} reads it");
+        }
+        let mapping = likely_mapping(names);
+        if column == "theta_rad" && mapping.iter().all(|(quantity, _)| *quantity != Quantity::Heading) {
+            return "; where no heading was seen the column stands there and is empty".to_owned();
+        }
+        let likely: Vec<String> = mapping
+            .into_iter()
+            .map(|(quantity, name)| format!("{}={}", quantity.key(), shown(name.as_bytes())))
+            .collect();
+        if likely.is_empty() { String::new() } else { format!("; likely {}: {import} reads it", likely.join(", ")) }
     }
 
     /// Names of the columns.
@@ -263,6 +302,7 @@ impl Columns {
                 line: line.number,
                 found: fields.len(),
                 expected: self.names.len(),
+                hint: field_count_hint(fields.len() > self.names.len(), line.is_open_end).to_owned(),
             });
         }
         Ok(Row { columns: self, fields, line })
@@ -332,7 +372,14 @@ impl Row<'_> {
     /// A whole number.
     pub(crate) fn count(&self, column: usize) -> Result<i64, DatasetError> {
         let text = self.text(column)?;
-        text.parse().map_err(|_| {
+        let whole = |_| match text.parse::<f64>() {
+            // 12.0, as spreadsheets and pandas write counts.
+            Ok(number) if number.fract() == 0.0 && number.abs() <= LARGEST_WHOLE && text.contains('.') => {
+                Ok(number as i64)
+            }
+            _ => Err(()),
+        };
+        text.parse().or_else(whole).map_err(|()| {
             let (file, line, column) = (self.file(), self.line(), self.name(column));
             let found = shown(text.as_bytes());
             match text.parse::<f64>() {

@@ -158,6 +158,10 @@ fn check_odometry(dataset: &Dataset, first: Discriminant<WheelLog>, odometry: &O
             as_long(&[angles.left.len(), angles.right.len()])?;
             all_finite("wheel angle", angles.left.iter().chain(&angles.right).copied())?;
         }
+        WheelLog::Speeds(speeds) => {
+            as_long(&[speeds.left.len(), speeds.right.len()])?;
+            all_finite("wheel speed", speeds.left.iter().chain(&speeds.right).copied())?;
+        }
         WheelLog::Twist { v_mps, omega_radps } => {
             as_long(&[v_mps.len(), omega_radps.len()])?;
             all_finite("twist", v_mps.iter().chain(omega_radps).copied())?;

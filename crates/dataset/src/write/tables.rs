@@ -112,7 +112,9 @@ fn odometry(run: &Run, _: &[MarkedPoint], columns: &OptionalColumns, out: &mut O
                     out.write_all(itoa::Buffer::new().format(count).as_bytes())?;
                 }
             }
-            WheelLog::Angles(angles) => numbers(out, [angles.left[row], angles.right[row]])?,
+            WheelLog::Angles(columns) | WheelLog::Speeds(columns) => {
+                numbers(out, [columns.left[row], columns.right[row]])?;
+            }
             WheelLog::Twist { v_mps, omega_radps } => numbers(out, [v_mps[row], omega_radps[row]])?,
         }
         for channel in &columns.extra {

@@ -111,7 +111,9 @@ fn columns_may_come_in_any_order_and_runs_in_turns() {
 
 #[test]
 fn truncated_empty_and_header_only() {
-    odometry("a,0,0,0\na,0.1,1", "odometry.csv:3: 3 fields; expected 4 as in the header (a last line may be cut off)");
+    odometry("a,0,0,0\na,0.1,1", "odometry.csv:3: 3 fields; expected 4 as in the header; it is the last line");
+    let inside = Case::good().with("odometry.csv", ODOMETRY.replace("a,0.1,10,12", "a,0.1,10")).message();
+    assert_eq!(inside, "odometry.csv:3: 3 fields; expected 4 as in the header");
     odometry("a,0,0,0\na,0.1,1,2,3\n", "odometry.csv:3: 5 fields; expected 4");
     fault("odometry.csv", "", "odometry.csv: empty file; expected a header like run,t_s,left_ticks,right_ticks");
     fault("truth.csv", "\n\n", "truth.csv: empty file; expected a header like run,t_s,x_m,y_m,theta_rad");
@@ -210,7 +212,7 @@ fn missing_and_wrong_columns() {
     fault(
         "odometry.csv",
         "run,t_s,l,r\n",
-        "odometry.csv:1: missing column left_ticks,right_ticks or left_rad,right_rad or v_mps,omega_radps; the columns",
+        "odometry.csv:1: missing column left_ticks,right_ticks or left_rad,right_rad or left_mps,right_mps or v_mps,omega_radps; the columns",
     );
     fault(
         "odometry.csv",
@@ -352,6 +354,62 @@ fn a_counter_that_wraps_is_kept_and_named() {
 }
 
 #[test]
+fn a_counter_that_leaves_its_place_for_a_row_is_a_spike() {
+    let rows = "a,0,0,0\na,1,50,1\na,2,4000000000,2\na,3,150,3\na,4,200,4\nb,0,0,0\n";
+    let case = Case::good().with("odometry.csv", format!("run,t_s,left_ticks,right_ticks\n{rows}"));
+    let loaded = read(case.path()).expect("no fault");
+    let spike = Warning::CounterSpike { run: "a".into(), side: Side::Left, row: 3, t_s: 2.0, ticks: 4_000_000_000 };
+    assert_eq!(loaded.warnings, [spike]);
+    assert!(loaded.warnings[0].to_string().contains("reads 4000000000 at 2 s, row 3 of the run"));
+}
+
+#[test]
+fn counts_may_be_written_with_a_point() {
+    let pointed = ODOMETRY.replace("10,12", "10.0,12.00");
+    let counted = |case: Case| read(case.path()).expect("no fault").dataset;
+    assert_eq!(counted(Case::good().with("odometry.csv", pointed)), counted(Case::good()));
+    odometry("a,0,3.5,0\n", "odometry.csv:2: column left_ticks: \"3.5\" is not a count");
+    odometry("a,0,1e17.0,0\n", "odometry.csv:2: column left_ticks: \"1e17.0\" is not a count");
+}
+
+/// What a fault's message says behind its place.
+#[track_caller]
+fn hints(file: &str, content: impl AsRef<[u8]>, expected: &str) {
+    let message = Case::good().with(file, content).message();
+    assert!(message.contains(expected), "\nfound    {message}\nexpected … {expected} …");
+}
+
+#[test]
+fn what_was_likely_meant_is_said() {
+    hints("odometry.csv", ODOMETRY.replace(',', ";"), "semicolons stand between the fields where commas are expected");
+    hints("odometry.csv", ODOMETRY.replace(',', "\t"), "tabs stand between the fields");
+    hints("odometry.csv", ODOMETRY.replace("0.1", "0,1"), "5 fields; expected 4 as in the header; decimal commas?");
+    hints("odometry.csv", ODOMETRY.replace("0.1", "\"0,1\""), "with a decimal point and no comma");
+    hints(
+        "odometry.csv",
+        ODOMETRY.replace("left_ticks,right_ticks", "enc_l,enc_r"),
+        "; likely run=run, t=t_s, left=enc_l, right=enc_r: yair import csv",
+    );
+    hints("truth.csv", TRUTH.replace(",theta_rad", ",heading"), "likely run=run, t=t_s, x=x_m, y=y_m, theta=heading");
+    hints("truth.csv", "run,t_s,x_m,y_m\na,0,0,0\n", "the column stands there and is empty");
+    let cut = &TOML[..TOML.find("_m = 0.3").expect("a key")];
+    hints("dataset.toml", cut, "dataset.toml:5: the file may be cut off at line 5");
+    hints(
+        "dataset.toml",
+        TOML.replace("left_wheel_diameter_m", "left_wheel_radius_m"),
+        "a diameter is twice the radius",
+    );
+    let large = TOML.replace("_diameter_m = 0.1", "_diameter_m = 160").replace("= 0.3", "= 363");
+    let warnings = read(Case::good().with("dataset.toml", large).path()).expect("no fault").warnings;
+    assert_eq!(warnings.len(), 3);
+    assert!(
+        warnings[2]
+            .to_string()
+            .ends_with("wheel_separation_m = 363 is in metres; is it 0.363 m, written in millimetres?")
+    );
+}
+
+#[test]
 fn text_that_is_none() {
     fault("dataset.toml", b"format = 1\nname = \"\xff\"\n", "dataset.toml:2: not UTF-8 text");
     fault("odometry.csv", b"run,t_s\xff\n", "odometry.csv:1: not UTF-8 text");
@@ -371,15 +429,19 @@ fn what_is_no_file_and_no_folder() {
     assert!(message.starts_with("dataset.toml: no such file; expected a dataset's format"), "{message}");
     let case = Case::good().without("odometry.csv");
     fs::create_dir(case.path().join("odometry.csv")).expect("made");
-    assert!(case.message().starts_with("odometry.csv: not a file; expected"), "{}", case.message());
+    assert!(
+        case.message().starts_with("odometry.csv: is a folder, where a file belongs; expected"),
+        "{}",
+        case.message()
+    );
     let case = Case::good().without("truth.csv");
     assert!(matches!(case.error(), DatasetError::NoTruth { .. }));
     assert!(case.error().to_string().contains("truth.csv, displacement.csv, points.csv and wheel_reference.csv"));
     fs::create_dir(case.path().join("truth.csv")).expect("made");
-    assert!(case.message().starts_with("truth.csv: not a file; expected"), "{}", case.message());
-    for absent in [case.path().join("absent"), case.path().join("dataset.toml")] {
-        let message = read(&absent).expect_err("no folder").to_string();
-        assert!(message.contains("no such folder; expected a dataset"), "{message}");
+    assert!(case.message().starts_with("truth.csv: is a folder, where a file belongs; expected"), "{}", case.message());
+    for (wrong, expected) in [("absent", "no such folder"), ("dataset.toml", "is a file, where a folder belongs")] {
+        let message = read(&case.path().join(wrong)).expect_err("no folder").to_string();
+        assert!(message.contains(&format!("{wrong}: {expected}; expected a dataset")), "{message}");
     }
 }
 

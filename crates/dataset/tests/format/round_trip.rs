@@ -53,6 +53,7 @@ fn text() -> impl Strategy<Value = Option<String>> {
 enum Form {
     Ticks,
     Angles,
+    Speeds,
     Twist,
 }
 
@@ -64,6 +65,9 @@ fn wheels(form: Form, rows: usize) -> BoxedStrategy<WheelLog> {
             .boxed(),
         Form::Angles => {
             (numbers(), numbers()).prop_map(|(left, right)| WheelLog::Angles(Wheels { left, right })).boxed()
+        }
+        Form::Speeds => {
+            (numbers(), numbers()).prop_map(|(left, right)| WheelLog::Speeds(Wheels { left, right })).boxed()
         }
         Form::Twist => {
             (numbers(), numbers()).prop_map(|(v_mps, omega_radps)| WheelLog::Twist { v_mps, omega_radps }).boxed()
@@ -171,7 +175,7 @@ fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
 }
 
 fn datasets() -> impl Strategy<Value = Dataset> {
-    let form = prop::sample::select(vec![Form::Ticks, Form::Angles, Form::Twist]);
+    let form = prop::sample::select(vec![Form::Ticks, Form::Angles, Form::Speeds, Form::Twist]);
     let points = btree_map(id(), (number(), number()), 0..3);
     (form, points).prop_flat_map(|(form, points)| {
         let points: Vec<_> =

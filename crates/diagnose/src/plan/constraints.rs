@@ -83,7 +83,7 @@ impl Setting {
             reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),
             relative: runs().all(|run| run.truth.is_empty() && run.point_readings.is_empty()),
-            twist: runs().any(|run| matches!(run.odometry.wheels, WheelLog::Twist { .. })),
+            twist: runs().any(|run| matches!(run.odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. })),
             free_m,
             minutes,
             handling_s: HANDLING_S,

@@ -88,7 +88,9 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
             for side in Side::BOTH.into_iter().filter(|side| reversed[*side]) {
                 match wheels {
                     WheelLog::Ticks(columns) => columns[side].iter_mut().for_each(|ticks| *ticks = -*ticks),
-                    WheelLog::Angles(columns) => columns[side].iter_mut().for_each(|angle| *angle = -*angle),
+                    WheelLog::Angles(columns) | WheelLog::Speeds(columns) => {
+                        columns[side].iter_mut().for_each(|turn| *turn = -*turn);
+                    }
                     WheelLog::Twist { .. } => {}
                 }
             }

@@ -67,7 +67,7 @@ impl Forward for State {
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let changed = |wheels: &mut WheelLog| match wheels {
         WheelLog::Ticks(Wheels { left, right }) => std::mem::swap(left, right),
-        WheelLog::Angles(Wheels { left, right }) => std::mem::swap(left, right),
+        WheelLog::Angles(Wheels { left, right }) | WheelLog::Speeds(Wheels { left, right }) => std::mem::swap(left, right),
         WheelLog::Twist { .. } => {}
     };
     let turned =

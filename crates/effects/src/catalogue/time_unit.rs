@@ -110,7 +110,7 @@ fn off_typical(dataset: &Dataset) -> f64 {
                 0.5 * (turned(&angles.left) + turned(&angles.right))
             }
             // Speeds are logged: the same whatever the unit of time.
-            WheelLog::Twist { .. } => return 0.0,
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => return 0.0,
         };
         distance_m += m_per_rad * turned_rad;
         time_s += length_s;

@@ -220,7 +220,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
 
 fn correction(dataset: &Dataset, factor: f64, reason: &str) -> RecordCorrection {
     let scaled = |wheels: &mut WheelLog| {
-        if let WheelLog::Angles(Wheels { left, right }) = wheels {
+        if let WheelLog::Angles(Wheels { left, right }) | WheelLog::Speeds(Wheels { left, right }) = wheels {
             left.iter_mut().chain(right).for_each(|angle| *angle /= factor);
         }
     };

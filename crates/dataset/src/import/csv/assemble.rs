@@ -1,0 +1,95 @@
+//! The dataset from the rows of the runs, in SI units.
+
+use kinematics::Wheels;
+
+use super::options::Rates;
+use super::runs::{Part, RawRun};
+use super::times::seconds;
+use super::units::{Drive, Units, WheelUnits};
+use crate::column_names::Quantity;
+use crate::error::DatasetError;
+use crate::record::{Odometry, Run, RunInfo, TruthSample, WheelLog};
+use crate::unit::Unit;
+
+/// Largest count that a double holds exactly.
+const LARGEST_COUNT: f64 = 9_007_199_254_740_992.0;
+
+/// One run of the dataset; `session_start` is the first run's start, where there are several.
+pub(super) fn run(
+    parts: &[Part],
+    raw: &RawRun,
+    units: &Units,
+    drive: &Drive,
+    session_start: Option<i128>,
+) -> Result<Run, DatasetError> {
+    let part = &parts[raw.part];
+    let t_s: Vec<f64> = raw.rows.iter().map(|&row| seconds(raw.start, part.log.time[row])).collect();
+    let wheels = match (units.wheels, &part.log.wheels) {
+        (WheelUnits::Wheels(Unit::Ticks), Some([left, right])) => WheelLog::Ticks(Wheels {
+            left: counts(part, Quantity::Left, raw, left)?,
+            right: counts(part, Quantity::Right, raw, right)?,
+        }),
+        (WheelUnits::Wheels(unit), Some(columns)) if unit.is_rate() => {
+            let m = drive.m_per_unit(unit).unwrap_or(Wheels::both(1.0));
+            let [left, right] = columns.each_ref().map(|column| rates(raw, column, drive.rates));
+            // Of contacts the unit's own quotient: the bits of the text in metres a second.
+            let scaled = |column: Vec<f64>, m: f64| {
+                let in_m_s = |value: f64| if unit.is_of_contact() { unit.to_si(value) } else { value * m };
+                column.into_iter().map(in_m_s).collect()
+            };
+            WheelLog::Speeds(Wheels { left: scaled(left, m.left), right: scaled(right, m.right) })
+        }
+        (WheelUnits::Wheels(unit), Some([left, right])) => {
+            let m_per_rad = drive.geometry.m_per_rad();
+            let angle = |column: &[f64], m_per_rad: f64| {
+                let of = |&row: &usize| {
+                    let value = unit.to_si(column[row]);
+                    if Unit::LENGTHS.contains(&unit) { value / m_per_rad } else { value }
+                };
+                raw.rows.iter().map(of).collect()
+            };
+            WheelLog::Angles(Wheels { left: angle(left, m_per_rad.left), right: angle(right, m_per_rad.right) })
+        }
+        (WheelUnits::Twist([speed, yaw_rate]), Some([v, omega])) => {
+            let si = |column: &[f64], unit: Unit| {
+                rates(raw, column, drive.rates).into_iter().map(|value| unit.to_si(value)).collect()
+            };
+            WheelLog::Twist { v_mps: si(v, speed), omega_radps: si(omega, yaw_rate) }
+        }
+        (_, None) => WheelLog::default(),
+    };
+    let truth_part = &parts[raw.truth_part];
+    let mut truth = Vec::with_capacity(raw.truth_rows.len());
+    if let Some(pose) = &truth_part.log.pose {
+        for &row in &raw.truth_rows {
+            let theta_rad = Some(units.angle.to_si(pose.theta[row])).filter(|theta_rad| theta_rad.is_finite());
+            let (x_m, y_m) = (units.length.to_si(pose.x[row]), units.length.to_si(pose.y[row]));
+            truth.push(TruthSample::new(seconds(raw.start, truth_part.log.time[row]), x_m, y_m, theta_rad));
+        }
+    }
+    let start_s = session_start.map(|session| seconds(session, raw.start));
+    let info = RunInfo { id: raw.id.clone(), start_s, ..RunInfo::default() };
+    Ok(Run { info, odometry: Odometry { t_s, wheels, ..Odometry::default() }, truth, ..Run::default() })
+}
+
+fn counts(part: &Part, side: Quantity, raw: &RawRun, column: &[f64]) -> Result<Vec<i64>, DatasetError> {
+    let count = |&row: &usize| {
+        let value = column[row];
+        if value.fract() == 0.0 && value.abs() <= LARGEST_COUNT {
+            return Ok(value as i64);
+        }
+        let column = part.sheet.names[part.roles.of[&side].index].clone();
+        let (file, line) = (part.sheet.file.clone(), part.log.lines[row]);
+        Err(DatasetError::NotACount { file, line, column, found: value.to_string() })
+    };
+    raw.rows.iter().map(count).collect()
+}
+
+/// Means over the intervals that end at each row.
+fn rates(raw: &RawRun, column: &[f64], rates: Rates) -> Vec<f64> {
+    let mean = |index: usize| match (rates, index.checked_sub(1)) {
+        (Rates::Instantaneous, Some(before)) => 0.5 * (column[raw.rows[before]] + column[raw.rows[index]]),
+        _ => column[raw.rows[index]],
+    };
+    (0..raw.rows.len()).map(mean).collect()
+}

@@ -1,0 +1,115 @@
+//! What a user says of the files to be imported; everything that is `None` is found, or asked for.
+
+use kinematics::Wheels;
+
+use super::sheet::Writing;
+use crate::column_names::Quantity;
+use crate::unit::Unit;
+
+/// One entry of `--map`: a quantity and its column, with its unit where that is said.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapEntry {
+    /// What it is.
+    pub quantity: Quantity,
+    /// The column's name, or its number from 1.
+    pub column: String,
+    /// `left=enc_l[deg]`
+    pub unit: Option<Unit>,
+}
+
+impl std::str::FromStr for MapEntry {
+    type Err = String;
+
+    /// Reads `left=enc_l` and `left=enc_l[deg]`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let keys = Quantity::ALL.map(Quantity::key).join(", ");
+        let expected = || format!("expected QUANTITY=COLUMN, with a quantity of {keys}");
+        let (key, column) = text.split_once('=').ok_or_else(expected)?;
+        let quantity = Quantity::of_key(key.trim()).ok_or_else(expected)?;
+        let (column, unit) = match column.trim().strip_suffix(']').and_then(|column| column.rsplit_once('[')) {
+            Some((before, unit)) if Unit::named(unit).is_some() && !before.is_empty() => (before, Unit::named(unit)),
+            _ => (column.trim(), None),
+        };
+        if let Some(unit) = unit.filter(|unit| !quantity.accepts(*unit)) {
+            return Err(format!("{key} is never in {}", unit.name()));
+        }
+        if column.is_empty() { Err(expected()) } else { Ok(Self { quantity, column: column.to_owned(), unit }) }
+    }
+}
+
+/// Whether a row's speed holds over the interval that ends there, or at the instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rates {
+    /// As the dataset holds it.
+    IntervalEnd,
+    /// The mean over an interval is that of its ends (trapezoid).
+    Instantaneous,
+}
+
+impl Rates {
+    /// The name that flags and output use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::IntervalEnd => "interval-end",
+            Self::Instantaneous => "instantaneous",
+        }
+    }
+}
+
+/// What only the robot's owner knows; no log says it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RobotGiven {
+    /// Nominal wheel diameters, metres.
+    pub wheel_diameter_m: Option<Wheels<f64>>,
+    /// Nominal distance between the wheel contacts, metres.
+    pub wheel_separation_m: Option<f64>,
+    /// Counts for one turn of a wheel.
+    pub ticks_per_rev: Option<f64>,
+    /// Width of the counters, where they wrap.
+    pub counter_bits: Option<u8>,
+}
+
+/// All that a user may say.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// How the files are written.
+    pub writing: Writing,
+    /// Columns.
+    pub map: Vec<MapEntry>,
+    /// Unit of all times.
+    pub time_unit: Option<Unit>,
+    /// Unit of all positions.
+    pub length_unit: Option<Unit>,
+    /// Unit of all headings.
+    pub angle_unit: Option<Unit>,
+    /// Unit of both wheels.
+    pub wheel_unit: Option<Unit>,
+    /// What a row's speed holds for.
+    pub rates: Option<Rates>,
+    /// The column that says to which run a row belongs.
+    pub runs_by: Option<String>,
+    /// Runs are cut at standstills and gaps that are longer, seconds.
+    pub cut_s: Option<f64>,
+    /// The robot.
+    pub robot: RobotGiven,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_of_the_map_have_a_quantity_a_column_and_perhaps_a_unit() {
+        let entry = |text: &str| text.parse::<MapEntry>();
+        let left = |column: &str, unit| MapEntry { quantity: Quantity::Left, column: column.to_owned(), unit };
+        assert_eq!(entry("left=enc_l"), Ok(left("enc_l", None)));
+        assert_eq!(entry("left=enc[deg]"), Ok(left("enc", Some(Unit::Deg))));
+        // A name may have brackets of its own.
+        assert_eq!(entry("left=enc[0]"), Ok(left("enc[0]", None)));
+        assert!(entry("x=enc[deg]").is_err_and(|message| message == "x is never in deg"));
+        for wrong in ["left", "left=", "wheel=enc_l", "=x"] {
+            assert!(entry(wrong).is_err_and(|message| message.contains("run, t, left, right")), "{wrong}");
+        }
+    }
+}

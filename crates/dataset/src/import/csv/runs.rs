@@ -1,0 +1,243 @@
+//! Runs from the rows of logs: by a column, a file each, or cut where the robot stands still.
+
+use std::path::Path;
+
+use super::columns::{Log, Roles};
+use super::options::Options;
+use super::sheet::Sheet;
+use super::times::seconds;
+use crate::column_names::Quantity;
+use crate::error::DatasetError;
+
+/// A file with what was found in it.
+pub(super) struct Part {
+    pub(super) sheet: Sheet,
+    pub(super) roles: Roles,
+    pub(super) log: Log,
+}
+
+/// Rows of one run, in the units of the files but for the time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RawRun {
+    pub(super) id: String,
+    /// Which part has its odometry, and which rows of it.
+    pub(super) part: usize,
+    pub(super) rows: Vec<usize>,
+    /// Which part has its truth, and which rows of it.
+    pub(super) truth_part: usize,
+    pub(super) truth_rows: Vec<usize>,
+    /// The run's start, picoseconds.
+    pub(super) start: i128,
+}
+
+/// The runs, and what makes them.
+pub(super) fn runs(parts: &[Part], options: &Options) -> Result<(Vec<RawRun>, String), DatasetError> {
+    let with_wheels: Vec<usize> = (0..parts.len()).filter(|&part| parts[part].roles.has_wheels()).collect();
+    let mut runs = Vec::new();
+    for (number, &part) in with_wheels.iter().enumerate() {
+        let base = if with_wheels.len() > 1 { stem(&parts[part].sheet.file) } else { "run-01".to_owned() };
+        for mut run in groups(&parts[part], part, &base)? {
+            find_truth(parts, &with_wheels, number, &mut run);
+            runs.push(run);
+        }
+    }
+    // A truth that is one file for several runs is theirs by its times.
+    let many = runs.len() > 1;
+    for run in &mut runs {
+        if let (Some(&first), Some(&last)) = (run.rows.first(), run.rows.last()) {
+            let (log, truth) = (&parts[run.part].log, &parts[run.truth_part]);
+            let (from, to) = (log.time[first], log.time[last]);
+            let shared = many
+                && run.truth_part != run.part
+                && truth.log.run.is_empty()
+                && count_of_truths(parts, &with_wheels) == 1;
+            if shared {
+                run.truth_rows.retain(|&row| (from..=to).contains(&truth.log.time[row]));
+            }
+            refuse_other_clock(parts, run, from, to)?;
+        }
+    }
+    let mut ordered_by = describe(parts, &with_wheels);
+    if let Some(cut_s) = options.cut_s {
+        runs = runs.into_iter().flat_map(|run| cut(parts, run, cut_s)).collect();
+        ordered_by = format!("{ordered_by}, cut at standstills and gaps of more than {cut_s} s");
+        if runs.is_empty() {
+            let message = format!("--cut {cut_s}: no run is left that moves; say a longer time");
+            return Err(DatasetError::Foreign { file: parts[with_wheels[0]].sheet.file.clone(), line: 1, message });
+        }
+    }
+    in_time_order(parts, &runs)?;
+    Ok((runs, ordered_by))
+}
+
+fn count_of_truths(parts: &[Part], with_wheels: &[usize]) -> usize {
+    (0..parts.len()).filter(|part| !with_wheels.contains(part)).count()
+}
+
+fn describe(parts: &[Part], with_wheels: &[usize]) -> String {
+    let by_column = with_wheels.iter().find_map(|&part| {
+        let chosen = parts[part].roles.of.get(&Quantity::Run)?;
+        Some(parts[part].sheet.names[chosen.index].clone())
+    });
+    match by_column {
+        Some(column) => format!("column {column}"),
+        None if with_wheels.len() > 1 => "a run a file".to_owned(),
+        None => "one run".to_owned(),
+    }
+}
+
+fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The rows with wheels of one part, by run.
+fn groups(part: &Part, number: usize, base: &str) -> Result<Vec<RawRun>, DatasetError> {
+    let log = &part.log;
+    let names = if log.run.is_empty() { vec![base.to_owned()] } else { log.run_names.clone() };
+    let empty = |id: String| RawRun { id, part: number, ..RawRun::default() };
+    let mut runs: Vec<RawRun> = names.into_iter().map(empty).collect();
+    for row in (0..log.time.len()).filter(|&row| log.has_wheels_at(row)) {
+        runs[log.run_of(row) as usize].rows.push(row);
+    }
+    for run in &mut runs {
+        let Some(&first) = run.rows.first() else {
+            let run = run.id.clone();
+            return Err(DatasetError::RunWithoutRows { file: part.sheet.file.clone(), run });
+        };
+        run.start = log.time[first];
+    }
+    Ok(runs)
+}
+
+/// The rows that saw a run: of its own file, else of a file of its own run's name or place.
+fn find_truth(parts: &[Part], with_wheels: &[usize], number: usize, run: &mut RawRun) {
+    let own = &parts[run.part];
+    if own.roles.has_pose() {
+        run.truth_part = run.part;
+        let of_run = own.log.run_names.iter().position(|name| *name == run.id).unwrap_or(0) as u32;
+        run.truth_rows = pose_rows(own).filter(|&row| own.log.run_of(row) == of_run).collect();
+        return;
+    }
+    let truths: Vec<usize> = (0..parts.len()).filter(|part| !with_wheels.contains(part)).collect();
+    // As many files of either kind belong together in the order in which they were given.
+    let paired = truths.get(number).filter(|_| truths.len() == with_wheels.len()).or(truths.first());
+    let Some(&truth) = paired else { return };
+    let log = &parts[truth].log;
+    run.truth_part = truth;
+    let of_run = log.run_names.iter().position(|name| *name == run.id);
+    run.truth_rows = match (log.run.is_empty(), of_run) {
+        (true, _) => pose_rows(&parts[truth]).collect(),
+        (false, Some(of_run)) => pose_rows(&parts[truth]).filter(|&row| log.run_of(row) == of_run as u32).collect(),
+        (false, None) => Vec::new(),
+    };
+}
+
+fn pose_rows(part: &Part) -> impl Iterator<Item = usize> {
+    (0..part.log.time.len()).filter(|&row| part.log.has_pose_at(row))
+}
+
+/// Two files whose times do not meet have two clocks.
+fn refuse_other_clock(parts: &[Part], run: &RawRun, from: i128, to: i128) -> Result<(), DatasetError> {
+    let truth = &parts[run.truth_part];
+    let file = truth.sheet.file.clone();
+    let line = truth.sheet.first_row;
+    let ends = run.truth_rows.first().zip(run.truth_rows.last());
+    let Some((&first, &last)) = ends else {
+        let message = format!("no row has a pose of run \"{}\"; every run needs a truth", run.id);
+        return Err(DatasetError::Foreign { file, line, message });
+    };
+    let (first, last) = (truth.log.time[first], truth.log.time[last]);
+    if first <= to && last >= from {
+        return Ok(());
+    }
+    let of = |from, to| format!("{:.3} to {:.3} s", seconds(0, from), seconds(0, to));
+    let message = format!(
+        "run \"{}\": the poses are of {}, the odometry is of {}: two clocks; bring both to one",
+        run.id,
+        of(first, last),
+        of(from, to)
+    );
+    Err(DatasetError::Foreign { file, line, message })
+}
+
+/// Each run's rows must follow each other in time.
+fn in_time_order(parts: &[Part], runs: &[RawRun]) -> Result<(), DatasetError> {
+    for run in runs {
+        for (part, rows) in [(run.part, &run.rows), (run.truth_part, &run.truth_rows)] {
+            let Part { sheet, roles, log } = &parts[part];
+            for pair in rows.windows(2) {
+                let (before, after) = (log.time[pair[0]], log.time[pair[1]]);
+                if after > before {
+                    continue;
+                }
+                let (file, line) = (sheet.file.clone(), log.lines[pair[1]]);
+                let column = sheet.names[roles.of[&Quantity::Time].index].clone();
+                let (t_s, previous_s) = (seconds(run.start, after), seconds(run.start, before));
+                if after == before {
+                    return Err(DatasetError::DuplicateInstant { file, line, column, t_s });
+                }
+                if log.run.is_empty() {
+                    let message = format!(
+                        "column {column}: time runs backwards, {t_s} s after {previous_s} s; if a run begins here, say --runs-by COLUMN, or --cut SECONDS to cut the file here and at standstills"
+                    );
+                    return Err(DatasetError::Foreign { file, line, message });
+                }
+                return Err(DatasetError::TimeRunsBackwards { file, line, column, t_s, previous_s });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A run cut where time restarts or leaps, and in the middle of long standstills; parts that do not move or
+/// that nothing saw are left out.
+fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
+    let (part, truth) = (&parts[run.part], &parts[run.truth_part]);
+    let Some([left, right]) = &part.log.wheels else { return vec![run] };
+    let rates = part.roles.wheels().is_some_and(|[of, _]| of == Quantity::Speed || part.roles.of[&of].is_rate);
+    let stands = |before: usize, row: usize| {
+        if rates {
+            left[row] == 0.0 && right[row] == 0.0
+        } else {
+            left[row] == left[before] && right[row] == right[before]
+        }
+    };
+    let time = |index: usize| part.log.time[run.rows[index]];
+    // Ends of pieces: the index of the first row that belongs to the next.
+    let (mut ends, mut stood_since) = (Vec::new(), 0);
+    for index in 1..run.rows.len() {
+        let gap_s = seconds(time(index - 1), time(index));
+        if gap_s < 0.0 || gap_s > cut_s {
+            ends.push(index);
+            stood_since = index;
+        } else if !stands(run.rows[index - 1], run.rows[index]) {
+            if seconds(time(stood_since), time(index - 1)) > cut_s {
+                ends.push(usize::midpoint(stood_since, index - 1));
+            }
+            stood_since = index;
+        }
+    }
+    ends.push(run.rows.len());
+    let mut pieces: Vec<RawRun> = Vec::new();
+    let mut start = 0;
+    for end in ends {
+        let rows: Vec<usize> = run.rows[start..end].to_vec();
+        start = end;
+        let moves = rows.windows(2).any(|pair| !stands(pair[0], pair[1]));
+        let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { continue };
+        let (from, to) = (part.log.time[first], part.log.time[last]);
+        // In one file time may restart: its poses stand beside their odometry.
+        let is_own = run.truth_part == run.part;
+        let belongs =
+            |row: usize| (!is_own || (first..=last).contains(&row)) && (from..=to).contains(&truth.log.time[row]);
+        let truth_rows: Vec<usize> = run.truth_rows.iter().copied().filter(|&row| belongs(row)).collect();
+        if moves && truth_rows.len() >= 2 {
+            pieces.push(RawRun { start: from, rows, truth_rows, ..run.clone() });
+        }
+    }
+    for (number, piece) in (1..).zip(&mut pieces) {
+        let base = if run.id == "run-01" { "run".to_owned() } else { run.id.clone() };
+        piece.id = format!("{base}-{number:02}");
+    }
+    pieces
+}
