@@ -13,6 +13,7 @@ use dataset::{Blocks, NominalRobot, Session, Warning};
 use estimation::Column;
 use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
+use crate::check;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
 
@@ -38,6 +39,9 @@ pub(crate) struct Arguments {
     /// Write the calibration to a file that `yair evaluate --calibration` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Calibrate although `yair check` finds an error, or the result cannot be the stated robot.
+    #[arg(long)]
+    force: bool,
 }
 
 const ALL: &str = "all";
@@ -57,6 +61,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let datasets =
         if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    let found = if arguments.force { check::before(&datasets, terminal) } else { check::refuse(&datasets, terminal)? };
     refuse_wrapped_counters(&sessions)?;
     if arguments.online {
         return follow::run(&sessions, terminal);

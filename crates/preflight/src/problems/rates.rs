@@ -1,0 +1,38 @@
+//! Rates of the instant where those of an interval are expected.
+
+use dataset::Dataset;
+
+use crate::alignment::{Clock, Comparison};
+use crate::problem::{Kind, Problem, Severity, probability};
+use crate::run_log::RunLog;
+use crate::session_check::SessionCheck;
+use crate::settings::{MAX_WINDOWS, MIN_GAIN};
+use crate::windows::windows;
+
+pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
+    let Some(matched) = check.matched.as_ref().filter(|_| check.runs.iter().all(|run| run.has_rates)) else { return };
+    // A clock that is off is the better reason.
+    if matched.clock != Clock::default() {
+        return;
+    }
+    let session = dataset.session();
+    let of_instant: Vec<RunLog> = check
+        .runs
+        .iter()
+        .filter_map(|run| {
+            let view = session.runs.iter().find(|view| view.info().id == run.id)?;
+            run.with_instant_rates(view, &check.robot)
+        })
+        .collect();
+    if of_instant.len() != check.runs.len() {
+        return;
+    }
+    let (windows, measured) = windows(&check.runs, matched.reading, MAX_WINDOWS);
+    let comparison = |runs| Comparison { windows: &windows, measured, runs, m_per_rad: check.m_per_rad() };
+    let (interval, instant) = (comparison(&check.runs), comparison(&of_instant));
+    let (Some(now), Some(then)) = (interval.at(matched.clock), instant.at(matched.clock)) else { return };
+    let gain = then.gain_over(&now);
+    if gain > MIN_GAIN {
+        check.problems.push(Problem::new(&Kind::InstantRates, Severity::Warning, None, probability(gain)));
+    }
+}
