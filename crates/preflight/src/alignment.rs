@@ -93,11 +93,11 @@ pub(crate) fn explain(pairs: &[Paired], measured: Measured, m_per_rad: Wheels<f6
             (left, whole)
         }
     };
-    // Below a micrometre and a microradian nothing is compared.
-    let log = |left: f64| (left + 1e-6).ln();
-    let cost = log(displacement.0) + turn.map_or(0.0, |turn| log(turn.0));
-    let share = |(left, whole): (f64, f64)| if whole > 0.0 { left / whole } else { 1.0 };
+    // Of all, so that no reading gains by making what is measured smaller; below a micrometre and a
+    // microradian nothing is compared.
+    let share = |(left, whole): (f64, f64)| if whole > 0.0 { (left + 1e-6) / (whole + 1e-6) } else { 1.0 };
     let unexplained = [turn.map_or(1.0, share), share(displacement)];
+    let cost = unexplained.iter().map(|share| share.ln()).sum();
     Some(Explained { cost, windows: pairs.len() as f64, unexplained })
 }
 

@@ -80,6 +80,11 @@ impl SessionCheck {
         Some(Matched { pairs, measured, reading, clock, explained, geometry, one_direction })
     }
 
+    /// Whether the instrument sees positions alone.
+    pub(crate) fn measures_positions(&self) -> bool {
+        windows(&self.runs, Reading::AS_IS, MAX_WINDOWS).1 == Measured::Positions
+    }
+
     /// All turning of both wheels, radians.
     pub(crate) fn turning(&self) -> Wheels<f64> {
         self.runs.iter().map(RunLog::turning).fold(Wheels::both(0.0), |sum, run| sum.zip_with(run, |a, b| a + b))

@@ -35,20 +35,42 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
     };
     let best = best?;
     let found = best.explained;
-    if found.unexplained.iter().all(|share| *share > UNRELATED) {
+    let positions = check.measures_positions();
+    if !positions && found.unexplained.iter().all(|share| *share > UNRELATED) {
         if found.windows > 4.0 * MIN_WINDOWS as f64 {
             let unexplained = found.unexplained[1].min(1.0);
             check.problems.push(Problem::new(&Kind::TruthUnrelated { unexplained }, Severity::Error, None, 0.9));
         }
         return None;
     }
-    let mut clock = say_offset(check, reading, as_is, best);
-    if let Some((rated, _)) = say_rate(check, reading, clock) {
-        clock = rated;
-    }
+    let clock = said_clock(check, reading, as_is, best);
     let matched = check.matched_at(reading, clock)?;
     say_reading(check, &matched, as_is);
     Some(matched)
+}
+
+/// Says a rate and an offset that matter; the clock with them.
+fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
+    let rated = rate(check, reading, best.clock);
+    if let Some((clock, gain)) = rated {
+        let severity = if clock.rate.abs() > MAX_CLOCK_RATE { Severity::Error } else { Severity::Warning };
+        check.problems.push(Problem::new(&Kind::ClockRate { rate: clock.rate }, severity, None, probability(gain)));
+        // What is left at the start of the records.
+        if clock.offset_s.abs() < 2.0 * MIN_CLOCK_OFFSET_S {
+            return clock;
+        }
+    }
+    let clock = rated.map_or(best.clock, |(clock, _)| clock);
+    match offset_gain(check, reading, as_is, clock, best.sigma_s) {
+        Some(gain) => {
+            let offset_s = clock.offset_s / (1.0 + clock.rate);
+            let severity = if offset_s.abs() > MAX_FITTED_OFFSET_S { Severity::Error } else { Severity::Warning };
+            let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
+            check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
+            clock
+        }
+        None => rated.map_or(Clock::default(), |(clock, _)| clock),
+    }
 }
 
 /// The reading that the wheels explain decisively better than the sound one.
@@ -84,44 +106,33 @@ fn best_clock(check: &SessionCheck, reading: Reading, now: Option<Explained>) ->
     }
 }
 
-/// Says an offset that matters; the clock with it.
-fn say_offset(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
-    let offset_s = best.clock.offset_s;
-    if offset_s.abs() < MIN_CLOCK_OFFSET_S || offset_s.abs() < 4.0 * best.sigma_s {
-        return Clock::default();
-    }
-    let now = if reading == Reading::AS_IS { as_is } else { check.explained(reading, Clock::default()) };
-    let with = check.explained(reading, best.clock);
-    let gain = match (now, with) {
-        (Some(now), Some(with)) => with.gain_over(&now),
-        (None, Some(_)) => f64::INFINITY,
-        (_, None) => 0.0,
-    };
-    let ratio = now.zip(with).map_or(0.0, |(now, with)| with.ratio_to(&now));
-    if gain < MIN_GAIN || ratio > 0.5 * (1.0 + DECISIVE_RATIO) {
-        return Clock::default();
-    }
-    let severity = if offset_s.abs() > MAX_FITTED_OFFSET_S { Severity::Error } else { Severity::Warning };
-    let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
-    check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
-    best.clock
-}
-
-/// Says a rate that matters; the clock with it.
-fn say_rate(check: &mut SessionCheck, reading: Reading, clock: Clock) -> Option<(Clock, Explained)> {
-    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 2);
-    let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
-    let now = comparison.at(clock)?;
-    // Without a rate, the best offset may be anything within a window.
-    let still = comparison.best_offset(false).map_or(now, |best| if best.explained.cost < now.cost { best.explained } else { now });
-    let (rated, found) = comparison.best_rate(clock)?;
-    if rated.rate.abs() < MIN_CLOCK_RATE || found.gain_over(&still) < MIN_GAIN || found.ratio_to(&still) > 0.5 * (1.0 + DECISIVE_RATIO) {
+/// What an offset gains, if it matters.
+fn offset_gain(
+    check: &SessionCheck,
+    reading: Reading,
+    as_is: Option<Explained>,
+    clock: Clock,
+    sigma_s: f64,
+) -> Option<f64> {
+    if clock.offset_s.abs() < MIN_CLOCK_OFFSET_S.max(4.0 * sigma_s) {
         return None;
     }
-    let severity = if rated.rate.abs() > MAX_CLOCK_RATE { Severity::Error } else { Severity::Warning };
-    let kind = Kind::ClockRate { rate: rated.rate };
-    check.problems.push(Problem::new(&kind, severity, None, probability(found.gain_over(&still))));
-    Some((rated, found))
+    let now = if reading == Reading::AS_IS { as_is } else { check.explained(reading, Clock::default()) };
+    let with = check.explained(reading, clock)?;
+    let Some(now) = now else { return Some(f64::INFINITY) };
+    let gain = with.gain_over(&now);
+    (gain > MIN_GAIN && with.ratio_to(&now) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some(gain)
+}
+
+/// A rate that matters, with what it gains.
+fn rate(check: &SessionCheck, reading: Reading, near: Clock) -> Option<(Clock, f64)> {
+    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 2);
+    let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
+    let still = comparison.at(near)?;
+    let (rated, found) = comparison.best_rate(near)?;
+    let gain = found.gain_over(&still);
+    let matters = rated.rate.abs() > MIN_CLOCK_RATE && gain > MIN_GAIN;
+    (matters && found.ratio_to(&still) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some((rated, gain))
 }
 
 /// Says how the instrument's records are to be read.

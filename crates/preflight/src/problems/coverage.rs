@@ -12,6 +12,7 @@ use crate::problem::{Kind, Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{DETERMINED_SIGMA, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::windows::Measured;
 
 const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
 
@@ -95,7 +96,7 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
     };
     let m_per_rad = session.m_per_rad();
     let separation_m = session.robot.wheel_separation_m;
-    if let Some(matched) = &session.matched {
+    if let Some(matched) = session.matched.as_ref().filter(|matched| matched.measured == Measured::Poses) {
         // Mean absolute residuals of displacement and turn, for noise of independent windows ten apart.
         let (mut left, mut whole_m, mut whole_rad) = ([0.0, 0.0], 0.0, 0.0);
         for pair in &matched.pairs {
@@ -127,38 +128,52 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
     }
 }
 
-/// A run's last pose, position or distance, seen from its first.
+/// Instants of a run at which its position or pose is compared, seen from its first.
+const INSTANTS: usize = 8;
+
+/// What a run's poses or positions tell, seen from the first.
 fn add_ends(run: &RunLog, geometry: &DriveGeometry, row: &mut impl FnMut([f64; 3], f64)) {
     let Some((first, last)) = run.truth.first().zip(run.truth.last()) else { return };
     if last.t_s <= first.t_s {
         return;
     }
-    let end = |factors: [f64; 3]| {
+    let count = INSTANTS.min(run.truth.len() - 1);
+    let instants_s: Vec<f64> =
+        (1..=count).map(|k| first.t_s + (last.t_s - first.t_s) * k as f64 / count as f64).collect();
+    let path = |factors: [f64; 3]| {
         let m_per_rad = geometry.m_per_rad();
-        let m_per_rad = Wheels { left: factors[0] * m_per_rad.left, right: factors[1] * m_per_rad.right };
-        let reckoner = kinematics::Odometry {
-            m_per_count: m_per_rad,
-            wheel_separation_m: factors[2] * geometry.wheel_separation_m(),
-            rule: Rule::Midpoint,
-        };
+        let m_per_count = Wheels { left: factors[0] * m_per_rad.left, right: factors[1] * m_per_rad.right };
+        let wheel_separation_m = factors[2] * geometry.wheel_separation_m();
+        let reckoner = kinematics::Odometry { m_per_count, wheel_separation_m, rule: Rule::Midpoint };
         let columns = Wheels { left: &run.wheels.left[..], right: &run.wheels.right[..] };
-        let mut at = Pose::IDENTITY;
-        reckoner.for_each_pose(Pose::IDENTITY, columns, |pose| at = pose);
-        at
+        let mut poses = vec![Pose::IDENTITY; count];
+        let mut times = run.t_s.iter();
+        reckoner.for_each_pose(Pose::IDENTITY, columns, |pose| {
+            let Some(t_s) = times.next() else { return };
+            for (at, _) in poses.iter_mut().zip(&instants_s).filter(|(_, instant_s)| t_s <= *instant_s) {
+                *at = pose;
+            }
+        });
+        poses
     };
-    let base = end([1.0; 3]);
+    let base = path([1.0; 3]);
     let step = 1e-4;
-    let gradients = [0, 1, 2].map(|parameter| {
+    let moved = [0, 1, 2].map(|parameter| {
         let mut factors = [1.0; 3];
         factors[parameter] += step;
-        let moved = end(factors);
-        [moved.x_m - base.x_m, moved.y_m - base.y_m, moved.theta_rad - base.theta_rad].map(|by| by / step)
+        path(factors)
     });
-    let of = |component: usize| [gradients[0][component], gradients[1][component], gradients[2][component]];
-    // Instruments read an end to some millimetres, and wheels err by some millimetres on the way.
-    row(of(0), 5e-3);
-    row(of(1), 5e-3);
-    if first.theta_rad().is_some() && last.theta_rad().is_some() {
-        row(of(2), 1e-2);
+    let has_headings = first.theta_rad().is_some() && last.theta_rad().is_some();
+    for (at, base) in base.iter().enumerate() {
+        let of = |value: fn(&Pose) -> f64| {
+            let slope = |parameter: usize| (value(&moved[parameter][at]) - value(base)) / step;
+            [slope(0), slope(1), slope(2)]
+        };
+        // Instruments read an end to some millimetres, and wheels err by some millimetres on the way.
+        row(of(|pose| pose.x_m), 5e-3);
+        row(of(|pose| pose.y_m), 5e-3);
+        if has_headings {
+            row(of(|pose| pose.theta_rad), 1e-2);
+        }
     }
 }
