@@ -30,7 +30,7 @@ pub use estimate::{
 pub use methods::{METHODS, method};
 pub use report::{
     CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,
-    ReportedValue,
+    ReportedValue, TrainedOn, nominal_value,
 };
 pub use robust::{MedianMad, Summary};
 pub use trajectory::{AugmentedCalibration, CorrectedRun, corrected_run};

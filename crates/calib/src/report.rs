@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use dataset::NominalRobot;
+use dataset::{NominalRobot, Run, Session};
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter, is_implausible};
-use crate::settings::MAX_FILE_BYTES;
+use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO, MAX_FILE_BYTES};
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -41,8 +41,40 @@ pub struct CalibrationReport {
     /// The dataset's name, or a list of them.
     #[serde(default)]
     pub dataset: Names,
+    /// The runs that the values rest on, for whoever evaluates them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trained_on: Vec<TrainedOn>,
     /// What each method found.
     pub methods: Vec<MethodReport>,
+}
+
+/// A dataset that a calibration was made from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TrainedOn {
+    /// Its name.
+    pub dataset: String,
+    /// The fingerprint of each run, by id.
+    pub runs: BTreeMap<String, String>,
+}
+
+impl TrainedOn {
+    /// All runs of a session.
+    #[must_use]
+    pub fn of(session: &Session<'_>) -> Self {
+        let run = |run: &dataset::RunView<'_>| (run.info().id.clone(), fingerprint(run.run()));
+        Self { dataset: session.name.to_owned(), runs: session.runs.iter().map(run).collect() }
+    }
+
+    /// Whether a run is one of them.
+    #[must_use]
+    pub fn has(&self, run: &Run) -> bool {
+        let fingerprint = fingerprint(run);
+        self.runs.values().any(|known| *known == fingerprint)
+    }
+}
+
+fn fingerprint(run: &Run) -> String {
+    format!("{:016x}", run.fingerprint())
 }
 
 /// One name or several.
@@ -112,8 +144,11 @@ pub struct MethodReport {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "ValueOrNumber")]
 pub struct ReportedValue {
-    /// In SI units.
-    pub value: f64,
+    /// In SI units; `None` where the data do not determine it, with the reason under `not_observable`.
+    pub value: Option<f64>,
+    /// The value over the stated one, of what is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio_to_nominal: Option<f64>,
     /// One standard deviation.
     pub sigma: Option<f64>,
     /// Why there is no sigma.
@@ -128,15 +163,25 @@ pub struct ReportedValue {
 #[serde(untagged)]
 enum ValueOrNumber {
     Number(f64),
-    Value { value: f64, sigma: Option<f64> },
+    Value { value: f64, sigma: Option<f64>, ratio_to_nominal: Option<f64> },
 }
 
 impl From<ValueOrNumber> for ReportedValue {
     fn from(from: ValueOrNumber) -> Self {
         match from {
-            ValueOrNumber::Number(value) => Self { value, sigma: None, sigma_why_null: None, interval_95: None },
-            ValueOrNumber::Value { value, sigma } => Self { value, sigma, sigma_why_null: None, interval_95: None },
+            ValueOrNumber::Number(value) => Self::of(value, None),
+            ValueOrNumber::Value { value, sigma, ratio_to_nominal } => {
+                Self { ratio_to_nominal, ..Self::of(value, sigma) }
+            }
         }
+    }
+}
+
+impl ReportedValue {
+    /// A value with its standard deviation, and nothing else known of it.
+    #[must_use]
+    pub const fn of(value: f64, sigma: Option<f64>) -> Self {
+        Self { value: Some(value), ratio_to_nominal: None, sigma, sigma_why_null: None, interval_95: None }
     }
 }
 
@@ -179,10 +224,9 @@ impl MethodReport {
             Err(error) => return Self { error: Some(error.to_string()), ..empty },
         };
         let value = |estimate: crate::Estimate| ReportedValue {
-            value: estimate.value,
-            sigma: estimate.sigma,
+            ratio_to_nominal: nominal_value(nominal, estimate.parameter.key()).map(|nominal| estimate.value / nominal),
             sigma_why_null: estimate.sigma.is_none().then(|| "too few runs to show a scatter".to_owned()),
-            interval_95: None,
+            ..ReportedValue::of(estimate.value, estimate.sigma)
         };
         Self {
             parameters: calibration
@@ -210,6 +254,66 @@ impl MethodReport {
             ..empty
         }
     }
+
+    /// Takes the values back that the data do not determine: each stays at, or depends on, what is stated.
+    /// `of_scale` says whether a common scale that is not observable leaves no length determined; methods
+    /// that keep the stated mean wheel by design say no.
+    pub fn withhold_undetermined(&mut self, of_scale: bool) {
+        let mut more = Vec::new();
+        for blind in &self.not_observable {
+            let is_scale = blind.parameter == Parameter::CommonScale.key();
+            let keys: &[Parameter] = match () {
+                () if is_scale && of_scale => &Parameter::ESTIMATED,
+                () if blind.parameter == Parameter::LeftWheelDiameter.key() => {
+                    &[Parameter::LeftWheelDiameter, Parameter::LeftPerTick]
+                }
+                () if blind.parameter == Parameter::RightWheelDiameter.key() => {
+                    &[Parameter::RightWheelDiameter, Parameter::RightPerTick]
+                }
+                () if blind.parameter == Parameter::WheelSeparation.key() => &[Parameter::WheelSeparation],
+                () => &[],
+            };
+            for parameter in keys {
+                let Some(value) = self.parameters.get_mut(parameter.key()) else { continue };
+                let why = "the data do not determine the value".to_owned();
+                *value = ReportedValue {
+                    value: None,
+                    ratio_to_nominal: None,
+                    sigma: None,
+                    sigma_why_null: Some(why),
+                    interval_95: None,
+                };
+                if parameter.key() != blind.parameter {
+                    let why = blind.why.clone();
+                    more.push(ReportedBlindness { parameter: parameter.key().to_owned(), why });
+                }
+            }
+        }
+        more.retain(|blind| !self.not_observable.contains(blind));
+        self.not_observable.extend(more);
+    }
+
+    /// Whether a geometry parameter has a value.
+    #[must_use]
+    pub fn determines_anything(&self) -> bool {
+        let of = |parameter: &Parameter| self.parameters.get(parameter.key()).is_some_and(|value| value.value.is_some());
+        Parameter::ESTIMATED.iter().any(of)
+    }
+}
+
+/// What a robot states of a parameter.
+#[must_use]
+pub fn nominal_value(robot: &NominalRobot, key: &str) -> Option<f64> {
+    let per_tick = |diameter_m: f64| Some(std::f64::consts::PI * diameter_m / robot.ticks_per_rev?);
+    let is = |parameter: Parameter| key == parameter.key();
+    match () {
+        () if is(Parameter::LeftWheelDiameter) => Some(robot.left_wheel_diameter_m),
+        () if is(Parameter::RightWheelDiameter) => Some(robot.right_wheel_diameter_m),
+        () if is(Parameter::WheelSeparation) => Some(robot.wheel_separation_m),
+        () if is(Parameter::LeftPerTick) => per_tick(robot.left_wheel_diameter_m),
+        () if is(Parameter::RightPerTick) => per_tick(robot.right_wheel_diameter_m),
+        () => None,
+    }
 }
 
 impl CalibrationReport {
@@ -218,7 +322,11 @@ impl CalibrationReport {
     /// # Errors
     /// [`ReportError::NotACalibration`] when a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, ReportError> {
-        toml::to_string(self).map_err(|error| ReportError::NotACalibration {
+        let mut known = self.clone();
+        for method in &mut known.methods {
+            method.parameters.retain(|_, value| value.value.is_some());
+        }
+        toml::to_string(&known).map_err(|error| ReportError::NotACalibration {
             place: "calibration".to_owned(),
             message: error.to_string(),
         })
@@ -248,12 +356,13 @@ impl CalibrationReport {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
                 let length =
                     !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
-                !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
+                let value = value.value.unwrap_or(f64::NAN);
+                !known.contains(&key.as_str()) || !value.is_finite() || (length && value <= 0.0)
             }) {
                 let message = format!(
                     "[methods.parameters] of {}: {key} = {} is no known value; lengths are positive; known: {}",
                     method.method,
-                    value.value,
+                    value.value.unwrap_or(f64::NAN),
                     known.join(", ")
                 );
                 return Err(ReportError::NotACalibration { place, message });
@@ -270,7 +379,7 @@ impl CalibrationReport {
             .filter(|method| method.error.is_none())
             .map(|method| NamedCalibration {
                 name: method.method.clone(),
-                values: method.parameters.iter().map(|(key, value)| (key.clone(), value.value)).collect(),
+                values: method.parameters.iter().filter_map(|(key, value)| Some((key.clone(), value.value?))).collect(),
             })
             .collect()
     }
@@ -331,6 +440,27 @@ impl NamedCalibration {
         Some(format!("{} is {found_m:.4} where the dataset states {nominal_m:.4}", parameter.key()))
     }
 
+    /// The value that is far from a robot's nominal one, though it may be a correction of it, for people.
+    #[must_use]
+    pub fn other_robot(&self, robot: &NominalRobot) -> Option<String> {
+        let found = self.geometry(robot, robot.geometry().ok()?)?;
+        let lengths = [
+            (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
+            (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
+            (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
+        ];
+        let off = |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| {
+            let most = if parameter == Parameter::WheelSeparation {
+                MAX_EVALUATED_SEPARATION_RATIO
+            } else {
+                MAX_EVALUATED_DIAMETER_RATIO
+            };
+            (found_m / nominal_m).ln().abs() > most.ln()
+        };
+        let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
+        Some(format!("{} is {:.2} mm where the dataset states {:.2} mm", parameter.key(), 1e3 * found_m, 1e3 * nominal_m))
+    }
+
     /// Latency of the outside instrument's time stamps, seconds; 0 unless the calibration has it.
     #[must_use]
     pub fn latency_s(&self) -> f64 {
@@ -351,8 +481,12 @@ mod tests {
     use super::*;
 
     fn report() -> CalibrationReport {
-        let value = |value, sigma| ReportedValue { value, sigma, sigma_why_null: None, interval_95: None };
+        let value = ReportedValue::of;
         CalibrationReport {
+            trained_on: vec![TrainedOn {
+                dataset: "a".to_owned(),
+                runs: BTreeMap::from([("run-01".to_owned(), "00ff".to_owned())]),
+            }],
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
                 group_instruments: Vec::new(),

@@ -5,8 +5,10 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
+mod corrections;
 mod counter;
 mod error;
+mod fingerprint;
 pub mod import;
 mod imported;
 mod prefetch;

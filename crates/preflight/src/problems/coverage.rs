@@ -118,13 +118,15 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
                 *turn += separation_m * turn_rad.abs();
             }
         }
-        return;
     }
+    let has_windows = session.matched.as_ref().is_some_and(|matched| matched.measured == Measured::Poses);
     let Ok(geometry) = session.robot.geometry() else { return };
     for run in &session.runs {
         add_ends(run, &geometry, &mut row);
-        let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
-        *distance += 0.5 * (turned.left + turned.right);
+        if !has_windows {
+            let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
+            *distance += 0.5 * (turned.left + turned.right);
+        }
     }
 }
 
