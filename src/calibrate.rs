@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use calib::methods::joint::{Joint, LargeCalibrationError};
-use calib::{CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names, TrainedOn, nominal_value};
+use calib::{
+    CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names, TrainedOn, nominal_value,
+};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::{Blocks, NominalRobot, Session, Warning};
@@ -274,16 +276,16 @@ fn why_no_result(method: &MethodReport) -> Option<String> {
         let why = rejected.map_or_else(String::new, |rejected| format!(": run {}: {}", rejected.run, rejected.why));
         return Some(format!("{name}: no run was used{why}; yair check says what is wrong with them; {force}"));
     }
+    if !method.determines_anything() {
+        let why = method.not_observable.first().map_or("", |blind| blind.why.as_str());
+        return Some(format!("{name}: these runs determine no parameter by itself: {why}; {force}"));
+    }
     if !method.converged {
         let why = "the fit did not converge, so that its numbers are no result; yair check says what is wrong";
         return Some(format!("{name}: {why}; {force}"));
     }
     if let Some(warning) = method.warnings.first() {
         return Some(format!("{name}: the result cannot be the stated robot: {warning}; {force}"));
-    }
-    if !method.determines_anything() {
-        let why = method.not_observable.first().map_or("", |blind| blind.why.as_str());
-        return Some(format!("{name}: these runs determine no parameter by itself: {why}; {force}"));
     }
     None
 }

@@ -28,7 +28,8 @@ impl GivenCalibration {
     /// The calibrations of a file.
     pub(crate) fn read(path: &Path) -> Result<Vec<Self>, Failure> {
         let place = path.display().to_string();
-        let of = |given, trained_on: &[TrainedOn]| Self { place: place.clone(), given, trained_on: trained_on.to_vec() };
+        let of =
+            |given, trained_on: &[TrainedOn]| Self { place: place.clone(), given, trained_on: trained_on.to_vec() };
         if is_scenario(path) {
             let scenario = Scenario::read(path)?;
             let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, Options};
 use clap::Args;
 
-use crate::diagnosis_page::Page;
 use crate::check;
+use crate::diagnosis_page::Page;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 

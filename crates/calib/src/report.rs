@@ -296,7 +296,8 @@ impl MethodReport {
     /// Whether a geometry parameter has a value.
     #[must_use]
     pub fn determines_anything(&self) -> bool {
-        let of = |parameter: &Parameter| self.parameters.get(parameter.key()).is_some_and(|value| value.value.is_some());
+        let of =
+            |parameter: &Parameter| self.parameters.get(parameter.key()).is_some_and(|value| value.value.is_some());
         Parameter::ESTIMATED.iter().any(of)
     }
 }
@@ -458,7 +459,12 @@ impl NamedCalibration {
             (found_m / nominal_m).ln().abs() > most.ln()
         };
         let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
-        Some(format!("{} is {:.2} mm where the dataset states {:.2} mm", parameter.key(), 1e3 * found_m, 1e3 * nominal_m))
+        Some(format!(
+            "{} is {:.2} mm where the dataset states {:.2} mm",
+            parameter.key(),
+            1e3 * found_m,
+            1e3 * nominal_m
+        ))
     }
 
     /// Latency of the outside instrument's time stamps, seconds; 0 unless the calibration has it.

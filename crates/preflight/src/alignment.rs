@@ -35,9 +35,7 @@ pub(crate) fn paired(windows: &[Window], runs: &[RunLog], clock: Clock) -> Vec<P
         let moved = run.turned(clock.log_s(window.from_s), clock.log_s(window.to_s))?;
         let turned = match window.turn {
             Some((from_s, to_s, turn_rad)) if (from_s, to_s) == (window.from_s, window.to_s) => Some((moved, turn_rad)),
-            Some((from_s, to_s, turn_rad)) => {
-                Some((run.turned(clock.log_s(from_s), clock.log_s(to_s))?, turn_rad))
-            }
+            Some((from_s, to_s, turn_rad)) => Some((run.turned(clock.log_s(from_s), clock.log_s(to_s))?, turn_rad)),
             None => None,
         };
         Some(Paired { window: *window, moved, turned })
@@ -185,29 +183,35 @@ impl Comparison<'_> {
         (low_s <= high_s).then_some((middle_s - half_s, middle_s + half_s))
     }
 
-    /// The best rate beside a known offset, with the offset that goes with it.
+    /// The best rate beside a known offset, with the offset that goes with it: over a grid of rates that turn
+    /// the clock about the start of the records or about the middle of the longest, and then in turns.
     pub(crate) fn best_rate(&self, near: Clock) -> Option<(Clock, Explained)> {
         let [most, step] = CLOCK_RATES;
-        let longest_s = self.windows.iter().map(|window| window.to_s.abs()).fold(0.0, f64::max);
+        let middle_s = 0.5 * self.windows.iter().map(|window| window.to_s.abs()).fold(0.0, f64::max);
         let mut best: Option<(Clock, Explained)> = None;
-        let (mut centre, mut range, mut step) = (near, most, step);
-        for _ in 0..3 {
-            let count = (range / step).round() as i32;
-            let around = centre;
-            for k in -count..=count {
-                let rate = around.rate + step * f64::from(k);
-                // A rate turns the clock about the middle of the records, or about their start.
-                for middle_s in [0.0, 0.5 * longest_s] {
-                    let offset_s = around.offset_s - (rate - around.rate) * middle_s;
-                    let clock = Clock { offset_s, rate };
-                    let Some(found) = self.at(clock) else { continue };
-                    if best.is_none_or(|(_, best)| found.cost < best.cost) {
-                        best = Some((clock, found));
-                    }
+        let consider = |clock: Clock, best: &mut Option<(Clock, Explained)>| {
+            let Some(found) = self.at(clock) else { return };
+            if best.is_none_or(|(_, best)| found.cost < best.cost) {
+                *best = Some((clock, found));
+            }
+        };
+        let count = (most / step).round() as i32;
+        for k in -count..=count {
+            let rate = step * f64::from(k);
+            for offset_s in [0.0, near.offset_s, near.offset_s - rate * middle_s] {
+                consider(Clock { offset_s, rate }, &mut best);
+            }
+        }
+        let (mut step, mut step_s) = (0.5 * step, CLOCK_STEPS_S[1]);
+        for _ in 0..6 {
+            for _ in 0..2 {
+                for by in [-2.0, -1.0, 1.0, 2.0] {
+                    let (at, _) = best?;
+                    consider(Clock { rate: at.rate + by * step, ..at }, &mut best);
+                    consider(Clock { offset_s: at.offset_s + by * step_s, ..at }, &mut best);
                 }
             }
-            centre = best?.0;
-            (range, step) = (step, 0.2 * step);
+            (step, step_s) = (0.4 * step, 0.4 * step_s);
         }
         best
     }

@@ -8,10 +8,7 @@ use kinematics::{Side, Wheels};
 
 use crate::alignment::Paired;
 use crate::regression::{Moments, robustly, slope};
-use crate::settings::MIN_WINDOWS;
-
-/// Groups of consecutive windows that are left out in turn.
-const GROUPS: usize = 8;
+use crate::settings::{GROUPS, MIN_WINDOWS};
 
 /// The drive: metres a radian of each wheel (negative: it counts backwards) and the separation (negative: the
 /// robot turns the other way).
@@ -58,8 +55,7 @@ impl GeometryEstimate {
             let square: f64 = without.iter().map(|one| (of(one) - mean).powi(2)).sum();
             (square * (count - 1.0) / count).sqrt() / of(&whole).abs()
         };
-        let sigma =
-            [sigma(|one| one.m_per_rad.left), sigma(|one| one.m_per_rad.right), sigma(|one| one.separation_m)];
+        let sigma = [sigma(|one| one.m_per_rad.left), sigma(|one| one.m_per_rad.right), sigma(|one| one.separation_m)];
         Some(Self { sigma, ..whole })
     }
 

@@ -52,8 +52,11 @@ impl Moments {
 
     fn inverse(self) -> Option<Self> {
         let determinant = self.ll * self.rr - self.lr * self.lr;
-        (determinant > 1e-12 * self.ll * self.rr)
-            .then(|| Self { ll: self.rr / determinant, lr: -self.lr / determinant, rr: self.ll / determinant })
+        (determinant > 1e-12 * self.ll * self.rr).then(|| Self {
+            ll: self.rr / determinant,
+            lr: -self.lr / determinant,
+            rr: self.ll / determinant,
+        })
     }
 }
 
@@ -69,13 +72,10 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
             left += weight * turn.left * outcome;
             right += weight * turn.right * outcome;
         }
-        let per_rad = Wheels {
-            left: inverse.ll * left + inverse.lr * right,
-            right: inverse.lr * left + inverse.rr * right,
-        };
-        let residual = |(turn, outcome): &(Wheels<f64>, f64)| {
-            outcome - per_rad.left * turn.left - per_rad.right * turn.right
-        };
+        let per_rad =
+            Wheels { left: inverse.ll * left + inverse.lr * right, right: inverse.lr * left + inverse.rr * right };
+        let residual =
+            |(turn, outcome): &(Wheels<f64>, f64)| outcome - per_rad.left * turn.left - per_rad.right * turn.right;
         let mut sizes: Vec<f64> = pairs.iter().map(|pair| residual(pair).abs()).collect();
         let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
         let weighted_square: f64 = weighted().map(|(pair, weight)| weight * residual(pair).powi(2)).sum();
@@ -106,9 +106,10 @@ pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
     for _ in 0..ROBUST_PASSES {
-        let sums = pairs.iter().zip(&weights).fold((0.0, 0.0), |(xx, xy), ((x, y), weight)| {
-            (xx + weight * x * x, xy + weight * x * y)
-        });
+        let sums = pairs
+            .iter()
+            .zip(&weights)
+            .fold((0.0, 0.0), |(xx, xy), ((x, y), weight)| (xx + weight * x * x, xy + weight * x * y));
         if sums.0 <= 0.0 {
             return None;
         }

@@ -40,9 +40,8 @@ impl RunLog {
         }
         let mut truth = run.run().truth.clone();
         if truth.is_empty() {
-            let sample = |(t_s, pose): (f64, kinematics::Pose)| {
-                TruthSample::new(t_s, pose.x_m, pose.y_m, Some(pose.theta_rad))
-            };
+            let sample =
+                |(t_s, pose): (f64, kinematics::Pose)| TruthSample::new(t_s, pose.x_m, pose.y_m, Some(pose.theta_rad));
             truth = run.observed_poses().into_iter().map(sample).collect();
         }
         Some(Self {
@@ -128,11 +127,8 @@ fn rolled(
     let mut angles = Wheels { left: Vec::with_capacity(t_s.len()), right: Vec::with_capacity(t_s.len()) };
     for row in 0..t_s.len() {
         if row > 0 {
-            let rate = if of_instant {
-                speeds(row).zip_with(speeds(row - 1), |a, b| 0.5 * (a + b))
-            } else {
-                speeds(row)
-            };
+            let rate =
+                if of_instant { speeds(row).zip_with(speeds(row - 1), |a, b| 0.5 * (a + b)) } else { speeds(row) };
             angle = angle.zip_with(rate, |angle, rate| angle + rate * (t_s[row] - t_s[row - 1]));
         }
         angles.left.push(angle.left);

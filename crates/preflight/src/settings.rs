@@ -32,6 +32,14 @@ pub(crate) const CAUCHY_MEDIANS: f64 = 3.5;
 /// Budgeted: weights change by less than a per cent after ten.
 pub(crate) const ROBUST_PASSES: usize = 10;
 
+/// Groups of consecutive windows that the jackknife leaves out in turn.
+/// Convention: eight; standard deviations are then known to a quarter.
+pub(crate) const GROUPS: usize = 8;
+
+/// Instants of a run at which its position or pose tells of the drive's parameters.
+/// Budgeted: the sides of a square have two each.
+pub(crate) const INSTANTS: usize = 8;
+
 /// Ratio of the smaller to the larger eigenvalue of the wheels' second moments, below which their motions are
 /// all of one direction: straights alone, or spins alone.
 /// Budgeted: corrections of a heading while going straight are a hundredth of the motion, squared.
@@ -70,9 +78,13 @@ pub(crate) const MAX_NEAR_OFFSET_S: f64 = 5.0;
 /// Budgeted: the first is half of a window, so that none is passed over.
 pub(crate) const CLOCK_STEPS_S: [f64; 4] = [0.25, 0.05, 0.01, 0.002];
 
-/// Seconds. Offset of the clocks from which on it is said; a smaller one is estimated as a latency.
+/// Seconds. Offset of the clocks from which on it is said, as a hint.
+/// Convention: instruments are late by a frame.
+pub(crate) const MIN_CLOCK_OFFSET_S: f64 = 0.02;
+
+/// Seconds. Offset of the clocks from which on it is a warning; a smaller one is estimated as a latency.
 /// Convention: cameras and networks are late by less.
-pub(crate) const MIN_CLOCK_OFFSET_S: f64 = 0.15;
+pub(crate) const MIN_WARNED_OFFSET_S: f64 = 0.15;
 
 /// Seconds. Offset that no fit of a latency reaches from 0.
 /// Budgeted: three standard deviations of its prior.
@@ -133,8 +145,12 @@ pub(crate) const SAME_SEPARATION: f64 = 0.12;
 pub(crate) const OWN_HEADING_RAD: f64 = 1e-4;
 
 /// Relative. Distances of the instrument that are nearer to those of the wheels are computed from the wheels.
-/// Convention: as for headings, of a path of metres.
-pub(crate) const OWN_DISTANCE: f64 = 1e-4;
+/// Convention: wheels are known to a per cent before they are calibrated.
+pub(crate) const OWN_DISTANCE: f64 = 1e-3;
+
+/// Metres. Steps of the path that are compared for it.
+/// Budgeted: files with four decimals round them by a hundredth.
+pub(crate) const MIN_OWN_STEP_M: f64 = 5e-3;
 
 /// Radians. Least turning of a log whose headings are compared with those of the wheels.
 /// Budgeted: a turn, over which wheels err by more than a milliradian.

@@ -28,7 +28,8 @@ impl Grouped {
     /// Goes through the tables for where the rows are, with marks inside the runs if they are to be cut: the
     /// header, what was noticed, and the tables unless they mix the rows of several runs.
     pub(super) fn survey(opened: Opened, marked: bool) -> Result<(Dataset, Vec<Warning>, Option<Self>), DatasetError> {
-        let Opened { mut dataset, manifest_file, run_lines, corrections, mut odometry, truths, index, warnings } = opened;
+        let Opened { mut dataset, manifest_file, run_lines, corrections, mut odometry, truths, index, warnings } =
+            opened;
         let odometry_rows = odometry.survey(&index, marked)?;
         let mut surveyed = Vec::with_capacity(truths.len());
         for mut truth in truths {
@@ -38,8 +39,11 @@ impl Grouped {
         let infos = std::mem::take(&mut dataset.runs).into_iter().map(|run| run.info).collect();
         let points = PointIndex::new(&dataset.points);
         // Marks are of times as they stand in the files.
-        let is_grouped = (corrections.is_none() || !marked) && odometry_rows.is_grouped && surveyed.iter().all(|(_, rows)| rows.is_grouped);
-        let grouped = Self { manifest_file, infos, run_lines, corrections, odometry, odometry_rows, truths: surveyed, points };
+        let is_grouped = (corrections.is_none() || !marked)
+            && odometry_rows.is_grouped
+            && surveyed.iter().all(|(_, rows)| rows.is_grouped);
+        let grouped =
+            Self { manifest_file, infos, run_lines, corrections, odometry, odometry_rows, truths: surveyed, points };
         Ok((dataset, warnings, is_grouped.then_some(grouped)))
     }
 

@@ -7,7 +7,7 @@ use crate::problem::{Kind, MirroredAxis, Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
 use crate::settings::{
     DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_UNEXPLAINED, MAX_WINDOWS, MIN_CLOCK_OFFSET_S,
-    MIN_CLOCK_RATE, MIN_GAIN, MIN_WINDOWS, UNRELATED,
+    MIN_CLOCK_RATE, MIN_GAIN, MIN_WARNED_OFFSET_S, MIN_WINDOWS, UNRELATED,
 };
 use crate::windows::{Measured, Reading, windows};
 
@@ -56,7 +56,7 @@ fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explaine
         let severity = if clock.rate.abs() > MAX_CLOCK_RATE { Severity::Error } else { Severity::Warning };
         check.problems.push(Problem::new(&Kind::ClockRate { rate: clock.rate }, severity, None, probability(gain)));
         // What is left at the start of the records.
-        if clock.offset_s.abs() < 2.0 * MIN_CLOCK_OFFSET_S {
+        if clock.offset_s.abs() < 2.0 * MIN_WARNED_OFFSET_S {
             return clock;
         }
     }
@@ -64,7 +64,11 @@ fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explaine
     match offset_gain(check, reading, as_is, clock, best.sigma_s) {
         Some(gain) => {
             let offset_s = clock.offset_s / (1.0 + clock.rate);
-            let severity = if offset_s.abs() > MAX_FITTED_OFFSET_S { Severity::Error } else { Severity::Warning };
+            let severity = match offset_s.abs() {
+                large if large > MAX_FITTED_OFFSET_S => Severity::Error,
+                some if some > MIN_WARNED_OFFSET_S => Severity::Warning,
+                _ => Severity::Hint,
+            };
             let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
             check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
             clock

@@ -29,7 +29,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
                 Fault::Spike { row, angle_rad } => Some((*row, *angle_rad)),
                 Fault::Restart { .. } => None,
             });
-            let in_counts = |angle_rad: f64| if run.count_rad > 0.0 { (angle_rad / run.count_rad).round() } else { angle_rad };
+            let in_counts =
+                |angle_rad: f64| if run.count_rad > 0.0 { (angle_rad / run.count_rad).round() } else { angle_rad };
             let mut kinds = Vec::new();
             if let Some((row, angle_rad)) = spikes.next() {
                 let (t_s, rows) = (run.t_s[row], 1 + spikes.count());
@@ -76,7 +77,8 @@ fn faults(run: &RunLog, side: Side) -> Vec<Fault> {
                 continue;
             }
             let jump = (angles[row + 1] - angles[row]).abs() / if run.count_rad > 0.0 { run.count_rad } else { 1.0 };
-            let wraps = COUNTER_BITS.iter().any(|bits| (jump - 2.0_f64.powi(*bits)).abs() * run.count_rad < 4.0 * usual);
+            let wraps =
+                COUNTER_BITS.iter().any(|bits| (jump - 2.0_f64.powi(*bits)).abs() * run.count_rad < 4.0 * usual);
             if !wraps && angles[row + 1].abs() < 4.0 * usual && angles[row].abs() > IMPOSSIBLE_STEP_RATIO * usual {
                 found.push(Fault::Restart { row: row + 1 });
             }

@@ -11,7 +11,7 @@ use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 use crate::problem::{Kind, Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{DETERMINED_SIGMA, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::settings::{DETERMINED_SIGMA, INSTANTS, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
 use crate::windows::Measured;
 
 const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
@@ -30,7 +30,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
     let (mut left_rad, mut right_rad) = (0.0, 0.0);
     let mut whole_turns = true;
     for run in &check.runs {
-        let travel_m = Wheels { left: net(&run.wheels.left) * m_per_rad.left, right: net(&run.wheels.right) * m_per_rad.right };
+        let travel_m =
+            Wheels { left: net(&run.wheels.left) * m_per_rad.left, right: net(&run.wheels.right) * m_per_rad.right };
         let turned_rad = (travel_m.right - travel_m.left) / check.robot.wheel_separation_m;
         whole_turns &= turned_rad.abs() > 0.5 * MIN_TURNING_RAD || run.protocol == Some(dataset::Protocol::Straight);
         if turned_rad > 0.0 { left_rad += turned_rad } else { right_rad -= turned_rad }
@@ -129,9 +130,6 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
         }
     }
 }
-
-/// Instants of a run at which its position or pose is compared, seen from its first.
-const INSTANTS: usize = 8;
 
 /// What a run's poses or positions tell, seen from the first.
 fn add_ends(run: &RunLog, geometry: &DriveGeometry, row: &mut impl FnMut([f64; 3], f64)) {

@@ -18,7 +18,8 @@ struct Hypothesis {
     wheels: f64,
 }
 
-const SOUND: Hypothesis = Hypothesis { exchanged: false, signs: Wheels { left: 1.0, right: 1.0 }, unit: 1.0, wheels: 1.0 };
+const SOUND: Hypothesis =
+    Hypothesis { exchanged: false, signs: Wheels { left: 1.0, right: 1.0 }, unit: 1.0, wheels: 1.0 };
 
 /// All hypotheses, the sound one first.
 fn hypotheses() -> Vec<Hypothesis> {

@@ -17,13 +17,18 @@ pub(crate) fn found(check: &mut SessionCheck) {
             step(&run.wheels.left) + step(&run.wheels.right) > MIN_WHEEL_TURN_RAD
         };
         let is_gap = |length_s: f64| length_s > (GAP_RATIO * median_s).max(MIN_GAP_S);
-        let longest = lengths().filter(|(row, length_s)| is_gap(*length_s) && moved(*row)).max_by(|a, b| a.1.total_cmp(&b.1));
+        let longest =
+            lengths().filter(|(row, length_s)| is_gap(*length_s) && moved(*row)).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((row, length_s)) = longest.filter(|_| run.continuous) {
             let kind = Kind::Gap { t_s: run.t_s[row], length_s };
             problems.push(Problem::new(&kind, Severity::Hint, Some(vec![run.id.clone()]), 0.95));
         }
-        let missing: f64 =
-            lengths().map(|(_, length_s)| length_s).filter(|length_s| !is_gap(*length_s)).map(|length_s| (length_s / median_s).round() - 1.0).filter(|rows| *rows > 0.0).sum();
+        let missing: f64 = lengths()
+            .map(|(_, length_s)| length_s)
+            .filter(|length_s| !is_gap(*length_s))
+            .map(|length_s| (length_s / median_s).round() - 1.0)
+            .filter(|rows| *rows > 0.0)
+            .sum();
         let share = missing / (missing + run.t_s.len() as f64);
         if share > LOST_ROWS {
             losing.push(run.id.clone());

@@ -6,13 +6,13 @@ use crate::alignment::{Clock, Comparison};
 use crate::problem::{Kind, Problem, Severity, probability};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{MAX_WINDOWS, MIN_GAIN};
+use crate::settings::{MAX_WINDOWS, MIN_GAIN, MIN_WARNED_OFFSET_S};
 use crate::windows::windows;
 
 pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
     let Some(matched) = check.matched.as_ref().filter(|_| check.runs.iter().all(|run| run.has_rates)) else { return };
-    // A clock that is off is the better reason.
-    if matched.clock != Clock::default() {
+    // A clock that is far off is the better reason; half a row is no more than the rates'.
+    if matched.clock.rate != 0.0 || matched.clock.offset_s.abs() > MIN_WARNED_OFFSET_S {
         return;
     }
     let session = dataset.session();
@@ -30,9 +30,12 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
     let (windows, measured) = windows(&check.runs, matched.reading, MAX_WINDOWS);
     let comparison = |runs| Comparison { windows: &windows, measured, runs, m_per_rad: check.m_per_rad() };
     let (interval, instant) = (comparison(&check.runs), comparison(&of_instant));
-    let (Some(now), Some(then)) = (interval.at(matched.clock), instant.at(matched.clock)) else { return };
+    let (Some(now), Some(then)) = (interval.at(matched.clock), instant.at(Clock::default())) else { return };
     let gain = then.gain_over(&now);
-    if gain > MIN_GAIN {
+    let as_well = matched.clock != Clock::default();
+    if gain > if as_well { 0.0 } else { MIN_GAIN } {
+        let gain = gain.max(MIN_GAIN);
+        check.problems.retain(|problem| !as_well || problem.severity != Severity::Hint || problem.fix.is_none());
         check.problems.push(Problem::new(&Kind::InstantRates, Severity::Warning, None, probability(gain)));
     }
 }

@@ -19,8 +19,11 @@ pub(crate) fn found(sessions: &[SessionCheck]) -> Option<Problem> {
             let geometry = session.matched.as_ref()?.geometry?;
             // What is wrong with a session's wheels has been said of it.
             let sound = geometry.m_per_rad.left * geometry.m_per_rad.right > 0.0;
-            let lengths_m =
-                [2.0 * geometry.m_per_rad.left.abs(), 2.0 * geometry.m_per_rad.right.abs(), geometry.separation_m.abs()];
+            let lengths_m = [
+                2.0 * geometry.m_per_rad.left.abs(),
+                2.0 * geometry.m_per_rad.right.abs(),
+                geometry.separation_m.abs(),
+            ];
             sound.then_some((lengths_m, geometry.sigma, session.name.as_str()))
         })
         .collect();

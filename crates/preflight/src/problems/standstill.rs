@@ -10,7 +10,8 @@ pub(crate) fn found(check: &mut SessionCheck) -> bool {
     let wheels_turn_rad = turning.left + turning.right;
     let net = check.runs.iter().any(|run| {
         let spread = |angles: &[f64]| {
-            let (low, high) = angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
+            let (low, high) =
+                angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
             high - low
         };
         spread(&run.wheels.left).max(spread(&run.wheels.right)) > MIN_WHEEL_TURN_RAD

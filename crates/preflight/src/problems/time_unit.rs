@@ -49,7 +49,10 @@ fn spans(run: &RunLog) -> Option<f64> {
         (None, Some(first)) => run.displacements.last()?.t1_s - first.t0_s,
         (None, None) => return None,
     };
-    (log_s > 0.0 && truth_s > 0.0 && run.t_s.len() >= MIN_ROWS && run.truth.len().max(run.displacements.len()) >= MIN_ROWS)
+    (log_s > 0.0
+        && truth_s > 0.0
+        && run.t_s.len() >= MIN_ROWS
+        && run.truth.len().max(run.displacements.len()) >= MIN_ROWS)
         .then(|| truth_s / log_s)
 }
 

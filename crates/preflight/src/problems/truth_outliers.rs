@@ -16,7 +16,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
             far.clear();
         }
         if truth.len() >= MIN_ROWS {
-            let mut steps: Vec<f64> = (1..truth.len()).map(|row| step(row - 1, row)).filter(|step| *step > 0.0).collect();
+            let mut steps: Vec<f64> =
+                (1..truth.len()).map(|row| step(row - 1, row)).filter(|step| *step > 0.0).collect();
             steps.sort_by(f64::total_cmp);
             let usual = steps.get((steps.len() as f64 * USUAL_STEP_QUANTILE) as usize).copied().unwrap_or(0.0);
             let most = (IMPOSSIBLE_STEP_RATIO * usual).max(MIN_OUTLIER_M);

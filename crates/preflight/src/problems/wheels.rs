@@ -8,7 +8,8 @@ use crate::problems::ends;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{
-    CERTAIN_SIGMAS, FACTOR_TOLERANCE, LENGTH_UNITS, MAX_SEPARATION_RATIO, MAX_WHEEL_RATIO, MIN_TURNING_RAD, TICK_FACTORS,
+    CERTAIN_SIGMAS, FACTOR_TOLERANCE, LENGTH_UNITS, MAX_SEPARATION_RATIO, MAX_WHEEL_RATIO, MIN_TURNING_RAD,
+    TICK_FACTORS,
 };
 
 /// Names of the units of [`LENGTH_UNITS`].
@@ -59,7 +60,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
         };
         if miss(reversed_distance_m, reversed_turn_rad) < 0.2 * miss(distance_m, turn_rad) {
             // Positive is along the left wheel: ahead if that counts forward.
-            let left_is_right = if reversed_turn_rad.abs() * check.robot.wheel_separation_m > reversed_distance_m.abs() {
+            let left_is_right = if reversed_turn_rad.abs() * check.robot.wheel_separation_m > reversed_distance_m.abs()
+            {
                 one.turn_per_rad < 0.0
             } else {
                 one.ahead_m_per_rad > 0.0
@@ -69,7 +71,10 @@ pub(crate) fn found(check: &mut SessionCheck) {
         } else if distance_m.abs() > turn_rad.abs() * check.robot.wheel_separation_m {
             let ratio = one.distance_m_per_rad / distance_m.abs();
             kinds.extend(scale(check, Wheels::both(ratio), None, [one.distance_sigma; 3]));
-        } else if one.turn_per_rad * turn_rad < 0.0 && one.turn_per_rad.abs() > CERTAIN_SIGMAS * one.turn_sigma && !mirrored {
+        } else if one.turn_per_rad * turn_rad < 0.0
+            && one.turn_per_rad.abs() > CERTAIN_SIGMAS * one.turn_sigma
+            && !mirrored
+        {
             kinds.push(Kind::WheelsExchanged { label: truth_follows_labels(&check.runs) });
         }
     } else {
@@ -89,15 +94,21 @@ fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sig
     let is_off = |ratio: f64, most: f64, sigma: f64| {
         ratio.ln().abs() > most.ln() && ratio.ln().abs() - most.ln() > CERTAIN_SIGMAS * sigma.min(0.05)
     };
-    let off = Wheels { left: is_off(wheels.left, MAX_WHEEL_RATIO, sigma[0]), right: is_off(wheels.right, MAX_WHEEL_RATIO, sigma[1]) };
+    let off = Wheels {
+        left: is_off(wheels.left, MAX_WHEEL_RATIO, sigma[0]),
+        right: is_off(wheels.right, MAX_WHEEL_RATIO, sigma[1]),
+    };
     let near = |a: f64, b: f64| (a / b).ln().abs() < FACTOR_TOLERANCE;
     let mean = (wheels.left * wheels.right).sqrt();
     if off.left && off.right && near(wheels.left, wheels.right) {
-        if separation.is_some_and(|separation| near(separation, mean)) || (separation.is_none() && !(0.05..20.0).contains(&mean)) {
+        if separation.is_some_and(|separation| near(separation, mean))
+            || (separation.is_none() && !(0.05..20.0).contains(&mean))
+        {
             let unit = LENGTH_UNITS.iter().position(|unit| near(mean, *unit));
             let nominal_unit = LENGTH_UNITS.iter().position(|unit| near(mean, unit.recip()));
             return Some(Kind::LengthUnit {
-                ratio: unit.map_or_else(|| nominal_unit.map_or(mean, |at| LENGTH_UNITS[at].recip()), |at| LENGTH_UNITS[at]),
+                ratio: unit
+                    .map_or_else(|| nominal_unit.map_or(mean, |at| LENGTH_UNITS[at].recip()), |at| LENGTH_UNITS[at]),
                 unit: unit.or(nominal_unit).map(|at| UNIT_NAMES[at]),
                 of_truth: mean > 1.0,
             });
