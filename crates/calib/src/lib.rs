@@ -14,7 +14,10 @@ mod pose_measurements;
 mod report;
 mod robust;
 mod settings;
+mod stated;
+mod trained_on;
 mod trajectory;
+mod withheld;
 
 pub mod methods;
 
@@ -30,7 +33,9 @@ pub use estimate::{
 pub use methods::{METHODS, method};
 pub use report::{
     CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,
-    ReportedValue, TrainedOn, nominal_value,
+    ReportedValue,
 };
 pub use robust::{MedianMad, Summary};
+pub use stated::nominal_value;
+pub use trained_on::TrainedOn;
 pub use trajectory::{AugmentedCalibration, CorrectedRun, corrected_run};

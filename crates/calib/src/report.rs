@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use dataset::{NominalRobot, Run, Session};
+use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter, is_implausible};
 use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO, MAX_FILE_BYTES};
+use crate::stated::nominal_value;
+use crate::trained_on::TrainedOn;
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -46,35 +48,6 @@ pub struct CalibrationReport {
     pub trained_on: Vec<TrainedOn>,
     /// What each method found.
     pub methods: Vec<MethodReport>,
-}
-
-/// A dataset that a calibration was made from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TrainedOn {
-    /// Its name.
-    pub dataset: String,
-    /// The fingerprint of each run, by id.
-    pub runs: BTreeMap<String, String>,
-}
-
-impl TrainedOn {
-    /// All runs of a session.
-    #[must_use]
-    pub fn of(session: &Session<'_>) -> Self {
-        let run = |run: &dataset::RunView<'_>| (run.info().id.clone(), fingerprint(run.run()));
-        Self { dataset: session.name.to_owned(), runs: session.runs.iter().map(run).collect() }
-    }
-
-    /// Whether a run is one of them.
-    #[must_use]
-    pub fn has(&self, run: &Run) -> bool {
-        let fingerprint = fingerprint(run);
-        self.runs.values().any(|known| *known == fingerprint)
-    }
-}
-
-fn fingerprint(run: &Run) -> String {
-    format!("{:016x}", run.fingerprint())
 }
 
 /// One name or several.
@@ -253,67 +226,6 @@ impl MethodReport {
             warnings: calibration.plausibility_warnings(nominal),
             ..empty
         }
-    }
-
-    /// Takes the values back that the data do not determine: each stays at, or depends on, what is stated.
-    /// `of_scale` says whether a common scale that is not observable leaves no length determined; methods
-    /// that keep the stated mean wheel by design say no.
-    pub fn withhold_undetermined(&mut self, of_scale: bool) {
-        let mut more = Vec::new();
-        for blind in &self.not_observable {
-            let is_scale = blind.parameter == Parameter::CommonScale.key();
-            let keys: &[Parameter] = match () {
-                () if is_scale && of_scale => &Parameter::ESTIMATED,
-                () if blind.parameter == Parameter::LeftWheelDiameter.key() => {
-                    &[Parameter::LeftWheelDiameter, Parameter::LeftPerTick]
-                }
-                () if blind.parameter == Parameter::RightWheelDiameter.key() => {
-                    &[Parameter::RightWheelDiameter, Parameter::RightPerTick]
-                }
-                () if blind.parameter == Parameter::WheelSeparation.key() => &[Parameter::WheelSeparation],
-                () => &[],
-            };
-            for parameter in keys {
-                let Some(value) = self.parameters.get_mut(parameter.key()) else { continue };
-                let why = "the data do not determine the value".to_owned();
-                *value = ReportedValue {
-                    value: None,
-                    ratio_to_nominal: None,
-                    sigma: None,
-                    sigma_why_null: Some(why),
-                    interval_95: None,
-                };
-                if parameter.key() != blind.parameter {
-                    let why = blind.why.clone();
-                    more.push(ReportedBlindness { parameter: parameter.key().to_owned(), why });
-                }
-            }
-        }
-        more.retain(|blind| !self.not_observable.contains(blind));
-        self.not_observable.extend(more);
-    }
-
-    /// Whether a geometry parameter has a value.
-    #[must_use]
-    pub fn determines_anything(&self) -> bool {
-        let of =
-            |parameter: &Parameter| self.parameters.get(parameter.key()).is_some_and(|value| value.value.is_some());
-        Parameter::ESTIMATED.iter().any(of)
-    }
-}
-
-/// What a robot states of a parameter.
-#[must_use]
-pub fn nominal_value(robot: &NominalRobot, key: &str) -> Option<f64> {
-    let per_tick = |diameter_m: f64| Some(std::f64::consts::PI * diameter_m / robot.ticks_per_rev?);
-    let is = |parameter: Parameter| key == parameter.key();
-    match () {
-        () if is(Parameter::LeftWheelDiameter) => Some(robot.left_wheel_diameter_m),
-        () if is(Parameter::RightWheelDiameter) => Some(robot.right_wheel_diameter_m),
-        () if is(Parameter::WheelSeparation) => Some(robot.wheel_separation_m),
-        () if is(Parameter::LeftPerTick) => per_tick(robot.left_wheel_diameter_m),
-        () if is(Parameter::RightPerTick) => per_tick(robot.right_wheel_diameter_m),
-        () => None,
     }
 }
 

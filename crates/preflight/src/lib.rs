@@ -9,12 +9,14 @@
 
 mod alignment;
 mod geometry_estimate;
+mod kind;
 mod problem;
 mod problems;
 mod regression;
 mod run_log;
 mod session_check;
 mod settings;
+mod stages;
 mod text;
 mod windows;
 
@@ -45,7 +47,7 @@ impl Preflight {
 /// Checks one robot's sessions.
 #[must_use]
 pub fn check(datasets: &[Dataset]) -> Preflight {
-    let sessions: Vec<SessionCheck> = datasets.iter().map(SessionCheck::of).collect();
+    let sessions: Vec<SessionCheck> = datasets.iter().map(stages::checked).collect();
     let mut problems: Vec<Problem> = problems::several_robots::found(&sessions).into_iter().collect();
     for session in &sessions {
         for problem in &session.problems {

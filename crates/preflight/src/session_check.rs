@@ -1,4 +1,4 @@
-//! One session, a check after the other: what is found first is undone before the next.
+//! One session with what was found of it.
 
 use dataset::{Dataset, NominalRobot};
 use kinematics::Wheels;
@@ -6,7 +6,6 @@ use kinematics::Wheels;
 use crate::alignment::{Clock, Comparison, Explained, Paired, paired};
 use crate::geometry_estimate::{GeometryEstimate, OneDirection};
 use crate::problem::Problem;
-use crate::problems;
 use crate::run_log::RunLog;
 use crate::settings::{MAX_WINDOWS, MIN_WINDOWS};
 use crate::windows::{Measured, Reading, windows};
@@ -34,25 +33,12 @@ pub(crate) struct Matched {
 }
 
 impl SessionCheck {
-    /// Checks a session.
-    pub(crate) fn of(dataset: &Dataset) -> Self {
+    /// A session of which nothing has been checked.
+    pub(crate) fn new(dataset: &Dataset) -> Self {
         let session = dataset.session();
         let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, &dataset.robot)).collect();
         let name = session.name.to_owned();
-        let mut check = Self { name, robot: dataset.robot, runs, problems: Vec::new(), matched: None };
-        problems::counters::found(&mut check);
-        problems::truth_outliers::found(&mut check);
-        problems::time_unit::found(&mut check);
-        problems::log_rows::found(&mut check);
-        if problems::standstill::found(&mut check) {
-            return check;
-        }
-        check.matched = problems::clock::matched(&mut check);
-        problems::wheels::found(&mut check);
-        problems::truth_is_odometry::found(&mut check);
-        problems::rates::found(&mut check, dataset);
-        problems::coverage::found(&mut check);
-        check
+        Self { name, robot: dataset.robot, runs, problems: Vec::new(), matched: None }
     }
 
     pub(crate) fn m_per_rad(&self) -> Wheels<f64> {

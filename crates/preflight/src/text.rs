@@ -2,7 +2,7 @@
 
 use kinematics::Side;
 
-use crate::problem::{Kind, MirroredAxis};
+use crate::kind::{Kind, MirroredAxis};
 
 /// The problem's name in JSON and in docs/check.md.
 pub(crate) const fn id(kind: &Kind) -> &'static str {

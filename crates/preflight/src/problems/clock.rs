@@ -3,7 +3,8 @@
 //! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
 
 use crate::alignment::{BestClock, Clock, Comparison, Explained};
-use crate::problem::{Kind, MirroredAxis, Problem, Severity, probability};
+use crate::kind::{Kind, MirroredAxis};
+use crate::problem::{Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
 use crate::settings::{
     DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_UNEXPLAINED, MAX_WINDOWS, MIN_CLOCK_OFFSET_S,

@@ -3,7 +3,8 @@
 
 use kinematics::Side;
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{

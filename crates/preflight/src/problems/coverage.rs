@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{DETERMINED_SIGMA, INSTANTS, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};

@@ -3,7 +3,8 @@
 
 use kinematics::{DriveGeometry, Increment, Pose, Side, Wheels, wrap_to_pi};
 
-use crate::problem::{Kind, Problem, Severity, probability};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity, probability};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{LENGTH_UNITS, MAX_UNEXPLAINED, TICK_FACTORS};
@@ -32,6 +33,9 @@ fn hypotheses() -> Vec<Hypothesis> {
     all.extend(TICK_FACTORS.map(|wheels| Hypothesis { wheels, ..SOUND }));
     all
 }
+
+/// A place by dead reckoning and the one that was measured, metres.
+type Placed = ((f64, f64), (f64, f64));
 
 /// Pairs of consecutive poses.
 struct Step<'a> {
@@ -75,7 +79,7 @@ pub(super) fn of_positions(check: &SessionCheck) -> Vec<Problem> {
 /// the best rotation and shift, over the larger extent of the two.
 fn path_miss(run: &RunLog, hypothesis: Hypothesis, geometry: &DriveGeometry, shift_s: f64) -> Option<f64> {
     let mut at = (run.angles_at(run.truth.first()?.t_s - shift_s)?, Pose::IDENTITY);
-    let mut pairs = Vec::with_capacity(run.truth.len());
+    let mut pairs: Vec<Placed> = Vec::with_capacity(run.truth.len());
     let mut from_s = run.truth.first()?.t_s - shift_s;
     for sample in &run.truth {
         let to_s = sample.t_s - shift_s;
@@ -84,7 +88,7 @@ fn path_miss(run: &RunLog, hypothesis: Hypothesis, geometry: &DriveGeometry, shi
         pairs.push(((at.1.x_m, at.1.y_m), (sample.x_m, sample.y_m)));
     }
     let count = pairs.len() as f64;
-    let mean = |of: fn(&((f64, f64), (f64, f64))) -> (f64, f64)| {
+    let mean = |of: fn(&Placed) -> (f64, f64)| {
         let sum = pairs.iter().map(of).fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
         (sum.0 / count, sum.1 / count)
     };

@@ -1,6 +1,7 @@
 //! Gaps and missing rows of the log.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::problems::time_unit::median_row_s;
 use crate::session_check::SessionCheck;
 use crate::settings::{GAP_RATIO, LOST_ROWS, MIN_GAP_S, MIN_WHEEL_TURN_RAD};

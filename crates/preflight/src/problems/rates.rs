@@ -3,7 +3,8 @@
 use dataset::Dataset;
 
 use crate::alignment::{Clock, Comparison};
-use crate::problem::{Kind, Problem, Severity, probability};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity, probability};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{MAX_WINDOWS, MIN_GAIN, MIN_WARNED_OFFSET_S};

@@ -1,6 +1,7 @@
 //! Sessions whose own data say that they are of different robots, whatever their files state.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::problems::wheels::certain;
 use crate::session_check::SessionCheck;
 use crate::settings::{CERTAIN_SIGMAS, SAME_SEPARATION, SAME_WHEEL};

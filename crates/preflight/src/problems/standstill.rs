@@ -1,6 +1,7 @@
 //! Nothing moves: the wheels, or the robot that the instrument sees.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
 use crate::settings::{MIN_WHEEL_TURN_RAD, STANDING_M};
 

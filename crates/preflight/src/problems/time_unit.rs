@@ -1,6 +1,7 @@
 //! Times in milliseconds: of all tables, or of one. The checks that follow have seconds.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{CLOCK_UNIT_RATIO, MAX_ROW_S, MIN_ROWS, MIN_SPEED_M_S};

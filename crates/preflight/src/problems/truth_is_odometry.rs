@@ -1,7 +1,8 @@
 //! Truth that is computed from the wheels: its headings and distances are those of nominal dead reckoning,
 //! nearer than any instrument is.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{MIN_OWN_STEP_M, MIN_OWN_TURN_RAD, MIN_WINDOWS, OWN_DISTANCE, OWN_HEADING_RAD};

@@ -1,6 +1,7 @@
 //! Positions metres off for a row. They are left out of the checks that follow.
 
-use crate::problem::{Kind, Problem, Severity};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
 use crate::settings::{IMPOSSIBLE_STEP_RATIO, MAX_POSITION_M, MIN_OUTLIER_M, MIN_ROWS, USUAL_STEP_QUANTILE};
 

@@ -3,7 +3,8 @@
 use dataset::Protocol;
 use kinematics::{Side, Wheels};
 
-use crate::problem::{Kind, Problem, Severity, probability};
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity, probability};
 use crate::problems::ends;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
