@@ -30,7 +30,6 @@ struct Log {
     odometry: Vec<(usize, f64, [f64; 2])>,
     /// Run, time, x, y, heading.
     truth: Vec<(usize, f64, [f64; 3])>,
-    twist: bool,
     positions: bool,
 }
 
@@ -61,7 +60,6 @@ fn driven(true_m: [f64; 3], seed: u64) -> Log {
         runs: Vec::new(),
         odometry: Vec::new(),
         truth: Vec::new(),
-        twist: false,
         positions: false,
     };
     let step_s = 0.005;
@@ -113,8 +111,7 @@ impl Log {
         for (id, protocol) in &self.runs {
             let _ = write!(toml, "[[run]]\nid = \"{id}\"\nprotocol = \"{protocol}\"\n");
         }
-        let columns = if self.twist { "v_mps,omega_radps" } else { "left_ticks,right_ticks" };
-        let mut odometry = format!("run,t_s,{columns}\n");
+        let mut odometry = "run,t_s,left_ticks,right_ticks\n".to_owned();
         for (run, t_s, [left, right]) in &self.odometry {
             let _ = writeln!(odometry, "{},{t_s:.4},{left},{right}", self.runs[*run].0);
         }
@@ -250,6 +247,18 @@ fn wheels_and_headings_on_the_wrong_side_are_named_and_mended() {
     refused(&good(5).truths(|_, seen| seen[2] = -seen[2]), "heading_clockwise", true);
     refused(&good(6).truths(|_, seen| seen.swap(0, 1)), "axes_exchanged", true);
     refused(&good(6).truths(|_, seen| seen[1] = -seen[1]), "axis_mirrored", true);
+}
+
+#[test]
+fn positions_alone_tell_of_wheels_and_units_too() {
+    let positions = |seed| Log { positions: true, ..good(seed) };
+    refused(&positions(28).rows(|_, wheels| wheels.swap(0, 1)), "wheels_exchanged", false);
+    refused(&positions(28).rows(|_, wheels| wheels[1] = -wheels[1]), "wheel_backwards", false);
+    let millimetres = positions(29).truths(|_, seen| (seen[0], seen[1]) = (1e3 * seen[0], 1e3 * seen[1]));
+    refused(&millimetres, "truth_length_unit", false);
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    positions(30).write(&temp.path().join("set"), "");
+    assert_eq!(problems(temp.path(), "set"), []);
 }
 
 #[test]
