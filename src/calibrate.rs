@@ -2,17 +2,20 @@
 
 mod follow;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use calib::methods::joint::{Joint, LargeCalibrationError};
-use calib::{CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names};
+use calib::{
+    CalibError, Calibration, CalibrationReport, METHODS, Method, MethodReport, Names, TrainedOn, nominal_value,
+};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::{Blocks, NominalRobot, Session, Warning};
 use estimation::Column;
 use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
+use crate::check;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
 
@@ -35,9 +38,14 @@ pub(crate) struct Arguments {
     /// say when they have settled.
     #[arg(long, conflicts_with_all = ["method", "out"])]
     online: bool,
-    /// Write the calibration to a file that `yair evaluate --calibration` takes.
+    /// Write the calibration to a file that `yair evaluate --calibration` takes. Another
+    /// calibration there is replaced, any other file is kept.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Calibrate although `yair check` finds an error or the result cannot be the stated robot, give values
+    /// that the data do not determine.
+    #[arg(long)]
+    force: bool,
 }
 
 const ALL: &str = "all";
@@ -48,6 +56,9 @@ fn methods() -> String {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    if let Some(out) = &arguments.out {
+        refuse_other_file(out)?;
+    }
     let joint = Joint::DEFAULT.name();
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
@@ -57,6 +68,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let datasets =
         if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    if arguments.force {
+        check::before(&datasets, terminal);
+    } else {
+        check::refuse(&datasets, terminal)?;
+    }
     refuse_wrapped_counters(&sessions)?;
     if arguments.online {
         return follow::run(&sessions, terminal);
@@ -82,10 +98,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let mut report = CalibrationReport {
         dataset: names,
+        trained_on: sessions.iter().map(TrainedOn::of).collect(),
         methods: outcomes.iter().map(|(name, outcome)| MethodReport::new(name, outcome, &robot)).collect(),
     };
     if arguments.profile {
         add_profiles(&mut report, &sessions)?;
+    }
+    if !arguments.force {
+        report.methods.iter_mut().for_each(|method| method.withhold_undetermined(method.method == joint));
     }
     // One method asked for by name and not applicable is a failure; the JSON still says so in its place.
     let refused = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().err());
@@ -93,6 +113,12 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let (true, Some(refused)) = (nothing_found, refused) {
         terminal.document(&report)?;
         return Err(refused.to_string().into());
+    }
+    if let (false, [only]) = (arguments.force, &report.methods[..])
+        && let Some(why) = why_no_result(only)
+    {
+        terminal.document(&report)?;
+        return Err(why.into());
     }
     if let Some(out) = &arguments.out {
         write_whole(out, report.to_toml()?.as_bytes())?;
@@ -157,10 +183,12 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
         }
         let (low, high) = found.profile(column, RISE_95).map_err(|error| error.to_string())?;
         for key in keys {
-            if let Some(value) = joint.parameters.get_mut(*key) {
+            if let Some(value) = joint.parameters.get_mut(*key)
+                && let Some(found) = value.value
+            {
                 // The steps of the geometry are relative, those of the mounting are added.
                 let at = |by: f64| {
-                    if Column::GEOMETRY.contains(&column) { value.value * by.exp() } else { value.value + by }
+                    if Column::GEOMETRY.contains(&column) { found * by.exp() } else { found + by }
                 };
                 value.interval_95 = Some([at(low), at(high)]);
             }
@@ -172,20 +200,25 @@ fn add_profiles(report: &mut CalibrationReport, sessions: &[Session<'_>]) -> Res
 fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal: &Terminal) -> Result<(), Failure> {
     let profiled =
         report.methods.iter().flat_map(|method| method.parameters.values()).any(|value| value.interval_95.is_some());
-    let mut headers = vec!["method", "parameter", "nominal", "value", "sigma", "unit"];
+    let mut headers = vec!["method", "parameter", "nominal", "value", "ratio", "sigma", "unit"];
     if profiled {
-        headers.splice(5..5, ["95 % from", "to"]);
+        headers.splice(6..6, ["95 % from", "to"]);
     }
     let mut table = table(&headers, 2);
     for method in &report.methods {
         for (key, value) in &method.parameters {
-            let (scale, unit) = if key.ends_with("_rad") { (180.0 / std::f64::consts::PI, "deg") } else { (1e3, "mm") };
+            let (scale, unit) = match () {
+                () if key.ends_with("_rad") => (180.0 / std::f64::consts::PI, "deg"),
+                () if key.ends_with("_s") => (1e3, "ms"),
+                () => (1e3, "mm"),
+            };
             let decimals = decimals(value.sigma.map(|sigma| scale * sigma));
             let mut row = vec![
                 method.method.clone(),
                 key.clone(),
-                cell(nominal(robot, key), scale, decimals),
-                cell(Some(value.value), scale, decimals),
+                cell(nominal_value(robot, key), scale, decimals),
+                value.value.map_or_else(|| "not determined".to_owned(), |found| cell(Some(found), scale, decimals)),
+                cell(value.ratio_to_nominal, 1.0, ratio_decimals(value.sigma.zip(value.value))),
                 cell(value.sigma, scale, decimals),
             ];
             if profiled {
@@ -214,27 +247,55 @@ fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal:
         for warning in &method.warnings {
             terminal.remark(&format!("warning: {name}: {warning}"));
         }
+        if let Some(latency_s) = method.parameters.get("latency_s").and_then(|latency| latency.value) {
+            let late = if latency_s < 0.0 { "early" } else { "late" };
+            terminal.say(&format!("  the poses are {:.1} ms {late} against the log", 1e3 * latency_s.abs()))?;
+        }
         for blind in &method.not_observable {
-            terminal.say(&format!("  cannot tell {}: {}", blind.parameter, blind.why))?;
+            terminal.say(&format!("  not determined: {}: {}", blind.parameter, blind.why))?;
         }
     }
     Ok(())
 }
 
-/// What the robot believes of a parameter.
-fn nominal(robot: &NominalRobot, key: &str) -> Option<f64> {
-    let per_tick = |diameter_m: f64| Some(std::f64::consts::PI * diameter_m / robot.ticks_per_rev?);
-    match key {
-        "left_wheel_diameter_m" => Some(robot.left_wheel_diameter_m),
-        "right_wheel_diameter_m" => Some(robot.right_wheel_diameter_m),
-        "wheel_separation_m" => Some(robot.wheel_separation_m),
-        "left_m_per_tick" => per_tick(robot.left_wheel_diameter_m),
-        "right_m_per_tick" => per_tick(robot.right_wheel_diameter_m),
-        _ => None,
+/// Refuses to replace what is no calibration.
+fn refuse_other_file(out: &Path) -> Result<(), Failure> {
+    if out.exists() && CalibrationReport::read(out).is_err() {
+        let why = "already exists and is no calibration file; nothing was written: choose another name";
+        return Err(format!("{}: {why}", out.display()).into());
     }
+    Ok(())
+}
+
+/// Why the only method asked for gives no result that a robot should use.
+fn why_no_result(method: &MethodReport) -> Option<String> {
+    let name = &method.method;
+    let force = "--force gives the numbers all the same";
+    let rejected = method.runs_rejected.first();
+    if method.runs_used == 0 {
+        let why = rejected.map_or_else(String::new, |rejected| format!(": run {}: {}", rejected.run, rejected.why));
+        return Some(format!("{name}: no run was used{why}; yair check says what is wrong with them; {force}"));
+    }
+    if !method.determines_anything() {
+        let why = method.not_observable.first().map_or("", |blind| blind.why.as_str());
+        return Some(format!("{name}: these runs determine no parameter by itself: {why}; {force}"));
+    }
+    if !method.converged {
+        let why = "the fit did not converge, so that its numbers are no result; yair check says what is wrong";
+        return Some(format!("{name}: {why}; {force}"));
+    }
+    if let Some(warning) = method.warnings.first() {
+        return Some(format!("{name}: the result cannot be the stated robot: {warning}; {force}"));
+    }
+    None
 }
 
 /// Decimals that show two digits of sigma, six where there is none.
 fn decimals(sigma: Option<f64>) -> usize {
     sigma.filter(|sigma| *sigma > 0.0).map_or(6, |sigma| (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize)
+}
+
+/// Decimals of a ratio that show two digits of its standard deviation.
+fn ratio_decimals(sigma_and_value: Option<(f64, f64)>) -> usize {
+    sigma_and_value.map_or(4, |(sigma, value)| decimals(Some(sigma / value.abs())).clamp(3, 6))
 }

@@ -6,8 +6,8 @@ use std::io::Read;
 use std::path::Path;
 
 use ::diagnose::ExtendedModel;
-use calib::{AugmentedCalibration, CalibrationReport, ReportError};
-use dataset::{Dataset, NominalRobot};
+use calib::{AugmentedCalibration, CalibrationReport, ReportError, TrainedOn};
+use dataset::{Dataset, NominalRobot, Run};
 use scenario::{LARGEST_FILE_BYTES, Scenario};
 
 use crate::terminal::{Failure, Terminal};
@@ -16,6 +16,7 @@ use crate::terminal::{Failure, Terminal};
 pub(crate) struct GivenCalibration {
     place: String,
     given: Given,
+    trained_on: Vec<TrainedOn>,
 }
 
 enum Given {
@@ -27,18 +28,20 @@ impl GivenCalibration {
     /// The calibrations of a file.
     pub(crate) fn read(path: &Path) -> Result<Vec<Self>, Failure> {
         let place = path.display().to_string();
-        let of = |given| Self { place: place.clone(), given };
+        let of =
+            |given, trained_on: &[TrainedOn]| Self { place: place.clone(), given, trained_on: trained_on.to_vec() };
         if is_scenario(path) {
             let scenario = Scenario::read(path)?;
             let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
-            return Ok(vec![of(Given::Model(model))]);
+            return Ok(vec![of(Given::Model(model), &[])]);
         }
-        let calibrations = CalibrationReport::read(path)?.calibrations();
+        let report = CalibrationReport::read(path)?;
+        let calibrations = report.calibrations();
         if calibrations.is_empty() {
             let message = "it holds no values".to_owned();
             return Err(ReportError::NotACalibration { place, message }.into());
         }
-        Ok(calibrations.into_iter().map(|named| of(Given::Values(named.into()))).collect())
+        Ok(calibrations.into_iter().map(|named| of(Given::Values(named.into()), &report.trained_on)).collect())
     }
 
     pub(crate) const fn calibration(&self) -> &AugmentedCalibration {
@@ -46,6 +49,16 @@ impl GivenCalibration {
             Given::Values(calibration) => calibration,
             Given::Model(model) => &model.calibration,
         }
+    }
+
+    /// Whether the calibration was made from a run.
+    pub(crate) fn was_trained_on(&self, run: &Run) -> bool {
+        self.trained_on.iter().any(|dataset| dataset.has(run))
+    }
+
+    /// What of the calibration is no correction of a robot's stated values.
+    pub(crate) fn why_of_another_robot(&self, robot: &NominalRobot) -> Option<String> {
+        self.calibration().calibration.other_robot(robot)
     }
 
     /// Remarks what dead reckoning does without.

@@ -18,9 +18,10 @@ use crate::terminal::{Failure, Terminal, cell, table};
 /// of the catalogue, against an oracle.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// How many cases; the bars are meant for 2000 and more.
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=MAX_CASES))]
-    cases: u64,
+    /// How many cases; the bars are meant for 2000 and more, and a case takes seconds of a core. Without it
+    /// 200, and with --check 440, as the stored baseline.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_CASES))]
+    cases: Option<u64>,
     /// Seed of every random draw.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -42,6 +43,15 @@ pub(crate) struct Arguments {
     jobs: u16,
 }
 
+/// Cases where none are asked for: an idea of the measures in minutes.
+const DEFAULT_CASES: u64 = 200;
+
+/// Cases of the stored baseline.
+const CHECKED_CASES: u64 = 440;
+
+/// What a case takes on a core, in the optimised build: 2400 cases took 35 minutes (docs/diagnose.md).
+const SECONDS_A_CASE: f64 = 0.9;
+
 /// A week of computing; a typing error beyond.
 const MAX_CASES: u64 = 1_000_000;
 
@@ -57,13 +67,18 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Some(path) if !arguments.update => Some(DiagnosisBaseline::read(path)?),
         _ => None,
     };
-    let bar = terminal.progress(arguments.cases, "cases");
+    let cases = arguments.cases.unwrap_or(if arguments.check.is_some() { CHECKED_CASES } else { DEFAULT_CASES });
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs.into() };
+    let minutes = cases as f64 * SECONDS_A_CASE / (60.0 * jobs as f64);
+    terminal.remark(&format!("{cases} cases on {jobs} threads: about {:.0} minutes", minutes.max(1.0)));
+    let bar = terminal.progress(cases, "cases");
     let started = Instant::now();
     let scope = if arguments.check.is_some() { Scope::Guarded } else { Scope::Whole };
-    let result = challenge(arguments.seed, arguments.cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
+    let result = challenge(arguments.seed, cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     terminal.remark(&format!("{} cases in {:.1} s", result.cases.len(), started.elapsed().as_secs_f64()));
-    let now = DiagnosisBaseline::of(arguments.seed, arguments.cases, &result.cases);
+    let now = DiagnosisBaseline::of(arguments.seed, cases, &result.cases);
     let check = baseline.map(|baseline| baseline.check(&now));
     show(&result, terminal)?;
     terminal.document(&Document { result: &result, check: check.as_ref() })?;

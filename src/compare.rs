@@ -36,6 +36,7 @@ const KINDS_A_TABLE: usize = 3;
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
+    crate::check::before(&datasets, terminal);
     refuse_wrapped_counters(&sessions)?;
     let chosen = |method: &&dyn Method| {
         arguments.methods.is_empty() || arguments.methods.iter().any(|name| name == method.name())

@@ -11,6 +11,7 @@ use kinematics::{Pose, sin_cos};
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
+use crate::simulate::refuse_filled;
 use crate::terminal::{Failure, Terminal, datasets_at, folder_name};
 
 /// Corrected poses at every row of the logs, from each run's first truth pose where it has one.
@@ -101,15 +102,6 @@ fn only(calibrations: Vec<GivenCalibration>) -> Result<GivenCalibration, Failure
             Err(format!("{place}: {why}: yair calibrate --method M --out FILE").into())
         }
     }
-}
-
-fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
-    let taken = out.read_dir().map_or_else(|_| out.exists(), |mut entries| entries.next().is_some());
-    if taken && (!force || !out.is_dir()) {
-        let why = "already exists and is not an empty folder; nothing was written: choose another folder, or give --force to write into it";
-        return Err(format!("{}: {why}", out.display()).into());
-    }
-    Ok(())
 }
 
 /// Files that wait until all are written.

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, Options};
 use clap::Args;
 
+use crate::check;
 use crate::diagnosis_page::Page;
-use crate::simulate::write_whole;
+use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
 /// What the calibrated model gets wrong: the causes that explain it, the extended model, and the gain
@@ -25,10 +26,17 @@ pub(crate) struct Arguments {
     /// Take an effect out of the catalogue; may be given several times.
     #[arg(long = "without", value_name = "ID")]
     without: Vec<String>,
+    /// Write into a folder that is not empty.
+    #[arg(long)]
+    force: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    if let Some(out) = &arguments.out {
+        refuse_filled(out, arguments.force)?;
+    }
     let datasets = read_datasets(&arguments.datasets, terminal)?;
+    check::before(&datasets, terminal);
     let Diagnosis { mut document, extended, residuals, alternatives, .. } =
         ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone(), ..Options::default() })?;
     if let Some(out) = &arguments.out {

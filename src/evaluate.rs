@@ -9,6 +9,7 @@ use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
+use crate::check;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
@@ -24,6 +25,9 @@ pub(crate) struct Arguments {
     /// Exit with 3 when the last calibration drifts more than this, in per cent of the distance driven.
     #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
     max_drift: Option<f64>,
+    /// Print a row for every run.
+    #[arg(long)]
+    runs: bool,
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -46,9 +50,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     for path in &arguments.calibrations {
         found.extend(GivenCalibration::read(path)?.into_iter().map(Some));
     }
+    check_small(&paths, terminal);
     let (names, calibrations) = evaluate(&paths, &found, terminal)?;
     found.iter().flatten().for_each(|given| given.remark(terminal));
     show(&calibrations, terminal)?;
+    if arguments.runs {
+        show_runs(&calibrations, terminal)?;
+    }
+    warn_of_worse(&calibrations, terminal);
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
     terminal.document(&Document { dataset: Names::of(names), calibrations })?;
@@ -71,6 +80,7 @@ fn evaluate(
 ) -> Result<(Vec<String>, Vec<CalibrationDrift>), Failure> {
     let several = paths.len() > 1;
     let mut names = Vec::with_capacity(paths.len());
+    let (mut seen, mut all) = (vec![0_usize; calibrations.len()], 0_usize);
     let mut runs = vec![Vec::new(); calibrations.len()];
     for path in paths {
         let opened = RunByRun::open(path)?;
@@ -84,11 +94,21 @@ fn evaluate(
         let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
         let robot = opened.header().robot;
         calibrations.iter().flatten().try_for_each(|given| given.check(&robot, &place))?;
+        for given in calibrations.iter().flatten() {
+            if let Some(why) = given.why_of_another_robot(&robot) {
+                terminal.remark(&format!("warning: {} may be of another robot than {place}: {why}", given.place()));
+            }
+        }
         let mut driven_m = vec![0.0; calibrations.len()];
         for run in opened {
             let Loaded { mut dataset, warnings } = run?;
             warn(&warnings);
             dataset.provenance.name = Some(name.clone());
+            all += dataset.runs.len();
+            for (given, seen) in calibrations.iter().zip(&mut seen) {
+                let trained = |run: &&dataset::Run| given.as_ref().is_some_and(|given| given.was_trained_on(run));
+                *seen += dataset.runs.iter().filter(trained).count();
+            }
             let session = dataset.session();
             let each = calibrations.iter().zip(&mut runs).zip(&mut driven_m);
             for ((given, runs), driven_m) in each.filter(|((given, _), _)| !is_of_whole_datasets(given.as_ref())) {
@@ -108,10 +128,81 @@ fn evaluate(
         }
         names.push(name);
     }
+    for (given, seen) in calibrations.iter().zip(seen) {
+        if let (Some(given), 1..) = (given, seen) {
+            terminal.remark(&format!(
+                "warning: {} was trained on {seen} of these {all} runs: its drift on them is no test of it; evaluate runs that it has not seen",
+                given.place()
+            ));
+        }
+    }
     let of_runs = |(given, runs): (&Option<GivenCalibration>, _)| {
         CalibrationDrift::of_runs(given.as_ref().map(|given| &given.calibration().calibration), runs)
     };
     Ok((names, calibrations.iter().zip(runs).map(of_runs).collect()))
+}
+
+/// Datasets of at most so many bytes are read twice: once to be checked.
+const MAX_CHECKED_BYTES: u64 = 64 << 20;
+
+/// Passes on what is wrong with datasets that are not large; what cannot be read is told by whoever
+/// evaluates it.
+fn check_small(paths: &[PathBuf], terminal: &Terminal) {
+    let size = |path: &PathBuf| {
+        let of = |file| std::fs::metadata(path.join(file)).map_or(0, |metadata| metadata.len());
+        of("odometry.csv") + of("truth.csv")
+    };
+    if paths.iter().map(size).sum::<u64>() > MAX_CHECKED_BYTES {
+        return;
+    }
+    let read = |path: &PathBuf| {
+        let mut dataset = dataset::read(path).ok()?.dataset;
+        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+        Some(dataset)
+    };
+    if let Some(datasets) = paths.iter().map(read).collect::<Option<Vec<_>>>() {
+        check::before(&datasets, terminal);
+    }
+}
+
+/// A calibration that leaves more drift than the nominal values is of another robot, or of other runs.
+fn warn_of_worse(calibrations: &[CalibrationDrift], terminal: &Terminal) {
+    let Some((nominal, given)) = calibrations.split_first() else { return };
+    for drift in given {
+        if let (Some(nominal), Some(percent)) = (nominal.drift_percent, drift.drift_percent)
+            && percent > MAX_WORSE_RATIO * nominal
+        {
+            terminal.remark(&format!(
+                "warning: {} drifts {percent:.3} % where the nominal values drift {nominal:.3} %: is it a calibration of this robot?",
+                drift.name
+            ));
+        }
+    }
+}
+
+/// Ratio of the drift under a calibration to that under the nominal values, from which on it is said.
+/// Calibrations of the same robot on other floors leave less than nominal values or a little more.
+const MAX_WORSE_RATIO: f64 = 1.5;
+
+fn show_runs(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
+    let degrees = 180.0 / std::f64::consts::PI;
+    let headers =
+        ["calibration", "run", "length\nm", "max pos.\nmm", "max head.\ndeg", "final pos.\nmm", "final head.\ndeg"];
+    let mut rows = table(&headers, 2);
+    for drift in calibrations {
+        for run in &drift.runs {
+            rows.add_row([
+                drift.name.clone(),
+                run.dataset.as_ref().map_or_else(|| run.run.clone(), |dataset| format!("{dataset}/{}", run.run)),
+                cell(Some(run.length_m), 1.0, 2),
+                cell(run.max_position_m, 1e3, 2),
+                cell(run.max_heading_rad, degrees, 3),
+                cell(run.final_position_m, 1e3, 2),
+                cell(run.final_heading_rad, degrees, 3),
+            ]);
+        }
+    }
+    terminal.say(&rows.to_string())
 }
 
 fn is_of_whole_datasets(given: Option<&GivenCalibration>) -> bool {

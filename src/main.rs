@@ -3,6 +3,7 @@
 mod calibrate;
 mod calibration_file;
 mod challenge;
+mod check;
 mod compare;
 mod correct;
 mod diagnose;
@@ -43,6 +44,7 @@ struct Cli {
 enum Command {
     Simulate(simulate::Arguments),
     Import(import::Arguments),
+    Check(check::Arguments),
     Calibrate(calibrate::Arguments),
     Diagnose(diagnose::Arguments),
     Challenge(challenge::Arguments),
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
     let outcome = match &cli.command {
         Command::Simulate(arguments) => simulate::run(arguments, &terminal),
         Command::Import(arguments) => import::run(arguments, &terminal),
+        Command::Check(arguments) => check::run(arguments, &terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, &terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, &terminal),
         Command::Challenge(arguments) => challenge::run(arguments, &terminal),

@@ -8,7 +8,7 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
-use crate::simulate::write_whole;
+use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, read_datasets, table};
 
 /// The next experiment: what discriminates the candidates that a diagnosis leaves, or shows what it could not
@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "DATASET|SCENARIO")]
     sources: Vec<PathBuf>,
     /// Sides of the floor, metres; without it what the robot moved over so far, or the scenario's budget.
-    #[arg(long, value_name = "X,Y", value_parser = room)]
+    #[arg(long, value_name = "X,Y", value_parser = room, allow_hyphen_values = true)]
     room: Option<[f64; 2]>,
     /// Time for driving and placing the robot; without it the scenario's budget, or 10.
     #[arg(long, value_name = "M", value_parser = positive)]
@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// speed.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write into a folder that is not empty.
+    #[arg(long)]
+    force: bool,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -42,8 +45,10 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn room(text: &str) -> Result<[f64; 2], String> {
-    let sides: Vec<f64> = text.split(',').map(|side| positive(side.trim())).collect::<Result<_, _>>()?;
-    <[f64; 2]>::try_from(sides).map_err(|_| "two sides in metres, as 4,3".to_owned())
+    let expected = |_| "expected the two sides of the floor in metres, both positive, as 4,3".to_owned();
+    let sides: Vec<f64> =
+        text.split(',').map(|side| positive(side.trim())).collect::<Result<_, _>>().map_err(expected)?;
+    <[f64; 2]>::try_from(sides).map_err(|sides| expected(format!("{sides:?}")))
 }
 
 #[derive(Serialize)]
@@ -66,6 +71,9 @@ struct OfScenario {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let limits = Limits { room_m: arguments.room, minutes: arguments.minutes, top_speed_m_s: arguments.speed };
+    if let Some(out) = &arguments.out {
+        refuse_filled(out, arguments.force)?;
+    }
     match &arguments.sources[..] {
         [file] if file.is_file() => of_scenario(file, &limits, arguments, terminal),
         sources => of_data(sources, &limits, arguments, terminal),

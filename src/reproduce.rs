@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use paper_reproduction as paper;
 
-use crate::simulate::write_whole;
+use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal};
 
 /// The paper's tables from simulation, beside the published values, and where the paper contradicts itself.
@@ -22,9 +22,15 @@ pub(crate) struct Arguments {
     /// Write the page (paper.md) and its figures (SVG and PNG) into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write into a folder that is not empty.
+    #[arg(long)]
+    force: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    if let Some(out) = &arguments.out {
+        refuse_filled(out, arguments.force)?;
+    }
     let bar = terminal.progress(paper::total_trials(arguments.trials), "experiments");
     let started = Instant::now();
     let reproduction = paper::reproduce(arguments.trials, arguments.seed, &|trials| bar.inc(trials))?;

@@ -166,6 +166,16 @@ fn create_parents(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
 }
 
+/// Refuses a folder that has something in it, unless `force` says to write into it.
+pub(crate) fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
+    let taken = out.read_dir().map_or_else(|_| out.exists(), |mut entries| entries.next().is_some());
+    if taken && (!force || !out.is_dir()) {
+        let why = "already exists and is not an empty folder; nothing was written: choose another folder, or give --force to write into it";
+        return Err(format!("{}: {why}", out.display()).into());
+    }
+    Ok(())
+}
+
 /// Writes a file in one piece.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     staged(path, bytes)?.persist(path).map_err(|error| format!("{}: {}", path.display(), error.error))?;

@@ -37,6 +37,10 @@ pub(crate) fn show(result: &SweepResult, terminal: &Terminal) -> Result<(), Fail
         let title = format!("RMSE of {}, per cent of the true value", symbol(parameter));
         quantities.push((title, Box::new(move |point, method| rmse(point, method, parameter))));
     }
+    let axes: Vec<&str> = first.levels.keys().map(String::as_str).collect();
+    if !axes.is_empty() {
+        terminal.say(&format!("columns are levels of {}", axes.join(", ")))?;
+    }
     for points in result.points.chunks(POINTS_A_TABLE) {
         for (title, number) in &quantities {
             terminal.say(title)?;

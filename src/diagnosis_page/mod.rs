@@ -237,7 +237,8 @@ impl Page<'_> {
         for method in &self.document.calibration.methods {
             for (name, value) in &method.parameters {
                 let sigma = value.sigma.map_or_else(|| "–".to_owned(), |sigma| format!("{sigma:.1e}"));
-                writeln!(page, "| `{name}` | {:.7} | {sigma} |", value.value)?;
+                let found = value.value.map_or_else(|| "–".to_owned(), |found| format!("{found:.7}"));
+                writeln!(page, "| `{name}` | {found} | {sigma} |")?;
             }
             for unobservable in &method.not_observable {
                 writeln!(page, "\nNot observable: {} – {}", unobservable.parameter, unobservable.why)?;

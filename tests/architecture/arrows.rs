@@ -13,6 +13,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
     ("dataset", &["kinematics"]),
     ("motion-programs", &["kinematics", "dataset"]),
     ("model-term", &["kinematics", "dataset"]),
+    ("preflight", &["kinematics", "dataset"]),
     ("effects", &["kinematics", "dataset", "model-term"]),
     ("scenario", &["kinematics", "dataset", "motion-programs", "model-term", "effects"]),
     ("sim-yair", &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario"]),
@@ -89,6 +90,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "bench",
             "blind-benchmark",
             "paper-reproduction",
+            "preflight",
         ],
     ),
 ];

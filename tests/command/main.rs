@@ -3,6 +3,7 @@
 
 mod accuracy_gate;
 mod bad_input;
+mod bad_logs;
 mod compare;
 mod contract;
 mod correct;

@@ -31,7 +31,7 @@ fn a_counter_that_is_cleared_is_named_and_is_no_torn_byte() {
         assert!(document.findings.iter().all(|finding| finding.runs.is_none()), "{persistent}");
         // Wheels and separation are within 2 % of nominal again, as the scenario has them.
         let drive = &document.calibration.methods[0].parameters;
-        let off = drive["left_wheel_diameter_m"].value / scenario.robot.left_wheel_diameter_m - 1.0;
+        let off = drive["left_wheel_diameter_m"].value.expect("a value") / scenario.robot.left_wheel_diameter_m - 1.0;
         assert!(off.abs() < 0.02, "{persistent}: {off}");
     }
 }
@@ -161,7 +161,7 @@ fn a_khepera_has_rows_of_false_length_and_wheels_of_its_published_size() {
     assert!(document.findings.iter().all(|finding| finding.names[0] != "low_speed_truncation"));
     let drive = &document.calibration.methods[0].parameters;
     for (wheel, published_m) in [("left_wheel_diameter_m", 0.041_179_6), ("right_wheel_diameter_m", 0.041_440_8)] {
-        let off = drive[wheel].value / published_m - 1.0;
+        let off = drive[wheel].value.expect("a value") / published_m - 1.0;
         // Two of its standard deviations, and less than a twentieth of what the loss made of it.
         assert!(off.abs() < 0.02, "{wheel}: {off}");
     }

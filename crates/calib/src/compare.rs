@@ -192,7 +192,7 @@ fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<AugmentedCal
     }
     let why = outcome.as_ref().err().map(CalibError::to_string);
     let methods = vec![MethodReport::new(method.name(), &outcome, session.robot)];
-    let report = CalibrationReport { dataset: Names::One(session.name.to_owned()), methods };
+    let report = CalibrationReport { dataset: Names::One(session.name.to_owned()), trained_on: Vec::new(), methods };
     report.calibrations().pop().map(AugmentedCalibration::from).ok_or_else(|| why.unwrap_or_default())
 }
 

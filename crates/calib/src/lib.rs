@@ -14,7 +14,10 @@ mod pose_measurements;
 mod report;
 mod robust;
 mod settings;
+mod stated;
+mod trained_on;
 mod trajectory;
+mod withheld;
 
 pub mod methods;
 
@@ -33,4 +36,6 @@ pub use report::{
     ReportedValue,
 };
 pub use robust::{MedianMad, Summary};
+pub use stated::nominal_value;
+pub use trained_on::TrainedOn;
 pub use trajectory::{AugmentedCalibration, CorrectedRun, corrected_run};

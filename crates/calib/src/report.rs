@@ -10,7 +10,9 @@ use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter, is_implausible};
-use crate::settings::MAX_FILE_BYTES;
+use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO, MAX_FILE_BYTES};
+use crate::stated::nominal_value;
+use crate::trained_on::TrainedOn;
 use estimation::OneStep;
 
 /// Why a calibration file is not one.
@@ -41,6 +43,9 @@ pub struct CalibrationReport {
     /// The dataset's name, or a list of them.
     #[serde(default)]
     pub dataset: Names,
+    /// The runs that the values rest on, for whoever evaluates them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trained_on: Vec<TrainedOn>,
     /// What each method found.
     pub methods: Vec<MethodReport>,
 }
@@ -112,8 +117,11 @@ pub struct MethodReport {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "ValueOrNumber")]
 pub struct ReportedValue {
-    /// In SI units.
-    pub value: f64,
+    /// In SI units; `None` where the data do not determine it, with the reason under `not_observable`.
+    pub value: Option<f64>,
+    /// The value over the stated one, of what is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio_to_nominal: Option<f64>,
     /// One standard deviation.
     pub sigma: Option<f64>,
     /// Why there is no sigma.
@@ -128,15 +136,25 @@ pub struct ReportedValue {
 #[serde(untagged)]
 enum ValueOrNumber {
     Number(f64),
-    Value { value: f64, sigma: Option<f64> },
+    Value { value: f64, sigma: Option<f64>, ratio_to_nominal: Option<f64> },
 }
 
 impl From<ValueOrNumber> for ReportedValue {
     fn from(from: ValueOrNumber) -> Self {
         match from {
-            ValueOrNumber::Number(value) => Self { value, sigma: None, sigma_why_null: None, interval_95: None },
-            ValueOrNumber::Value { value, sigma } => Self { value, sigma, sigma_why_null: None, interval_95: None },
+            ValueOrNumber::Number(value) => Self::of(value, None),
+            ValueOrNumber::Value { value, sigma, ratio_to_nominal } => {
+                Self { ratio_to_nominal, ..Self::of(value, sigma) }
+            }
         }
+    }
+}
+
+impl ReportedValue {
+    /// A value with its standard deviation, and nothing else known of it.
+    #[must_use]
+    pub const fn of(value: f64, sigma: Option<f64>) -> Self {
+        Self { value: Some(value), ratio_to_nominal: None, sigma, sigma_why_null: None, interval_95: None }
     }
 }
 
@@ -179,10 +197,9 @@ impl MethodReport {
             Err(error) => return Self { error: Some(error.to_string()), ..empty },
         };
         let value = |estimate: crate::Estimate| ReportedValue {
-            value: estimate.value,
-            sigma: estimate.sigma,
+            ratio_to_nominal: nominal_value(nominal, estimate.parameter.key()).map(|nominal| estimate.value / nominal),
             sigma_why_null: estimate.sigma.is_none().then(|| "too few runs to show a scatter".to_owned()),
-            interval_95: None,
+            ..ReportedValue::of(estimate.value, estimate.sigma)
         };
         Self {
             parameters: calibration
@@ -218,7 +235,11 @@ impl CalibrationReport {
     /// # Errors
     /// [`ReportError::NotACalibration`] when a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, ReportError> {
-        toml::to_string(self).map_err(|error| ReportError::NotACalibration {
+        let mut known = self.clone();
+        for method in &mut known.methods {
+            method.parameters.retain(|_, value| value.value.is_some());
+        }
+        toml::to_string(&known).map_err(|error| ReportError::NotACalibration {
             place: "calibration".to_owned(),
             message: error.to_string(),
         })
@@ -248,12 +269,13 @@ impl CalibrationReport {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
                 let length =
                     !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
-                !known.contains(&key.as_str()) || !value.value.is_finite() || (length && value.value <= 0.0)
+                let value = value.value.unwrap_or(f64::NAN);
+                !known.contains(&key.as_str()) || !value.is_finite() || (length && value <= 0.0)
             }) {
                 let message = format!(
                     "[methods.parameters] of {}: {key} = {} is no known value; lengths are positive; known: {}",
                     method.method,
-                    value.value,
+                    value.value.unwrap_or(f64::NAN),
                     known.join(", ")
                 );
                 return Err(ReportError::NotACalibration { place, message });
@@ -270,7 +292,7 @@ impl CalibrationReport {
             .filter(|method| method.error.is_none())
             .map(|method| NamedCalibration {
                 name: method.method.clone(),
-                values: method.parameters.iter().map(|(key, value)| (key.clone(), value.value)).collect(),
+                values: method.parameters.iter().filter_map(|(key, value)| Some((key.clone(), value.value?))).collect(),
             })
             .collect()
     }
@@ -331,6 +353,32 @@ impl NamedCalibration {
         Some(format!("{} is {found_m:.4} where the dataset states {nominal_m:.4}", parameter.key()))
     }
 
+    /// The value that is far from a robot's nominal one, though it may be a correction of it, for people.
+    #[must_use]
+    pub fn other_robot(&self, robot: &NominalRobot) -> Option<String> {
+        let found = self.geometry(robot, robot.geometry().ok()?)?;
+        let lengths = [
+            (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
+            (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
+            (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
+        ];
+        let off = |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| {
+            let most = if parameter == Parameter::WheelSeparation {
+                MAX_EVALUATED_SEPARATION_RATIO
+            } else {
+                MAX_EVALUATED_DIAMETER_RATIO
+            };
+            (found_m / nominal_m).ln().abs() > most.ln()
+        };
+        let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
+        Some(format!(
+            "{} is {:.2} mm where the dataset states {:.2} mm",
+            parameter.key(),
+            1e3 * found_m,
+            1e3 * nominal_m
+        ))
+    }
+
     /// Latency of the outside instrument's time stamps, seconds; 0 unless the calibration has it.
     #[must_use]
     pub fn latency_s(&self) -> f64 {
@@ -351,8 +399,12 @@ mod tests {
     use super::*;
 
     fn report() -> CalibrationReport {
-        let value = |value, sigma| ReportedValue { value, sigma, sigma_why_null: None, interval_95: None };
+        let value = ReportedValue::of;
         CalibrationReport {
+            trained_on: vec![TrainedOn {
+                dataset: "a".to_owned(),
+                runs: BTreeMap::from([("run-01".to_owned(), "00ff".to_owned())]),
+            }],
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
                 group_instruments: Vec::new(),

@@ -24,6 +24,15 @@ pub(crate) const SAME_PLACE_M: f64 = 1e-6;
 /// Convention: wheels are known to a few per cent.
 pub(crate) const MAX_PLAUSIBLE_DIAMETER_RATIO: f64 = 1.3;
 
+/// Ratio of a calibrated wheel's diameter to that which an evaluated dataset states, or the inverse, beyond
+/// which the calibration may be of another robot.
+/// Convention: wheels are known to a few per cent; a correction of a tenth is rare.
+pub(crate) const MAX_EVALUATED_DIAMETER_RATIO: f64 = 1.1;
+
+/// As for wheels, of the wheel separation.
+/// Convention: effective separations of robots that do not skid are within some per cent of nominal.
+pub(crate) const MAX_EVALUATED_SEPARATION_RATIO: f64 = 1.25;
+
 /// Ratio of the wheel separation to its nominal value, or the inverse, beyond which a remark is made.
 /// Convention: skid steering makes the effective separation 1.5 to 2 times as large.
 pub(crate) const MAX_PLAUSIBLE_SEPARATION_RATIO: f64 = 2.2;

@@ -6,8 +6,10 @@
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
 mod column_names;
+mod corrections;
 mod counter;
 mod error;
+mod fingerprint;
 pub mod import;
 mod imported;
 mod prefetch;

@@ -183,6 +183,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         blind_to,
         sensitivity,
         calibration: CalibrationReport {
+            trained_on: Vec::new(),
             dataset: Names::of(names),
             methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
         },

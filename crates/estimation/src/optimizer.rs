@@ -74,7 +74,7 @@ pub struct Solution {
     pub(crate) free_headings: Vec<f64>,
     /// The last pass, at the values above.
     pub pass: Pass,
-    /// Did the steps converge?
+    /// Did the steps converge, or did the last of them hardly change the likelihood?
     pub converged: bool,
     /// Was a step long, and longer than the first? The minimum may then be one of several.
     pub left_basin: bool,
@@ -178,6 +178,8 @@ pub(crate) fn fit_from(
     let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
     // Squared distance of the model from that of the cached propagations.
     let mut moved_since_cached = 0.0;
+    // Whether the last step hardly changed the likelihood: a variance near 0 may wander on for ever.
+    let mut is_near = false;
     for _ in 0..options.max_steps {
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
         let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
@@ -202,11 +204,10 @@ pub(crate) fn fit_from(
         // moved since.
         moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
         let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
+        is_near = moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE;
         let settles = match options.ends {
             ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
-            ConvergenceCriterion::Likelihood => {
-                moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE
-            }
+            ConvergenceCriterion::Likelihood => is_near,
         };
         if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
             (converged, cached) = (true, cached.or(found.cached.take()));
@@ -220,7 +221,7 @@ pub(crate) fn fit_from(
     let pass_options =
         PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
-    Ok(Solution { model, noise, free_headings: headings, pass, converged, left_basin })
+    Ok(Solution { model, noise, free_headings: headings, pass, converged: converged || is_near, left_basin })
 }
 
 /// A pass at given common values, and its model: start headings that are not measured, and the instruments of

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::truth::{PointIndex, TruthTable};
 use super::{Opened, has_truth, odometry, without_truth};
+use crate::corrections::Corrections;
 use crate::error::DatasetError;
 use crate::record::{Dataset, NominalRobot, Run, RunInfo};
 use crate::table::{MARKED_ROWS, Survey};
@@ -16,6 +17,7 @@ pub(super) struct Grouped {
     manifest_file: PathBuf,
     infos: Vec<RunInfo>,
     run_lines: Vec<u64>,
+    corrections: Corrections,
     odometry: odometry::OdometryTable,
     odometry_rows: Survey,
     truths: Vec<(TruthTable, Survey)>,
@@ -26,7 +28,8 @@ impl Grouped {
     /// Goes through the tables for where the rows are, with marks inside the runs if they are to be cut: the
     /// header, what was noticed, and the tables unless they mix the rows of several runs.
     pub(super) fn survey(opened: Opened, marked: bool) -> Result<(Dataset, Vec<Warning>, Option<Self>), DatasetError> {
-        let Opened { mut dataset, manifest_file, run_lines, mut odometry, truths, index, warnings } = opened;
+        let Opened { mut dataset, manifest_file, run_lines, corrections, mut odometry, truths, index, warnings } =
+            opened;
         let odometry_rows = odometry.survey(&index, marked)?;
         let mut surveyed = Vec::with_capacity(truths.len());
         for mut truth in truths {
@@ -35,8 +38,12 @@ impl Grouped {
         }
         let infos = std::mem::take(&mut dataset.runs).into_iter().map(|run| run.info).collect();
         let points = PointIndex::new(&dataset.points);
-        let is_grouped = odometry_rows.is_grouped && surveyed.iter().all(|(_, rows)| rows.is_grouped);
-        let grouped = Self { manifest_file, infos, run_lines, odometry, odometry_rows, truths: surveyed, points };
+        // Marks are of times as they stand in the files.
+        let is_grouped = (corrections.is_none() || !marked)
+            && odometry_rows.is_grouped
+            && surveyed.iter().all(|(_, rows)| rows.is_grouped);
+        let grouped =
+            Self { manifest_file, infos, run_lines, corrections, odometry, odometry_rows, truths: surveyed, points };
         Ok((dataset, warnings, is_grouped.then_some(grouped)))
     }
 
@@ -73,7 +80,9 @@ impl Grouped {
             truth.read_run(number, rows, &self.points, &mut run)?;
         }
         if has_truth(&run) {
-            return Ok(unwrapped(run, robot));
+            let mut run = unwrapped(run, robot);
+            self.corrections.apply(&mut run);
+            return Ok(run);
         }
         let tables: Vec<_> = self.truths.iter().map(|(truth, _)| truth.name()).collect();
         Err(without_truth(self.manifest_file.clone(), self.run_lines[number], &run, &tables))

@@ -9,6 +9,7 @@ use kinematics::Point;
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
+use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
@@ -45,6 +46,7 @@ struct ManifestToml {
     robot: Spanned<RobotToml>,
     #[serde(default)]
     truth: TruthToml,
+    corrections: Option<Spanned<Corrections>>,
     #[serde(default)]
     run: Vec<Spanned<RunToml>>,
     #[serde(default)]
@@ -87,6 +89,7 @@ pub(crate) struct Manifest {
     /// Where `[robot]` stands.
     pub(crate) robot_line: u64,
     pub(crate) truth_noise: TruthNoise,
+    pub(crate) corrections: Corrections,
     pub(crate) points: Vec<MarkedPoint>,
     pub(crate) runs: Vec<RunInfo>,
     /// Where each `[[run]]` stands.
@@ -151,6 +154,7 @@ impl Source<'_> {
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,
             sigma_theta_rad: self.sigma("sigma_theta_rad", toml.truth.sigma_theta_rad)?,
         };
+        let corrections = toml.corrections.map_or(Ok(Corrections::default()), |found| self.corrections(found))?;
         if toml.run.is_empty() {
             return Err(self.error(&(0..0), "no [[run]]; expected one for every run of the tables".to_owned()));
         }
@@ -171,7 +175,7 @@ impl Source<'_> {
             points.push(MarkedPoint { id: id.into_inner(), body });
         }
         let provenance = Provenance { name: toml.name, licence: toml.licence, source: toml.source, notes: toml.notes };
-        Ok(Manifest { provenance, robot, robot_line, truth_noise, points, runs, run_lines })
+        Ok(Manifest { provenance, robot, robot_line, truth_noise, corrections, points, runs, run_lines })
     }
 
     /// A later format may have other keys: its number is the better reason then.
@@ -226,6 +230,21 @@ impl Source<'_> {
             ticks_per_rev: robot.ticks_per_rev.map(|ticks| self.positive("ticks_per_rev", &ticks)).transpose()?,
             counter_bits,
         })
+    }
+
+    /// Corrections whose factors are factors.
+    fn corrections(&self, found: Spanned<Corrections>) -> Result<Corrections, DatasetError> {
+        let span = found.span();
+        let corrections = found.into_inner();
+        for (key, factor) in [
+            ("time_factor", corrections.time_factor),
+            ("truth_time_factor", corrections.truth_time_factor),
+            ("truth_length_factor", corrections.truth_length_factor),
+        ] {
+            self.positive(key, &Spanned::new(span.clone(), factor))?;
+        }
+        self.finite("truth_shift_s", &Spanned::new(span, corrections.truth_shift_s))?;
+        Ok(corrections)
     }
 
     fn run(&self, run: &Spanned<RunToml>) -> Result<(RunInfo, Range<usize>), DatasetError> {

@@ -11,6 +11,7 @@ mod truth;
 
 use std::path::{Path, PathBuf};
 
+use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{Dataset, Run};
@@ -52,7 +53,7 @@ pub struct Loaded {
 /// # Errors
 /// [`DatasetError`] with file, line and column of the first fault; see there.
 pub fn read(dir: &Path) -> Result<Loaded, DatasetError> {
-    let Opened { dataset: mut header, manifest_file, run_lines, odometry, truths, index, mut warnings } =
+    let Opened { dataset: mut header, manifest_file, run_lines, corrections, odometry, truths, index, mut warnings } =
         Opened::open(dir)?;
     let runs = &mut header.runs;
     odometry.read(&index, runs)?;
@@ -67,6 +68,7 @@ pub fn read(dir: &Path) -> Result<Loaded, DatasetError> {
     if let Some((run, line)) = runs.iter().zip(run_lines).find(|(run, _)| !has_truth(run)) {
         return Err(without_truth(manifest_file, line, run, &tables));
     }
+    header.runs.iter_mut().for_each(|run| corrections.apply(run));
     warnings.extend(counter::wrap_warnings(&header));
     Ok(Loaded { dataset: header, warnings })
 }
@@ -84,6 +86,7 @@ struct Opened {
     manifest_file: PathBuf,
     /// Where the manifest speaks of each run.
     run_lines: Vec<u64>,
+    corrections: Corrections,
     odometry: OdometryTable,
     truths: Vec<TruthTable>,
     index: RunIndex,
@@ -97,7 +100,7 @@ impl Opened {
             return Err(DatasetError::NotAFolder { path: dir.to_owned(), expected });
         }
         let manifest_file = dir.join(MANIFEST);
-        let Manifest { provenance, robot, robot_line, truth_noise, points, runs: infos, run_lines } =
+        let Manifest { provenance, robot, robot_line, truth_noise, corrections, points, runs: infos, run_lines } =
             Manifest::read(&manifest_file)?;
 
         let mut warnings = Vec::new();
@@ -123,7 +126,7 @@ impl Opened {
         let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
         let runs = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();
         let dataset = Dataset { provenance, robot, truth_noise, points, runs };
-        Ok(Self { dataset, manifest_file, run_lines, odometry, truths, index, warnings })
+        Ok(Self { dataset, manifest_file, run_lines, corrections, odometry, truths, index, warnings })
     }
 }
 

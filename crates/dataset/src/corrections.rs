@@ -1,0 +1,190 @@
+//! What is wrong with a dataset's records as they stand in its files, and undone as they are read: the table
+//! `[corrections]` of `dataset.toml`, whose keys `yair check` names.
+
+use kinematics::Wheels;
+use serde::Deserialize;
+
+use crate::record::{Run, TruthSample, WheelLog};
+
+/// Corrections of all runs; none by default.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Corrections {
+    /// Factor of all times.
+    pub(crate) time_factor: f64,
+    /// Factor of the instrument's times.
+    pub(crate) truth_time_factor: f64,
+    /// Added to the instrument's times, seconds, after the factors.
+    pub(crate) truth_shift_s: f64,
+    /// Factor of the instrument's lengths.
+    pub(crate) truth_length_factor: f64,
+    heading_in_degrees: bool,
+    heading_clockwise: bool,
+    exchange_axes: bool,
+    mirror_x: bool,
+    mirror_y: bool,
+    /// y and the heading change their signs.
+    mirror_truth: bool,
+    exchange_wheels: bool,
+    reverse_left_wheel: bool,
+    reverse_right_wheel: bool,
+    /// Rates are of a row's instant, not of the interval that ends there.
+    instant_rates: bool,
+}
+
+impl Default for Corrections {
+    fn default() -> Self {
+        Self {
+            time_factor: 1.0,
+            truth_time_factor: 1.0,
+            truth_shift_s: 0.0,
+            truth_length_factor: 1.0,
+            heading_in_degrees: false,
+            heading_clockwise: false,
+            exchange_axes: false,
+            mirror_x: false,
+            mirror_y: false,
+            mirror_truth: false,
+            exchange_wheels: false,
+            reverse_left_wheel: false,
+            reverse_right_wheel: false,
+            instant_rates: false,
+        }
+    }
+}
+
+impl Corrections {
+    /// Whether records stay as they are.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Corrects a run that was read.
+    pub(crate) fn apply(&self, run: &mut Run) {
+        if self.is_none() {
+            return;
+        }
+        run.odometry.t_s.iter_mut().for_each(|t_s| *t_s *= self.time_factor);
+        self.wheels(&run.odometry.t_s, &mut run.odometry.wheels);
+        let time = |t_s: f64| t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s;
+        let length = |length_m: f64| length_m * self.truth_length_factor;
+        let turn = |turn: f64| {
+            let turn_rad = if self.heading_in_degrees { turn.to_radians() } else { turn };
+            if self.heading_clockwise != self.mirror_truth { -turn_rad } else { turn_rad }
+        };
+        let place = |x: f64, y: f64| {
+            let (x, y) = if self.exchange_axes { (y, x) } else { (x, y) };
+            let y_is_mirrored = self.mirror_y != self.mirror_truth;
+            (length(if self.mirror_x { -x } else { x }), length(if y_is_mirrored { -y } else { y }))
+        };
+        for sample in &mut run.truth {
+            let (x_m, y_m) = place(sample.x_m, sample.y_m);
+            *sample = TruthSample::new(time(sample.t_s), x_m, y_m, sample.theta_rad().map(turn));
+        }
+        for displacement in &mut run.displacements {
+            (displacement.t0_s, displacement.t1_s) = (time(displacement.t0_s), time(displacement.t1_s));
+            (displacement.dx_m, displacement.dy_m) = place(displacement.dx_m, displacement.dy_m);
+            displacement.dtheta_rad = turn(displacement.dtheta_rad);
+        }
+        for reading in &mut run.point_readings {
+            reading.t_s = time(reading.t_s);
+            (reading.room.x_m, reading.room.y_m) = place(reading.room.x_m, reading.room.y_m);
+        }
+        run.wheel_reference.iter_mut().for_each(|speed| speed.t_s = time(speed.t_s));
+    }
+
+    fn wheels(&self, t_s: &[f64], wheels: &mut WheelLog) {
+        match wheels {
+            WheelLog::Ticks(ticks) => self.columns(ticks, i64::wrapping_neg),
+            WheelLog::Angles(angles) => self.columns(angles, |angle| -angle),
+            WheelLog::Speeds(speeds) => {
+                self.columns(speeds, |speed| -speed);
+                self.over_intervals(t_s, [&mut speeds.left, &mut speeds.right]);
+            }
+            WheelLog::Twist { v_mps, omega_radps } => {
+                if self.exchange_wheels {
+                    omega_radps.iter_mut().for_each(|omega| *omega = -*omega);
+                }
+                self.over_intervals(t_s, [v_mps, omega_radps]);
+            }
+        }
+    }
+
+    /// Rates of the instant as those of the interval that ends there: the mean of both ends.
+    fn over_intervals(&self, t_s: &[f64], columns: [&mut Vec<f64>; 2]) {
+        if !self.instant_rates || t_s.len() < 2 {
+            return;
+        }
+        for rates in columns {
+            for row in (1..rates.len()).rev() {
+                rates[row] = 0.5 * (rates[row] + rates[row - 1]);
+            }
+        }
+    }
+
+    fn columns<T: Copy>(&self, columns: &mut Wheels<Vec<T>>, reversed: impl Fn(T) -> T) {
+        if self.reverse_left_wheel {
+            columns.left.iter_mut().for_each(|value| *value = reversed(*value));
+        }
+        if self.reverse_right_wheel {
+            columns.right.iter_mut().for_each(|value| *value = reversed(*value));
+        }
+        if self.exchange_wheels {
+            std::mem::swap(&mut columns.left, &mut columns.right);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Odometry;
+
+    fn run() -> Run {
+        Run {
+            odometry: Odometry {
+                t_s: vec![0.0, 1000.0],
+                wheels: WheelLog::Ticks(Wheels { left: vec![0, 7], right: vec![0, -9] }),
+                ..Odometry::default()
+            },
+            truth: vec![TruthSample::new(500.0, 1000.0, 2000.0, Some(90.0))],
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn records_in_other_units_and_on_other_sides_are_those_of_the_format() {
+        let corrections = Corrections {
+            time_factor: 1e-3,
+            truth_shift_s: -0.25,
+            truth_length_factor: 1e-3,
+            heading_in_degrees: true,
+            mirror_truth: true,
+            exchange_wheels: true,
+            reverse_right_wheel: true,
+            ..Corrections::default()
+        };
+        let mut run = run();
+        corrections.apply(&mut run);
+        assert_eq!(run.odometry.t_s, [0.0, 1.0]);
+        // The column called right is reversed, and is the left wheel's.
+        assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: vec![0, 9], right: vec![0, 7] }));
+        let quarter_rad = std::f64::consts::FRAC_PI_2;
+        assert_eq!(run.truth, [TruthSample::new(0.25, 1.0, -2.0, Some(-quarter_rad))]);
+    }
+
+    #[test]
+    fn rates_of_the_instant_become_those_of_the_interval_that_ends_there() {
+        let mut run = run();
+        run.odometry.wheels = WheelLog::Twist { v_mps: vec![1.0, 3.0], omega_radps: vec![0.0, 0.5] };
+        Corrections { instant_rates: true, ..Corrections::default() }.apply(&mut run);
+        assert_eq!(run.odometry.wheels, WheelLog::Twist { v_mps: vec![1.0, 2.0], omega_radps: vec![0.0, 0.25] });
+    }
+
+    #[test]
+    fn no_correction_changes_nothing() {
+        let mut same = run();
+        Corrections::default().apply(&mut same);
+        assert_eq!(same, run());
+    }
+}

@@ -1,0 +1,65 @@
+//! Checks of a log before anything is fitted: what is wrong with it, or would make a calibration wrong, and
+//! what mends it.
+//!
+//! The motion of the robot in short windows by its wheels is compared with that by the instrument. A
+//! regression of one on the other needs no nominal value: its residual says whether clocks, headings and axes
+//! are right, its four coefficients say which wheel is which, which way it counts and in which unit. A fault
+//! is said where the records with it undone fit decisively better, and where a check cannot be made it is
+//! silent.
+
+mod alignment;
+mod geometry_estimate;
+mod kind;
+mod problem;
+mod problems;
+mod regression;
+mod run_log;
+mod session_check;
+mod settings;
+mod stages;
+mod text;
+mod windows;
+
+use std::collections::BTreeMap;
+
+use dataset::Dataset;
+
+pub use problem::{Problem, Severity};
+use session_check::SessionCheck;
+
+/// What was found of one robot's datasets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preflight {
+    /// The worst first.
+    pub problems: Vec<Problem>,
+    /// Which parameters of the drive these runs determine.
+    pub determined: BTreeMap<&'static str, bool>,
+}
+
+impl Preflight {
+    /// Whether no problem is an error.
+    #[must_use]
+    pub fn is_ok(&self) -> bool {
+        self.problems.iter().all(|problem| problem.severity != Severity::Error)
+    }
+}
+
+/// Checks one robot's sessions.
+#[must_use]
+pub fn check(datasets: &[Dataset]) -> Preflight {
+    let sessions: Vec<SessionCheck> = datasets.iter().map(stages::checked).collect();
+    let mut problems: Vec<Problem> = problems::several_robots::found(&sessions).into_iter().collect();
+    for session in &sessions {
+        for problem in &session.problems {
+            // The same of several sessions is said once.
+            let mut problem = problem.clone();
+            if sessions.len() > 1 && problem.runs.is_none() {
+                problem.sentence = format!("{}: {}", session.name, problem.sentence);
+            }
+            problems.push(problem);
+        }
+    }
+    let determined = problems::coverage::determined(&sessions, &mut problems);
+    problems.sort_by_key(|problem| problem.severity);
+    Preflight { problems, determined }
+}

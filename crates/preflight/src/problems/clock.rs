@@ -1,0 +1,171 @@
+//! Clocks that are apart or run at different rates, and headings or axes that are read wrongly: what the
+//! wheels explain decisively better once it is undone.
+//! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
+
+use crate::alignment::{BestClock, Clock, Comparison, Explained};
+use crate::kind::{Kind, MirroredAxis};
+use crate::problem::{Problem, Severity, probability};
+use crate::session_check::{Matched, SessionCheck};
+use crate::settings::{
+    DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_UNEXPLAINED, MAX_WINDOWS, MIN_CLOCK_OFFSET_S,
+    MIN_CLOCK_RATE, MIN_GAIN, MIN_WARNED_OFFSET_S, MIN_WINDOWS, UNRELATED,
+};
+use crate::windows::{Measured, Reading, windows};
+
+/// Readings that are tried, the sound one first.
+const READINGS: [Reading; 4] = [
+    Reading::AS_IS,
+    Reading { degrees: true, clockwise: false },
+    Reading { degrees: false, clockwise: true },
+    Reading { degrees: true, clockwise: true },
+];
+
+/// The reading and the clock by which log and instrument go together; `None` where too few windows tell.
+pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
+    let as_is = check.explained(Reading::AS_IS, Clock::default());
+    let (reading, explained) = best_reading(check, as_is);
+    let best = best_clock(check, reading, explained);
+    let (reading, best) = match best {
+        // Both may be wrong at once.
+        Some(best) if best.explained.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED) => (reading, Some(best)),
+        _ => READINGS
+            .iter()
+            .filter_map(|reading| Some((*reading, best_clock(check, *reading, None)?)))
+            .min_by(|a, b| a.1.explained.cost.total_cmp(&b.1.explained.cost))
+            .map_or((reading, best), |(reading, best)| (reading, Some(best))),
+    };
+    let best = best?;
+    let found = best.explained;
+    let positions = check.measures_positions();
+    if !positions && found.unexplained.iter().all(|share| *share > UNRELATED) {
+        if found.windows > 4.0 * MIN_WINDOWS as f64 {
+            let unexplained = found.unexplained[1].min(1.0);
+            check.problems.push(Problem::new(&Kind::TruthUnrelated { unexplained }, Severity::Error, None, 0.9));
+        }
+        return None;
+    }
+    let clock = said_clock(check, reading, as_is, best);
+    let matched = check.matched_at(reading, clock)?;
+    say_reading(check, &matched, as_is);
+    Some(matched)
+}
+
+/// Says a rate and an offset that matter; the clock with them.
+fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
+    let rated = rate(check, reading, best.clock);
+    if let Some((clock, gain)) = rated {
+        let severity = if clock.rate.abs() > MAX_CLOCK_RATE { Severity::Error } else { Severity::Warning };
+        check.problems.push(Problem::new(&Kind::ClockRate { rate: clock.rate }, severity, None, probability(gain)));
+        // What is left at the start of the records.
+        if clock.offset_s.abs() < 2.0 * MIN_WARNED_OFFSET_S {
+            return clock;
+        }
+    }
+    let clock = rated.map_or(best.clock, |(clock, _)| clock);
+    match offset_gain(check, reading, as_is, clock, best.sigma_s) {
+        Some(gain) => {
+            let offset_s = clock.offset_s / (1.0 + clock.rate);
+            let severity = match offset_s.abs() {
+                large if large > MAX_FITTED_OFFSET_S => Severity::Error,
+                some if some > MIN_WARNED_OFFSET_S => Severity::Warning,
+                _ => Severity::Hint,
+            };
+            let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
+            check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
+            clock
+        }
+        None => rated.map_or(Clock::default(), |(clock, _)| clock),
+    }
+}
+
+/// The reading that the wheels explain decisively better than the sound one.
+fn best_reading(check: &SessionCheck, as_is: Option<Explained>) -> (Reading, Option<Explained>) {
+    let Some(sound) = as_is else { return (Reading::AS_IS, None) };
+    let better = READINGS[1..].iter().filter_map(|reading| {
+        let found = check.explained(*reading, Clock::default())?;
+        is_decisive(&found, &sound).then_some((*reading, found))
+    });
+    better
+        .min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+        .map_or((Reading::AS_IS, as_is), |(reading, found)| (reading, Some(found)))
+}
+
+fn is_decisive(found: &Explained, sound: &Explained) -> bool {
+    found.gain_over(sound) > MIN_GAIN
+        && found.ratio_to(sound) < DECISIVE_RATIO
+        && found.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED)
+}
+
+/// The best clock near the stated one, or anywhere if none is good there.
+fn best_clock(check: &SessionCheck, reading: Reading, now: Option<Explained>) -> Option<BestClock> {
+    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 4);
+    if windows.len() < MIN_WINDOWS {
+        return None;
+    }
+    let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
+    let is_good = |best: &BestClock| best.explained.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED);
+    let near = if now.is_some() { comparison.best_offset(false) } else { None };
+    match near.filter(is_good) {
+        Some(near) => Some(near),
+        None => comparison.best_offset(true),
+    }
+}
+
+/// What an offset gains, if it matters.
+fn offset_gain(
+    check: &SessionCheck,
+    reading: Reading,
+    as_is: Option<Explained>,
+    clock: Clock,
+    sigma_s: f64,
+) -> Option<f64> {
+    if clock.offset_s.abs() < MIN_CLOCK_OFFSET_S.max(4.0 * sigma_s) {
+        return None;
+    }
+    let now = if reading == Reading::AS_IS { as_is } else { check.explained(reading, Clock::default()) };
+    let with = check.explained(reading, clock)?;
+    let Some(now) = now else { return Some(f64::INFINITY) };
+    let gain = with.gain_over(&now);
+    (gain > MIN_GAIN && with.ratio_to(&now) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some(gain)
+}
+
+/// A rate that matters, with what it gains.
+fn rate(check: &SessionCheck, reading: Reading, near: Clock) -> Option<(Clock, f64)> {
+    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 2);
+    let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
+    let still = comparison.at(near)?;
+    let (rated, found) = comparison.best_rate(near)?;
+    let gain = found.gain_over(&still);
+    let matters = rated.rate.abs() > MIN_CLOCK_RATE && gain > MIN_GAIN;
+    (matters && found.ratio_to(&still) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some((rated, gain))
+}
+
+/// Says how the instrument's records are to be read.
+fn say_reading(check: &mut SessionCheck, matched: &Matched, as_is: Option<Explained>) {
+    let gain = as_is.map_or(MIN_GAIN, |sound| matched.explained.gain_over(&sound));
+    if matched.measured == Measured::Positions || matched.reading == Reading::AS_IS {
+        return;
+    }
+    let mut say = |kind: &Kind| check.problems.push(Problem::new(kind, Severity::Error, None, probability(gain)));
+    if matched.reading.degrees {
+        say(&Kind::HeadingInDegrees);
+    }
+    if matched.reading.clockwise {
+        let mirrored = matched.geometry.filter(|found| {
+            let sign = found.m_per_rad.left.signum() * found.separation_m.signum();
+            sign < 0.0 && found.m_per_rad.left * found.m_per_rad.right > 0.0
+        });
+        match mirrored {
+            None => say(&Kind::HeadingClockwise),
+            Some(found) => {
+                let (sin, cos) = found.sensor_rad.sin_cos();
+                let axis = match () {
+                    () if sin.abs() > cos.abs() => MirroredAxis::Exchanged,
+                    () if found.m_per_rad.left < 0.0 => MirroredAxis::X,
+                    () => MirroredAxis::Y,
+                };
+                say(&Kind::AxesMirrored { axis });
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! What was driven: whether it is enough, goes both ways round, and determines the drive's parameters.
+//!
+//! The information of windows of displacement and turn about the logarithms of both wheels and of the
+//! separation, with the windows' own residuals for noise; of runs seen at a few instants, by dead reckoning
+//! with each parameter changed.
+
+use std::collections::BTreeMap;
+
+use kinematics::{DriveGeometry, Pose, Rule, Wheels};
+
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
+use crate::run_log::RunLog;
+use crate::session_check::SessionCheck;
+use crate::settings::{DETERMINED_SIGMA, INSTANTS, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::windows::Measured;
+
+const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
+
+/// Information about the logarithms of left, right and separation.
+type Information = [[f64; 3]; 3];
+
+pub(crate) fn found(check: &mut SessionCheck) {
+    let turning = check.turning();
+    let m_per_rad = check.m_per_rad();
+    let distance_m = 0.5 * (turning.left * m_per_rad.left + turning.right * m_per_rad.right);
+    let off = check.problems.iter().any(|problem| problem.severity == Severity::Error);
+    if !off && distance_m < MIN_DISTANCE_M * check.robot.left_wheel_diameter_m.min(0.15) / 0.15 {
+        check.problems.push(Problem::new(&Kind::TooShort { distance_m }, Severity::Warning, None, 0.9));
+    }
+    let (mut left_rad, mut right_rad) = (0.0, 0.0);
+    let mut whole_turns = true;
+    for run in &check.runs {
+        let travel_m =
+            Wheels { left: net(&run.wheels.left) * m_per_rad.left, right: net(&run.wheels.right) * m_per_rad.right };
+        let turned_rad = (travel_m.right - travel_m.left) / check.robot.wheel_separation_m;
+        whole_turns &= turned_rad.abs() > 0.5 * MIN_TURNING_RAD || run.protocol == Some(dataset::Protocol::Straight);
+        if turned_rad > 0.0 { left_rad += turned_rad } else { right_rad -= turned_rad }
+    }
+    let all_rad = left_rad + right_rad;
+    if !off && whole_turns && all_rad > MIN_TURNING_RAD && left_rad.max(right_rad) > ONE_WAY * all_rad {
+        let kind = Kind::OneWayTurns { left: left_rad > right_rad };
+        check.problems.push(Problem::new(&kind, Severity::Hint, None, 0.9));
+    }
+}
+
+fn net(angles: &[f64]) -> f64 {
+    angles.last().zip(angles.first()).map_or(0.0, |(last, first)| last - first)
+}
+
+/// Which parameters the sessions determine together; what they do not is a problem.
+pub(crate) fn determined(sessions: &[SessionCheck], problems: &mut Vec<Problem>) -> BTreeMap<&'static str, bool> {
+    let mut information = [[0.0; 3]; 3];
+    let (mut distance, mut turn) = (0.0, 0.0);
+    for session in sessions {
+        add(&mut information, session, &mut distance, &mut turn);
+    }
+    let sigma = sigmas(&information);
+    let determined: BTreeMap<&'static str, bool> =
+        PARAMETERS.iter().zip(sigma).map(|(name, sigma)| (*name, sigma < DETERMINED_SIGMA)).collect();
+    let missing: Vec<&'static str> = PARAMETERS.into_iter().filter(|name| !determined[name]).collect();
+    let is_wrong = problems.iter().any(|problem| problem.severity == Severity::Error);
+    if !missing.is_empty() && !is_wrong {
+        let kind = Kind::NotDetermined { parameters: missing, turns: turn > distance };
+        problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
+    }
+    determined
+}
+
+/// Relative standard deviations, infinite along what nothing is known of.
+fn sigmas(information: &Information) -> [f64; 3] {
+    // A ridge of a standard deviation of 100 per cent each.
+    let mut rows = [[0.0; 6]; 3];
+    for (row, line) in rows.iter_mut().enumerate() {
+        line[..3].copy_from_slice(&information[row]);
+        line[row] += 1.0;
+        line[3 + row] = 1.0;
+    }
+    for pivot in 0..3 {
+        let scale = rows[pivot][pivot];
+        rows[pivot].iter_mut().for_each(|value| *value /= scale);
+        for row in (0..3).filter(|row| *row != pivot) {
+            let factor = rows[row][pivot];
+            let source = rows[pivot];
+            rows[row].iter_mut().zip(source).for_each(|(value, of)| *value -= factor * of);
+        }
+    }
+    [0, 1, 2].map(|row| rows[row][3 + row].sqrt())
+}
+
+fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64, turn: &mut f64) {
+    let mut row = |gradient: [f64; 3], sigma: f64| {
+        for (a, line) in information.iter_mut().enumerate() {
+            for (b, cell) in line.iter_mut().enumerate() {
+                *cell += gradient[a] * gradient[b] / (sigma * sigma);
+            }
+        }
+    };
+    let m_per_rad = session.m_per_rad();
+    let separation_m = session.robot.wheel_separation_m;
+    if let Some(matched) = session.matched.as_ref().filter(|matched| matched.measured == Measured::Poses) {
+        // Mean absolute residuals of displacement and turn, for noise of independent windows ten apart.
+        let (mut left, mut whole_m, mut whole_rad) = ([0.0, 0.0], 0.0, 0.0);
+        for pair in &matched.pairs {
+            whole_m += pair.window.ahead_m.hypot(pair.window.left_m);
+            whole_rad += pair.turned.map_or(0.0, |turned| turned.1.abs());
+        }
+        let count = matched.pairs.len() as f64;
+        left[0] = matched.explained.unexplained[1] * whole_m / count;
+        left[1] = matched.explained.unexplained[0] * whole_rad / count;
+        let sigma = left.map(|left| 1.25 * 10.0_f64.sqrt() * left.max(1e-6));
+        for pair in &matched.pairs {
+            let travel_m = pair.moved.zip_with(m_per_rad, |rad, m| rad * m);
+            row([0.5 * travel_m.left, 0.5 * travel_m.right, 0.0], sigma[0]);
+            *distance += 0.5 * (travel_m.left + travel_m.right).abs();
+            if let Some((turned, _)) = pair.turned {
+                let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
+                let turn_rad = (travel_m.right - travel_m.left) / separation_m;
+                row([-travel_m.left / separation_m, travel_m.right / separation_m, -turn_rad], sigma[1]);
+                *turn += separation_m * turn_rad.abs();
+            }
+        }
+    }
+    let has_windows = session.matched.as_ref().is_some_and(|matched| matched.measured == Measured::Poses);
+    let Ok(geometry) = session.robot.geometry() else { return };
+    for run in &session.runs {
+        add_ends(run, &geometry, &mut row);
+        if !has_windows {
+            let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
+            *distance += 0.5 * (turned.left + turned.right);
+        }
+    }
+}
+
+/// What a run's poses or positions tell, seen from the first.
+fn add_ends(run: &RunLog, geometry: &DriveGeometry, row: &mut impl FnMut([f64; 3], f64)) {
+    let Some((first, last)) = run.truth.first().zip(run.truth.last()) else { return };
+    if last.t_s <= first.t_s {
+        return;
+    }
+    let count = INSTANTS.min(run.truth.len() - 1);
+    let instants_s: Vec<f64> =
+        (1..=count).map(|k| first.t_s + (last.t_s - first.t_s) * k as f64 / count as f64).collect();
+    let path = |factors: [f64; 3]| {
+        let m_per_rad = geometry.m_per_rad();
+        let m_per_count = Wheels { left: factors[0] * m_per_rad.left, right: factors[1] * m_per_rad.right };
+        let wheel_separation_m = factors[2] * geometry.wheel_separation_m();
+        let reckoner = kinematics::Odometry { m_per_count, wheel_separation_m, rule: Rule::Midpoint };
+        let columns = Wheels { left: &run.wheels.left[..], right: &run.wheels.right[..] };
+        let mut poses = vec![Pose::IDENTITY; count];
+        let mut times = run.t_s.iter();
+        reckoner.for_each_pose(Pose::IDENTITY, columns, |pose| {
+            let Some(t_s) = times.next() else { return };
+            for (at, _) in poses.iter_mut().zip(&instants_s).filter(|(_, instant_s)| t_s <= *instant_s) {
+                *at = pose;
+            }
+        });
+        poses
+    };
+    let base = path([1.0; 3]);
+    let step = 1e-4;
+    let moved = [0, 1, 2].map(|parameter| {
+        let mut factors = [1.0; 3];
+        factors[parameter] += step;
+        path(factors)
+    });
+    let has_headings = first.theta_rad().is_some() && last.theta_rad().is_some();
+    for (at, base) in base.iter().enumerate() {
+        let of = |value: fn(&Pose) -> f64| {
+            let slope = |parameter: usize| (value(&moved[parameter][at]) - value(base)) / step;
+            [slope(0), slope(1), slope(2)]
+        };
+        // Instruments read an end to some millimetres, and wheels err by some millimetres on the way.
+        row(of(|pose| pose.x_m), 5e-3);
+        row(of(|pose| pose.y_m), 5e-3);
+        if has_headings {
+            row(of(|pose| pose.theta_rad), 1e-2);
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Times in milliseconds: of all tables, or of one. The checks that follow have seconds.
+
+use crate::kind::Kind;
+use crate::problem::{Problem, Severity};
+use crate::run_log::RunLog;
+use crate::session_check::SessionCheck;
+use crate::settings::{CLOCK_UNIT_RATIO, MAX_ROW_S, MIN_ROWS, MIN_SPEED_M_S};
+
+pub(crate) fn found(check: &mut SessionCheck) {
+    let mut ratios: Vec<f64> = check.runs.iter().filter_map(spans).collect();
+    ratios.sort_by(f64::total_cmp);
+    if let Some(ratio) = ratios.get(ratios.len() / 2) {
+        let [low, high] = CLOCK_UNIT_RATIO;
+        let factor = if (low..=high).contains(ratio) {
+            Some(1e-3)
+        } else if (low..=high).contains(&ratio.recip()) {
+            Some(1e3)
+        } else {
+            None
+        };
+        if let Some(factor) = factor {
+            let kind = Kind::TruthTimeUnit { factor };
+            check.problems.push(Problem::new(&kind, Severity::Error, None, 0.99));
+            for run in &mut check.runs {
+                if factor < 1.0 {
+                    run.scale_truth_time(factor);
+                } else {
+                    run.scale_time(1e-3);
+                    run.scale_truth_time(1e3);
+                }
+            }
+        }
+    }
+    let mut rows: Vec<f64> = check.runs.iter().filter_map(median_row_s).collect();
+    rows.sort_by(f64::total_cmp);
+    let Some(&row) = rows.get(rows.len() / 2) else { return };
+    let m_per_rad = check.m_per_rad().left.max(check.m_per_rad().right);
+    let fastest_m_s = check.runs.iter().map(fastest_rad_s).fold(0.0, f64::max) * m_per_rad;
+    if row > MAX_ROW_S && fastest_m_s < MIN_SPEED_M_S && fastest_m_s > 0.0 {
+        check.problems.push(Problem::new(&Kind::TimeInMilliseconds { row }, Severity::Error, None, 0.99));
+        check.runs.iter_mut().for_each(|run| run.scale_time(1e-3));
+    }
+}
+
+/// What the instrument's records span over what the log spans.
+fn spans(run: &RunLog) -> Option<f64> {
+    let log_s = run.t_s.last()? - run.t_s.first()?;
+    let truth_s = match (run.truth.first(), run.displacements.first()) {
+        (Some(first), _) => run.truth.last()?.t_s - first.t_s,
+        (None, Some(first)) => run.displacements.last()?.t1_s - first.t0_s,
+        (None, None) => return None,
+    };
+    (log_s > 0.0
+        && truth_s > 0.0
+        && run.t_s.len() >= MIN_ROWS
+        && run.truth.len().max(run.displacements.len()) >= MIN_ROWS)
+        .then(|| truth_s / log_s)
+}
+
+pub(super) fn median_row_s(run: &RunLog) -> Option<f64> {
+    let mut rows: Vec<f64> = run.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    rows.sort_by(f64::total_cmp);
+    (run.t_s.len() >= MIN_ROWS).then(|| rows[rows.len() / 2])
+}
+
+fn fastest_rad_s(run: &RunLog) -> f64 {
+    let rates = |angles: &Vec<f64>| {
+        let mut rates: Vec<f64> =
+            angles.windows(2).zip(run.t_s.windows(2)).map(|(a, t)| (a[1] - a[0]).abs() / (t[1] - t[0])).collect();
+        rates.sort_by(f64::total_cmp);
+        rates.get(rates.len() * 19 / 20).copied().unwrap_or(0.0)
+    };
+    rates(&run.wheels.left).max(rates(&run.wheels.right))
+}

@@ -1,0 +1,130 @@
+//! A run as the checks see it: wheel angles over time without impossible rows, and what the instrument saw.
+
+use dataset::{Displacement, NominalRobot, Protocol, RunView, TruthSample, WheelLog};
+use kinematics::{Side, Wheels};
+
+/// A run's records in one form.
+#[derive(Debug, Clone)]
+pub(crate) struct RunLog {
+    pub(crate) id: String,
+    pub(crate) protocol: Option<Protocol>,
+    pub(crate) turn_rad: Option<f64>,
+    pub(crate) continuous: bool,
+    pub(crate) t_s: Vec<f64>,
+    /// Radians by the stated ticks of a turn.
+    pub(crate) wheels: Wheels<Vec<f64>>,
+    /// Radians of a count; 0 where wheels are not counted.
+    pub(crate) count_rad: f64,
+    /// A robot that reports only speeds or its twist.
+    pub(crate) has_rates: bool,
+    /// Poses or positions.
+    pub(crate) truth: Vec<TruthSample>,
+    pub(crate) displacements: Vec<Displacement>,
+}
+
+impl RunLog {
+    /// A run's records; `None` where the log has no row or the wheels have no angle.
+    pub(crate) fn of(run: &RunView<'_>, robot: &NominalRobot) -> Option<Self> {
+        let odometry = run.odometry();
+        let (wheels, count_rad) = match &odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let count_rad = std::f64::consts::TAU / robot.ticks_per_rev?;
+                let angles = ticks.as_ref().map(|ticks| ticks.iter().map(|count| *count as f64 * count_rad).collect());
+                (angles, count_rad)
+            }
+            WheelLog::Angles(angles) => (angles.clone(), 0.0),
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => (rolled(&odometry.t_s, run, robot, false)?, 0.0),
+        };
+        if odometry.t_s.is_empty() {
+            return None;
+        }
+        let mut truth = run.run().truth.clone();
+        if truth.is_empty() {
+            let sample =
+                |(t_s, pose): (f64, kinematics::Pose)| TruthSample::new(t_s, pose.x_m, pose.y_m, Some(pose.theta_rad));
+            truth = run.observed_poses().into_iter().map(sample).collect();
+        }
+        Some(Self {
+            id: run.info().id.clone(),
+            protocol: run.info().protocol,
+            turn_rad: run.info().settings.turn_rad,
+            continuous: run.info().continuous,
+            t_s: odometry.t_s.clone(),
+            wheels,
+            count_rad,
+            has_rates: matches!(odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }),
+            truth,
+            displacements: run.run().displacements.clone(),
+        })
+    }
+
+    /// The wheels' angles if rates are of the instant.
+    pub(crate) fn with_instant_rates(&self, run: &RunView<'_>, robot: &NominalRobot) -> Option<Self> {
+        self.has_rates.then_some(())?;
+        Some(Self { wheels: rolled(&self.t_s, run, robot, true)?, ..self.clone() })
+    }
+
+    /// All times by a factor.
+    pub(crate) fn scale_time(&mut self, factor: f64) {
+        self.t_s.iter_mut().for_each(|t_s| *t_s *= factor);
+        self.scale_truth_time(factor);
+    }
+
+    /// Times of the instrument by a factor.
+    pub(crate) fn scale_truth_time(&mut self, factor: f64) {
+        self.truth.iter_mut().for_each(|sample| sample.t_s *= factor);
+        for displacement in &mut self.displacements {
+            displacement.t0_s *= factor;
+            displacement.t1_s *= factor;
+        }
+    }
+
+    /// The wheels' angles at an instant; `None` beyond the log.
+    pub(crate) fn angles_at(&self, t_s: f64) -> Option<Wheels<f64>> {
+        let (first_s, last_s) = (*self.t_s.first()?, *self.t_s.last()?);
+        let slack_s = if self.t_s.len() > 1 { 0.5 * (last_s - first_s) / (self.t_s.len() - 1) as f64 } else { 0.0 };
+        if !(first_s - slack_s..=last_s + slack_s).contains(&t_s) {
+            return None;
+        }
+        if self.t_s.len() < 2 {
+            return Some(Wheels { left: self.wheels.left[0], right: self.wheels.right[0] });
+        }
+        let row = self.t_s.partition_point(|row_s| *row_s <= t_s).clamp(1, self.t_s.len() - 1) - 1;
+        let share = ((t_s - self.t_s[row]) / (self.t_s[row + 1] - self.t_s[row])).clamp(0.0, 1.0);
+        Some(Wheels::from_sides(|side: Side| {
+            let angles = &self.wheels[side];
+            angles[row] + share * (angles[row + 1] - angles[row])
+        }))
+    }
+
+    /// What the wheels turn by between two instants, radians.
+    pub(crate) fn turned(&self, from_s: f64, to_s: f64) -> Option<Wheels<f64>> {
+        Some(self.angles_at(to_s)?.zip_with(self.angles_at(from_s)?, |to, from| to - from))
+    }
+
+    /// Both wheels' turning without regard to its direction, radians.
+    pub(crate) fn turning(&self) -> Wheels<f64> {
+        self.wheels.as_ref().map(|angles| angles.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum())
+    }
+}
+
+/// Wheel angles by the nominal wheels from a log of speeds or twists.
+fn rolled(t_s: &[f64], run: &RunView<'_>, robot: &NominalRobot, of_instant: bool) -> Option<Wheels<Vec<f64>>> {
+    let m_per_rad = robot.geometry().ok()?.m_per_rad();
+    let rate = |row: usize| {
+        let speed_m_s = run.reported_speed_m_s(robot, row)?;
+        Some(speed_m_s.zip_with(m_per_rad, |speed, m_per_rad| speed / m_per_rad))
+    };
+    let mut angle = Wheels::both(0.0);
+    let mut angles = Wheels { left: Vec::with_capacity(t_s.len()), right: Vec::with_capacity(t_s.len()) };
+    for row in 0..t_s.len() {
+        if row > 0 {
+            let now = rate(row)?;
+            let mean = if of_instant { now.zip_with(rate(row - 1)?, |a, b| 0.5 * (a + b)) } else { now };
+            angle = angle.zip_with(mean, |angle, rate| angle + rate * (t_s[row] - t_s[row - 1]));
+        }
+        angles.left.push(angle.left);
+        angles.right.push(angle.right);
+    }
+    Some(angles)
+}

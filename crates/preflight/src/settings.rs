@@ -1,0 +1,234 @@
+//! Every threshold of the checks before a fit: unit, meaning and source.
+
+/// Seconds. Length of the windows whose motion by the wheels is compared with that of the instrument.
+/// Budgeted: a robot turns by less than a radian in it, and moves by many roundings of its counters.
+pub(crate) const WINDOW_S: f64 = 0.5;
+
+/// Seconds. Longest window: in a longer one, a robot may drive more than one arc.
+/// Budgeted: an instrument of 1 Hz is still compared.
+pub(crate) const MAX_WINDOW_S: f64 = 1.6;
+
+/// Windows of a session at the most.
+/// Budgeted: a session is checked in less than a tenth of a second.
+pub(crate) const MAX_WINDOWS: usize = 1600;
+
+/// Windows of a session at the least, for any verdict on what they say.
+/// Convention: twelve for each of the parameters of a window's motion, two a component.
+pub(crate) const MIN_WINDOWS: usize = 24;
+
+/// Radians. Largest turn of a window: beyond, chord and heading no longer follow from one arc.
+/// Derived: below half a turn by the errors of nominal values.
+pub(crate) const MAX_WINDOW_TURN_RAD: f64 = 2.0;
+
+/// Ratio to the 90th percentile. A window whose instrument moves farther is an outlier of the instrument's.
+/// Budgeted: robots drive at most a few times as fast as usual.
+pub(crate) const OUTLYING_MOTION_RATIO: f64 = 5.0;
+
+/// Residuals over their median absolute value, at which a window has half of its weight.
+/// Convention: Cauchy's weights, tuned to 95 % efficiency, 2.385 standard deviations of 1.48 medians.
+pub(crate) const CAUCHY_MEDIANS: f64 = 3.5;
+
+/// Passes of reweighted least squares.
+/// Budgeted: weights change by less than a per cent after ten.
+pub(crate) const ROBUST_PASSES: usize = 10;
+
+/// Groups of consecutive windows that the jackknife leaves out in turn.
+/// Convention: eight; standard deviations are then known to a quarter.
+pub(crate) const GROUPS: usize = 8;
+
+/// Instants of a run at which its position or pose tells of the drive's parameters.
+/// Budgeted: the sides of a square have two each.
+pub(crate) const INSTANTS: usize = 8;
+
+/// Ratio of the smaller to the larger eigenvalue of the wheels' second moments, below which their motions are
+/// all of one direction: straights alone, or spins alone.
+/// Budgeted: corrections of a heading while going straight are a hundredth of the motion, squared.
+pub(crate) const COLLINEAR_RATIO: f64 = 2e-3;
+
+/// Ratio of the unexplained motion with a correction of the records to that without it, at the most, for the
+/// correction to be believed.
+/// Budgeted: twice as good a fit is no chance; other causes change it by less.
+pub(crate) const DECISIVE_RATIO: f64 = 0.5;
+
+/// Nats. Log likelihood gained by a correction, at the least.
+/// Budgeted: odds of 1e13 before errors that are alike for seconds, which make ten windows one.
+pub(crate) const MIN_GAIN: f64 = 30.0;
+
+/// Nats. Logarithm of the odds of a sound log against one with a given fault, before any data.
+/// Convention: a fault in a thousand logs.
+pub(crate) const PRIOR_LOG_ODDS: f64 = 6.9;
+
+/// Largest share of the motion that is left unexplained by a correction that is believed.
+/// Budgeted: records that do not follow the robot leave all of it.
+pub(crate) const MAX_UNEXPLAINED: f64 = 0.6;
+
+/// Share of the motion that is left unexplained by records that have nothing to do with the robot.
+/// Budgeted: of independent motions a straight line explains 1/n.
+pub(crate) const UNRELATED: f64 = 0.95;
+
+/// Seconds. Farthest offset of the clocks that is looked for beside the one that lets the records overlap.
+/// Convention: clocks that nobody set are minutes apart.
+pub(crate) const MAX_CLOCK_OFFSET_S: f64 = 600.0;
+
+/// Seconds. Farthest offset that is looked for where the records explain each other without one.
+/// Budgeted: records that are farther apart do not explain each other.
+pub(crate) const MAX_NEAR_OFFSET_S: f64 = 5.0;
+
+/// Seconds. Steps of the search for an offset, from coarse to fine.
+/// Budgeted: the first is half of a window, so that none is passed over.
+pub(crate) const CLOCK_STEPS_S: [f64; 4] = [0.25, 0.05, 0.01, 0.002];
+
+/// Seconds. Offset of the clocks from which on it is said, as a hint.
+/// Convention: instruments are late by a frame.
+pub(crate) const MIN_CLOCK_OFFSET_S: f64 = 0.02;
+
+/// Seconds. Offset of the clocks from which on it is a warning; a smaller one is estimated as a latency.
+/// Convention: cameras and networks are late by less.
+pub(crate) const MIN_WARNED_OFFSET_S: f64 = 0.15;
+
+/// Seconds. Offset that no fit of a latency reaches from 0.
+/// Budgeted: three standard deviations of its prior.
+pub(crate) const MAX_FITTED_OFFSET_S: f64 = 0.3;
+
+/// Share of the windows that must lie within both records at an offset that is looked at.
+/// Budgeted: a match of half of the records is no accident of one manoeuvre.
+pub(crate) const MIN_OVERLAP: f64 = 0.5;
+
+/// Relative. Rates of the clocks that are compared, to either side, and their step.
+/// Convention: quartz is good to 1e-4, a clock that counts ticks of another length is off by per cents.
+pub(crate) const CLOCK_RATES: [f64; 2] = [0.06, 0.0025];
+
+/// Relative. Clock rate from which on it is said.
+/// Budgeted: over a run of a minute, less is a latency of a window.
+pub(crate) const MIN_CLOCK_RATE: f64 = 0.004;
+
+/// Relative. Clock rate from which on no result is right.
+/// Budgeted: poses of a run of half a minute are then late by a window at its end.
+pub(crate) const MAX_CLOCK_RATE: f64 = 0.01;
+
+/// Ratio to the stated value, or its inverse, that calibration corrects; beyond, the log says something else
+/// than it means.
+/// Convention: wheels are known to a few per cent; `calib` remarks on the same ratio.
+pub(crate) const MAX_WHEEL_RATIO: f64 = 1.3;
+
+/// As for wheels, of the wheel separation.
+/// Convention: skid steering makes the effective separation 1.5 to 2 times as large.
+pub(crate) const MAX_SEPARATION_RATIO: f64 = 2.2;
+
+/// Relative. A factor is a simple one if it is as near as this.
+/// Convention: wheels are known to a few per cent.
+pub(crate) const FACTOR_TOLERANCE: f64 = 0.15;
+
+/// Standard deviations by which a verdict on a factor or on two sessions must be certain.
+/// Budgeted: errors that are alike for seconds make standard deviations up to three times too small.
+pub(crate) const CERTAIN_SIGMAS: f64 = 8.0;
+
+/// Factors by which the ticks of a turn are wrong: edges of quadrature, and gears counted or not.
+/// Convention: one, two or four edges of a slot are counted.
+pub(crate) const TICK_FACTORS: [f64; 8] = [0.125, 0.25, 0.5, 2.0, 4.0, 8.0, 16.0, 0.0625];
+
+/// Ratios of units of length to the metre's, as a file of them shows: mm, cm, inches, feet.
+/// Derived: from the units.
+pub(crate) const LENGTH_UNITS: [f64; 4] = [1000.0, 100.0, 39.370_078_740_157_48, 3.280_839_895_013_123];
+
+/// Relative. Wheels of one robot differ from session to session by less.
+/// Convention: tyres, load and floors change an effective diameter by up to 2 %.
+pub(crate) const SAME_WHEEL: f64 = 0.03;
+
+/// Relative. Separations of one robot differ from session to session by less.
+/// Convention: floors and loads change an effective separation by up to 8 %, skid steering more.
+pub(crate) const SAME_SEPARATION: f64 = 0.12;
+
+/// Radians. Headings of the instrument that are nearer to those of the wheels, all of them, are computed from
+/// the wheels.
+/// Convention: no instrument is better than 1e-4, and no robot goes straight so well.
+pub(crate) const OWN_HEADING_RAD: f64 = 1e-4;
+
+/// Relative. Distances of the instrument that are nearer to those of the wheels are computed from the wheels.
+/// Convention: wheels are known to a per cent before they are calibrated.
+pub(crate) const OWN_DISTANCE: f64 = 1e-3;
+
+/// Metres. Steps of the path that are compared for it.
+/// Budgeted: files with four decimals round them by a hundredth.
+pub(crate) const MIN_OWN_STEP_M: f64 = 5e-3;
+
+/// Radians. Least turning of a log whose headings are compared with those of the wheels.
+/// Budgeted: a turn, over which wheels err by more than a milliradian.
+pub(crate) const MIN_OWN_TURN_RAD: f64 = 3.0;
+
+/// Seconds. Rows that lie farther apart, of a log of many rows, are stamped in milliseconds.
+/// Convention: wheels are logged at 1 Hz or more.
+pub(crate) const MAX_ROW_S: f64 = 4.0;
+
+/// Rows of a log whose times can be judged.
+/// Convention: logs of a protocol that is read at its ends have two rows a run.
+pub(crate) const MIN_ROWS: usize = 20;
+
+/// m/s. A robot whose wheels never go faster, in a log of so long rows, is not logged in seconds.
+/// Convention: robots creep at centimetres a second.
+pub(crate) const MIN_SPEED_M_S: f64 = 2e-3;
+
+/// Ratio of truth's time to the log's, from which on one of them is in milliseconds.
+/// Budgeted: a run is seen for a thousandth of it, or for a thousand times as long.
+pub(crate) const CLOCK_UNIT_RATIO: [f64; 2] = [300.0, 3000.0];
+
+/// Counts, radians or metres a row over the largest usual one, beyond which no wheel goes.
+/// Budgeted: twice the ratio with which outlying rows are found where a fit follows.
+pub(crate) const IMPOSSIBLE_STEP_RATIO: f64 = 20.0;
+
+/// Quantile of the steps that are not zero, which is the usual one.
+/// Budgeted: some rows in a hundred may be faulty.
+pub(crate) const USUAL_STEP_QUANTILE: f64 = 0.95;
+
+/// Counts. A usual step is taken for at least as large.
+/// Budgeted: a robot that stands or creeps has steps of one count, and then drives off.
+pub(crate) const MIN_USUAL_COUNTS: f64 = 12.0;
+
+/// Bits of counters whose wrapping is no restart.
+/// Convention: widths that counters come in.
+pub(crate) const COUNTER_BITS: [i32; 4] = [8, 16, 24, 32];
+
+/// Metres. A position that lies farther from those before and after it, which are near each other, is an
+/// error of the instrument.
+/// Budgeted: ten steps of a fast robot at 20 Hz.
+pub(crate) const MIN_OUTLIER_M: f64 = 0.5;
+
+/// Metres. A position beyond is no measurement.
+/// Convention: rooms are smaller than a thousand kilometres.
+pub(crate) const MAX_POSITION_M: f64 = 1e6;
+
+/// Radians. Wheels that turn by less, all together, stand.
+/// Budgeted: a hundredth of a turn, above the flicker of a count.
+pub(crate) const MIN_WHEEL_TURN_RAD: f64 = 0.06;
+
+/// Metres. An instrument whose positions lie within such a square has seen nothing move.
+/// Budgeted: noise of instruments; robots that move at all go farther.
+pub(crate) const STANDING_M: f64 = 0.02;
+
+/// Relative. Precision below which a parameter is not determined.
+/// Convention: nominal values are as good.
+pub(crate) const DETERMINED_SIGMA: f64 = 0.05;
+
+/// Ratio of a gap in a log to its median row, from which on it is said.
+/// Budgeted: an operating system delays by less.
+pub(crate) const GAP_RATIO: f64 = 10.0;
+
+/// Seconds. Least gap that is said.
+/// Budgeted: robots turn by a radian in it.
+pub(crate) const MIN_GAP_S: f64 = 0.5;
+
+/// Share of rows that are missing, by the median row, from which on it is said.
+/// Convention: one in twenty.
+pub(crate) const LOST_ROWS: f64 = 0.05;
+
+/// Metres. Shortest distance of a session that calibrates anything.
+/// Budgeted: a wheel's turn.
+pub(crate) const MIN_DISTANCE_M: f64 = 0.5;
+
+/// Radians. Turning of all runs of a session from which on its direction is judged.
+/// Budgeted: a square has one turn.
+pub(crate) const MIN_TURNING_RAD: f64 = 5.0;
+
+/// Share of the turning that goes one way, from which on it all does.
+/// Budgeted: corrections of a path's heading are a twentieth of its turns.
+pub(crate) const ONE_WAY: f64 = 0.95;

@@ -1,0 +1,220 @@
+//! All words: ids, sentences and what mends a problem.
+
+use kinematics::Side;
+
+use crate::kind::{Kind, MirroredAxis};
+
+/// The problem's name in JSON and in docs/check.md.
+pub(crate) const fn id(kind: &Kind) -> &'static str {
+    match kind {
+        Kind::NothingMoves { .. } => "nothing_moves",
+        Kind::TruthUnrelated { .. } => "truth_unrelated",
+        Kind::TimeInMilliseconds { .. } => "time_in_milliseconds",
+        Kind::TruthTimeUnit { .. } => "truth_time_unit",
+        Kind::ClockOffset { .. } => "clock_offset",
+        Kind::ClockRate { .. } => "clock_drift",
+        Kind::HeadingInDegrees => "heading_in_degrees",
+        Kind::HeadingClockwise => "heading_clockwise",
+        Kind::AxesMirrored { axis: MirroredAxis::Exchanged } => "axes_exchanged",
+        Kind::AxesMirrored { .. } => "axis_mirrored",
+        Kind::WheelsExchanged { .. } => "wheels_exchanged",
+        Kind::WheelBackwards { .. } => "wheel_backwards",
+        Kind::LengthUnit { of_truth: true, .. } => "truth_length_unit",
+        Kind::LengthUnit { .. } => "robot_length_unit",
+        Kind::TicksPerTurn { .. } => "ticks_per_turn",
+        Kind::OtherRobot { .. } => "other_robot",
+        Kind::SeveralRobots { .. } => "several_robots",
+        Kind::TruthIsOdometry => "truth_is_odometry",
+        Kind::CounterSpike { .. } => "counter_spike",
+        Kind::CounterRestart { .. } => "counter_restart",
+        Kind::TruthOutlier { .. } => "truth_outlier",
+        Kind::InstantRates => "instant_rates",
+        Kind::Gap { .. } => "log_gap",
+        Kind::LostRows { .. } => "lost_rows",
+        Kind::TooShort { .. } => "too_short",
+        Kind::OneWayTurns { .. } => "one_way_turns",
+        Kind::NotDetermined { .. } => "not_determined",
+    }
+}
+
+/// What a person reads: what, where, what to do.
+pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
+    let place = place(runs);
+    let what = match kind {
+        Kind::NothingMoves { wheels_turn_rad, truth_extent_m } => match truth_extent_m {
+            Some(extent_m) => format!(
+                "the wheels turn by {:.1} turns but the instrument sees the robot within {:.0} mm; record both while the robot drives",
+                wheels_turn_rad / std::f64::consts::TAU,
+                1e3 * extent_m
+            ),
+            None => "nothing moves: the wheels do not turn; record while the robot drives".to_owned(),
+        },
+        Kind::TruthUnrelated { unexplained } => format!(
+            "the truth does not follow the wheels: {:.0} % of its motion is not explained by theirs, at any clock offset that was tried; check that both tables are of the same drives",
+            100.0 * unexplained
+        ),
+        Kind::TimeInMilliseconds { row } => format!(
+            "t_s is in milliseconds: rows lie {row:.0} \"seconds\" apart; divide the times of all tables by 1000"
+        ),
+        Kind::TruthTimeUnit { factor } => {
+            let (table, other) = if *factor < 1.0 { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
+            format!("t_s of {table} is in milliseconds, that of {other} in seconds; divide the times of {table} by 1000")
+        }
+        Kind::ClockOffset { offset_s, sigma_s } => {
+            let late = if *offset_s > 0.0 { "late" } else { "early" };
+            format!(
+                "the truth is {:.3} s ± {sigma_s:.3} s {late} against the log: the clocks are apart; shift truth's times by {:+.3} s",
+                offset_s.abs(),
+                -offset_s
+            )
+        }
+        Kind::ClockRate { rate } => {
+            let fast = if *rate > 0.0 { "fast" } else { "slow" };
+            format!(
+                "truth's clock runs {:.1} % {fast} against the log's; multiply truth's times by {:.5}",
+                100.0 * rate.abs(),
+                1.0 / (1.0 + rate)
+            )
+        }
+        Kind::HeadingInDegrees => "theta_rad of truth.csv is in degrees; multiply it by π/180".to_owned(),
+        Kind::HeadingClockwise => {
+            "theta_rad of truth.csv counts clockwise; it is counter-clockwise positive: change its sign".to_owned()
+        }
+        Kind::AxesMirrored { axis: MirroredAxis::Exchanged } => {
+            "x_m and y_m of truth.csv are exchanged: the path turns the other way than the headings; y is to the left of x".to_owned()
+        }
+        Kind::AxesMirrored { axis } => format!(
+            "{} of truth.csv has the wrong sign: the path turns the other way than the headings; y is to the left of x",
+            if *axis == MirroredAxis::X { "x_m" } else { "y_m" }
+        ),
+        Kind::WheelsExchanged { label } => match label {
+            Some(true) => {
+                "left and right wheel are exchanged in the log: the truth turns as the protocol says, the wheels the other way".to_owned()
+            }
+            Some(false) => {
+                "the truth is mirrored: the wheels turn as the protocol says, the truth the other way; change the sign of y_m and theta_rad".to_owned()
+            }
+            None => {
+                "left and right wheel are exchanged in the log, or the truth is mirrored: every turn goes the other way; exchange the wheels' columns, or change the sign of y_m and theta_rad".to_owned()
+            }
+        },
+        Kind::WheelBackwards { sides } => match &sides[..] {
+            [side] => format!("the {} wheel counts backwards; change the sign of its column", side.name()),
+            _ => "both wheels count backwards; change the sign of both columns".to_owned(),
+        },
+        Kind::LengthUnit { ratio, unit, of_truth } => {
+            let (what, how) = if *of_truth {
+                ("x_m and y_m of the truth are", *ratio)
+            } else {
+                ("the lengths under [robot] in dataset.toml are", 1.0 / ratio)
+            };
+            match unit {
+                Some(unit) => format!("{what} in {unit} instead of metres; divide them by {how:.4}"),
+                None => format!("{what} {how:.3} times what the rest of the dataset says; check the unit"),
+            }
+        }
+        Kind::TicksPerTurn { ratio, stated, simple } => {
+            let found = stated.map(|stated| stated / ratio);
+            let value = found.map_or_else(String::new, |found| format!(": near {found:.0}"));
+            let cause = if *simple { "ticks_per_rev is wrong by a simple factor" } else { "check ticks_per_rev and the wheel's diameter" };
+            format!("both wheels are {ratio:.3} times as large as stated; {cause}{value}")
+        }
+        Kind::OtherRobot { parameter, ratio } => {
+            format!("{parameter} is {ratio:.3} times what dataset.toml states; correct it, or check the log's columns")
+        }
+        Kind::SeveralRobots { parameter, sessions, values_m } => format!(
+            "the sessions are of different robots: {parameter} is {:.2} mm in {} and {:.2} mm in {}; calibrate them apart",
+            1e3 * values_m[0],
+            sessions[0],
+            1e3 * values_m[1],
+            sessions[1]
+        ),
+        Kind::TruthIsOdometry => {
+            "the truth is computed from the wheels: it follows nominal dead reckoning closer than any instrument could; give what an outside instrument measured".to_owned()
+        }
+        Kind::CounterSpike { side, t_s, count, rows } => {
+            let more = if *rows > 1 { format!(", as in {} more rows", rows - 1) } else { String::new() };
+            format!(
+                "the {} counter shows {count} at t = {t_s} s and comes back in the next row{more}; delete such rows",
+                side.name()
+            )
+        }
+        Kind::CounterRestart { side, t_s } => format!(
+            "the {} counter starts again from 0 at t = {t_s} s; cut the run there into two runs",
+            side.name()
+        ),
+        Kind::TruthOutlier { t_s, distance_m, rows } => {
+            let more = if *rows > 1 { format!(", and {} more rows likewise", rows - 1) } else { String::new() };
+            format!(
+                "the truth jumps by {distance_m:.3e} m at t = {t_s} s and comes back{more}; delete such rows"
+            )
+        }
+        Kind::InstantRates => {
+            "v_mps and omega_radps are of the instant; a row's rates are to be those of the interval that ends there; average each row with the one before".to_owned()
+        }
+        Kind::Gap { t_s, length_s } => format!(
+            "the log has a gap of {length_s:.2} s after t = {t_s} s; say continuous = false under its [[run]], or cut it there"
+        ),
+        Kind::LostRows { share } => format!("{:.0} % of the log's rows are missing", 100.0 * share),
+        Kind::TooShort { distance_m } => format!(
+            "the runs are too short: the wheels cover {distance_m:.2} m in all; drive some metres, straight and round both ways"
+        ),
+        Kind::OneWayTurns { left } => format!(
+            "all turns go {}; drive both ways round, or unequal wheels and a wrong wheel separation look alike",
+            if *left { "left" } else { "right" }
+        ),
+        Kind::NotDetermined { parameters, turns } => {
+            let why = if *turns { "no distance is driven straight" } else { "the robot hardly turns" };
+            let what = if *turns { "drive straights of some metres too" } else { "drive turns both ways too" };
+            format!("these runs do not determine {}: {why}; {what}", parameters.join(", "))
+        }
+    };
+    format!("{place}{what}")
+}
+
+/// At most so many runs are named one by one.
+fn place(runs: Option<&[String]>) -> String {
+    match runs {
+        None | Some([]) => String::new(),
+        Some([run]) => format!("run \"{run}\": "),
+        Some([first, second]) => format!("runs \"{first}\" and \"{second}\": "),
+        Some([first, rest @ ..]) => format!("run \"{first}\" and {} more: ", rest.len()),
+    }
+}
+
+/// The key of `dataset.toml` that mends a problem.
+pub(crate) fn fix(kind: &Kind) -> Option<String> {
+    let corrections = |what: String| Some(format!("[corrections] {what}"));
+    match kind {
+        Kind::TimeInMilliseconds { .. } => corrections("time_factor = 0.001".to_owned()),
+        Kind::TruthTimeUnit { factor } if *factor < 1.0 => corrections("truth_time_factor = 0.001".to_owned()),
+        Kind::ClockOffset { offset_s, .. } => corrections(format!("truth_shift_s = {:.3}", -offset_s)),
+        Kind::ClockRate { rate } => corrections(format!("truth_time_factor = {:.5}", 1.0 / (1.0 + rate))),
+        Kind::HeadingInDegrees => corrections("heading_in_degrees = true".to_owned()),
+        Kind::HeadingClockwise => corrections("heading_clockwise = true".to_owned()),
+        Kind::AxesMirrored { axis } => corrections(
+            match axis {
+                MirroredAxis::Exchanged => "exchange_axes = true",
+                MirroredAxis::X => "mirror_x = true",
+                MirroredAxis::Y => "mirror_y = true",
+            }
+            .to_owned(),
+        ),
+        Kind::WheelsExchanged { label: Some(false) } => corrections("mirror_truth = true".to_owned()),
+        Kind::WheelsExchanged { .. } => corrections("exchange_wheels = true".to_owned()),
+        Kind::WheelBackwards { sides } => {
+            let key = |side: &Side| format!("reverse_{}_wheel = true", side.name());
+            corrections(sides.iter().map(key).collect::<Vec<_>>().join(", "))
+        }
+        Kind::LengthUnit { ratio, of_truth: true, unit: Some(_) } => {
+            corrections(format!("truth_length_factor = {}", 1.0 / ratio))
+        }
+        Kind::TicksPerTurn { ratio, stated: Some(stated), .. } => {
+            Some(format!("[robot] ticks_per_rev = {:.0}", stated / ratio))
+        }
+        Kind::InstantRates => corrections("instant_rates = true".to_owned()),
+        Kind::Gap { .. } => Some("[[run]] continuous = false".to_owned()),
+        Kind::SeveralRobots { .. } => Some("--force".to_owned()),
+        _ => None,
+    }
+}
