@@ -375,5 +375,5 @@ fn a_counter_that_leaves_its_place_for_one_row_is_refused_and_the_row_named() {
     fs::write(at.join("set/odometry.csv"), odometry).expect("written");
     let ended = run_in(at, &["calibrate", "set", "--quiet"]);
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    contains(&ended.stderr, "run a: the left counter reads 4000000000 at 40 s and is back in the row after: a spike");
+    contains(&ended.stderr, "run \"a\": the left counter shows 4000000000 at t = 40 s and comes back in the next row");
 }

@@ -1,6 +1,6 @@
 //! Findings of runs and intervals that do not belong: the effects of the catalogue that do as much.
 
-use effects::{CATALOGUE, Hypothesis, Mounting, hypothesis};
+use effects::{CATALOGUE, Extrinsic, Hypothesis, hypothesis};
 
 use crate::cause::{Basis, Cause};
 use crate::document::Value;
@@ -20,7 +20,7 @@ pub(crate) fn of_anomalies(anomalies: &[Anomaly], without: &[String]) -> Vec<Fin
         runs.sort();
         runs.dedup();
         let largest = own.first()?;
-        let displaced = largest.displaced;
+        let displacement = largest.displacement;
         let value =
             |name: &str, value: f64, unit: &str| (name.to_owned(), Value { value, sigma: None, unit: unit.to_owned() });
         let parameters = match kind {
@@ -28,14 +28,14 @@ pub(crate) fn of_anomalies(anomalies: &[Anomaly], without: &[String]) -> Vec<Fin
                 value("events", own.len() as f64, "1"),
                 value("from_s", largest.span_s[0], "s"),
                 value("to_s", largest.span_s[1], "s"),
-                value("along_m", displaced.x_m, "m"),
-                value("across_m", displaced.y_m, "m"),
-                value("turn_rad", displaced.theta_rad, "rad"),
+                value("along_m", displacement.x_m, "m"),
+                value("across_m", displacement.y_m, "m"),
+                value("turn_rad", displacement.theta_rad, "rad"),
             ],
-            AnomalyKind::MountingPlace | AnomalyKind::MountingHeading => vec![
-                value("lever_x_m", displaced.x_m, "m"),
-                value("lever_y_m", displaced.y_m, "m"),
-                value("yaw_rad", displaced.theta_rad, "rad"),
+            AnomalyKind::ExtrinsicPosition | AnomalyKind::ExtrinsicHeading => vec![
+                value("lever_x_m", displacement.x_m, "m"),
+                value("lever_y_m", displacement.y_m, "m"),
+                value("yaw_rad", displacement.theta_rad, "rad"),
             ],
         };
         let causes: Vec<Cause> = CATALOGUE
@@ -53,12 +53,12 @@ pub(crate) fn of_anomalies(anomalies: &[Anomaly], without: &[String]) -> Vec<Fin
 
 /// Whether an effect of the catalogue is an anomaly of that kind.
 fn is_of(kind: AnomalyKind, id: &str) -> bool {
-    let mounting = || effects::description(id).and_then(|description| description.mounting);
+    let extrinsic = || effects::description(id).and_then(|description| description.extrinsic);
     match (kind, hypothesis(id)) {
         (AnomalyKind::Frame, Some(Hypothesis::UnknownMotion { is_of_instrument })) => is_of_instrument,
         (AnomalyKind::RobotOrFrame, Some(Hypothesis::UnknownMotion { .. })) => true,
-        (AnomalyKind::MountingPlace, _) => mounting() == Some(Mounting::Place),
-        (AnomalyKind::MountingHeading, _) => mounting() == Some(Mounting::Heading),
+        (AnomalyKind::ExtrinsicPosition, _) => extrinsic() == Some(Extrinsic::Position),
+        (AnomalyKind::ExtrinsicHeading, _) => extrinsic() == Some(Extrinsic::Heading),
         _ => false,
     }
 }

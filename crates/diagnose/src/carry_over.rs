@@ -23,7 +23,8 @@ use crate::document::Value;
 use crate::heterogeneity::Heterogeneity;
 use crate::kinds::kinds_of_runs;
 use crate::settings::carry_over::{
-    MAX_LESS_THAN_HALF, MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
+    HETEROGENEITY_LEVEL, MAX_LESS_THAN_HALF, MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL,
+    SUPPORTED_SIGMAS,
 };
 use crate::settings::levels::MIN_RUNS;
 use crate::statistics::{holm, p_of_z};
@@ -179,7 +180,8 @@ fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
             return (Some(false), format!("{noun} {name} has less than half of the size that the others give it"));
         }
         let of = sizes.units.len();
-        let scatters = sizes.heterogeneity.filter(|of| of.less_than_half > MAX_LESS_THAN_HALF && of.tau > 0.0);
+        let scatters =
+            sizes.heterogeneity.filter(|of| of.less_than_half > MAX_LESS_THAN_HALF && of.p_value < HETEROGENEITY_LEVEL);
         if let Some(Heterogeneity { tau, less_than_half, .. }) = scatters {
             open.push(format!(
                 "sizes scatter by {:.0} % over each {noun}: another one has less than half with a probability of {:.2}",

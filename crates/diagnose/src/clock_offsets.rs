@@ -30,9 +30,13 @@ pub(crate) struct ClockOffset {
 }
 
 /// What was found, and the records without it.
+#[derive(Default)]
 pub(crate) struct Clocks {
     pub(crate) offsets: Vec<ClockOffset>,
-    pub(crate) records: Vec<Dataset>,
+    /// Where there are offsets.
+    pub(crate) records: Option<Vec<Dataset>>,
+    /// The offset that all runs have still, seconds: small enough for the fit to estimate.
+    pub(crate) remaining_s: f64,
 }
 
 /// A run's own offset.
@@ -41,11 +45,11 @@ struct OfRun {
     profile: Profile,
 }
 
-/// Looks for offsets; `None` where there are none.
-pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
+/// Looks for offsets.
+pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Clocks {
     let mut all = Vec::new();
     for (session, dataset) in datasets.iter().enumerate() {
-        let geometry = dataset.robot.geometry().ok()?;
+        let Ok(geometry) = dataset.robot.geometry() else { return Clocks::default() };
         let view = dataset.session();
         for (position, run) in view.runs.iter().enumerate() {
             let profile = Profile::of(run, dataset, &geometry);
@@ -54,7 +58,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
     }
     let mut offsets_s: Vec<f64> = all.iter().map(|of| of.profile.offset_s).collect();
     if offsets_s.is_empty() {
-        return None;
+        return Clocks::default();
     }
     offsets_s.sort_by(f64::total_cmp);
     let middle_s = offsets_s[offsets_s.len() / 2];
@@ -84,7 +88,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
         offsets.push(ClockOffset { runs: None, offset_s: middle_s, sigma_s: information.sqrt().recip(), gain });
     }
     if offsets.is_empty() {
-        return None;
+        return Clocks { remaining_s: middle_s, ..Clocks::default() };
     }
     let mut records = datasets.to_vec();
     if is_common {
@@ -94,7 +98,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Option<Clocks> {
     for of in odd.iter().rev() {
         records[of.run.0].runs.remove(of.run.1);
     }
-    Some(Clocks { offsets, records })
+    Clocks { offsets, records: Some(records), remaining_s: if is_common { 0.0 } else { middle_s } }
 }
 
 /// Time, place and heading of a measured pose.
@@ -245,24 +249,27 @@ mod tests {
 
     #[test]
     fn a_run_whose_clock_is_off_is_named_and_left_out() {
-        let found = clock_offsets(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]).expect("one is off");
+        let found = clock_offsets(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]);
         let [offset] = &found.offsets[..] else { panic!("one run") };
         assert_eq!(offset.runs.as_deref(), Some(&["run-2".to_owned()][..]));
         // Poses are taken at hundredths of a second.
         assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
-        assert_eq!(found.records[0].runs.len(), 4);
+        assert_eq!(found.records.expect("one is off")[0].runs.len(), 4);
     }
 
     #[test]
     fn a_clock_that_is_off_in_all_runs_is_set_right() {
-        let found = clock_offsets(&[driven(&[-0.4; 4])]).expect("all are off");
+        let found = clock_offsets(&[driven(&[-0.4; 4])]);
         assert_eq!((found.offsets.len(), found.offsets[0].runs.as_deref()), (1, None));
         assert!((found.offsets[0].offset_s + 0.4).abs() < 0.01, "{}", found.offsets[0].offset_s);
         // Rejects a shift the other way: the records are then off by nothing.
-        assert!(clock_offsets(&found.records).is_none());
-        assert!(clock_offsets(&[driven(&[0.05; 4])]).is_none(), "what the fit can estimate");
-        assert!(clock_offsets(&[driven(&[0.0, 0.3])]).is_none(), "of two, either is the odd one");
-        assert!(clock_offsets(&[driven(&[0.0, 0.3, 0.0, -0.2, 0.0, 0.0])]).is_none(), "two of six are not odd");
+        let is_none = |datasets: &[Dataset]| clock_offsets(datasets).offsets.is_empty();
+        assert!(is_none(&found.records.expect("all are off")));
+        // What the fit can estimate is said to be there still.
+        let small = clock_offsets(&[driven(&[0.05; 4])]);
+        assert!(small.offsets.is_empty() && (small.remaining_s - 0.05).abs() < 0.01, "{}", small.remaining_s);
+        assert!(is_none(&[driven(&[0.0, 0.3])]), "of two, either is the odd one");
+        assert!(is_none(&[driven(&[0.0, 0.3, 0.0, -0.2, 0.0, 0.0])]), "two of six are not odd");
     }
 
     #[test]
@@ -272,6 +279,6 @@ mod tests {
             let WheelLog::Angles(Wheels { left, right }) = &mut run.odometry.wheels else { unreachable!("angles") };
             std::mem::swap(left, right);
         }
-        assert!(clock_offsets(&[swapped]).is_none());
+        assert!(clock_offsets(&[swapped]).offsets.is_empty());
     }
 }

@@ -109,9 +109,8 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
     let clocks = clock_offsets(datasets);
-    let (datasets, clocks) =
-        clocks.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.offsets[..]));
-    let odd = unknown_motions(datasets);
+    let datasets = clocks.records.as_deref().unwrap_or(datasets);
+    let odd = unknown_motions(datasets, clocks.remaining_s);
     let (datasets, anomalies) =
         odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
@@ -159,7 +158,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         log: log.as_ref(),
         spans: spans.as_ref(),
         faults: &faults,
-        clocks,
+        clocks: &clocks.offsets,
         anomalies,
         uncorrelated,
         without: &options.without,

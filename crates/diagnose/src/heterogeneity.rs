@@ -35,6 +35,8 @@ impl Heterogeneity {
         let q = sum(&|of| weight(of) * (of.0 - mean).powi(2));
         let freedom = (units - 1) as f64;
         let tau2 = ((q - freedom) / (all - sum(&|of| weight(of).powi(2)) / all)).max(0.0);
+        // A Q that is its expectation to the last digits.
+        let tau2 = if q - freedom < 1e-9 * freedom { 0.0 } else { tau2 };
         // The mean where units scatter has weights of its own.
         let own = |of: &(f64, f64)| (tau2 + of.1 * of.1).recip();
         let of_mean = sum(&own);
@@ -59,7 +61,8 @@ mod tests {
         // Weights of 100: Q = 100 (0.01 + 0 + 0.01) = 2.
         let alike = Heterogeneity::of(&[(0.9, 0.1), (1.0, 0.1), (1.1, 0.1)]).expect("three");
         assert!((alike.q - 2.0).abs() < 1e-9 && alike.tau == 0.0, "{alike:?}");
-        // p of χ² = 2 with two degrees is e⁻¹; t = 0.5/0.0577 = 8.66 with one degree: atan(1/8.66)/π = 0.0366.
+        // p of χ² = 2 with two degrees is e⁻¹; t = 0.5/0.0577 = 8.66 with one degree: its upper tail is
+        // atan(1/8.66)/π = 0.0366.
         assert!((alike.p_value - (-1.0_f64).exp()).abs() < 1e-9, "{alike:?}");
         assert!((alike.less_than_half - 0.0366).abs() < 1e-4, "{alike:?}");
         // Q = 100 · 2 · 0.64 = 128; τ² = (128 − 2)/(300 − 100) = 0.63.

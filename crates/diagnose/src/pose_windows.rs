@@ -7,14 +7,15 @@
 //! little. Reference: Censi et al. 2013, eq. 17–20 (the linear form); Holland & Welsch 1977 (iterative
 //! reweighting).
 
-use dataset::Dataset;
+use dataset::{Dataset, TruthSample};
 use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
 
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
-    MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_MOUNTING, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS, WINDOW_SPANS,
+    MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_EXTRINSICS, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS,
+    WINDOW_SPANS,
 };
 
 /// The measured poses of a run, and the travel of its wheels between them by nominal lengths.
@@ -32,17 +33,18 @@ pub(crate) struct PoseTrack {
 
 impl PoseTrack {
     /// Of all runs that measure enough poses with headings, and whose counts are those of wheels.
-    pub(crate) fn of_all(datasets: &[Dataset]) -> Vec<Self> {
+    /// The instrument's poses are of so long before their stamps: a delay displaces every change of speed.
+    pub(crate) fn of_all(datasets: &[Dataset], late_s: f64) -> Vec<Self> {
         let mut tracks = Vec::new();
         for (session, dataset) in datasets.iter().enumerate() {
             for (position, run) in dataset.session().runs.iter().enumerate() {
-                tracks.extend(Self::of(run, dataset, (session, position)));
+                tracks.extend(Self::of(run, dataset, (session, position), late_s));
             }
         }
         tracks
     }
 
-    fn of(run: &dataset::RunView<'_>, dataset: &Dataset, number: (usize, usize)) -> Option<Self> {
+    fn of(run: &dataset::RunView<'_>, dataset: &Dataset, number: (usize, usize), late_s: f64) -> Option<Self> {
         if !run.info().continuous || run.run().truth.len() < MIN_WINDOW_POSES || has_outlying_rows(run.run()) {
             return None;
         }
@@ -62,25 +64,27 @@ impl PoseTrack {
         let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![], gaps: vec![] };
         let mut gaps = 0;
         let (mut last, mut row) = (Wheels::both(0.0), 0);
-        for sample in run.run().truth.iter().filter(|sample| (first_s..=last_s).contains(&sample.t_s)) {
+        let within = |sample: &&TruthSample| (first_s..=last_s).contains(&(sample.t_s - late_s));
+        for sample in run.run().truth.iter().filter(within) {
+            let taken_s = sample.t_s - late_s;
             let pose = Pose::new(sample.x_m, sample.y_m, sample.theta_rad()?);
             if of.t_s.is_empty() {
-                last = between(sample.t_s);
-                row = rows_s.partition_point(|row_s| *row_s <= sample.t_s);
+                last = between(taken_s);
+                row = rows_s.partition_point(|row_s| *row_s <= taken_s);
             }
             let mut go = |to: Wheels<f64>| {
                 let turned = to.zip_with(last, |to, last| to - last);
                 of.steps_m.push(turned.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad));
                 last = to;
             };
-            while row < rows_s.len() && rows_s[row] <= sample.t_s {
+            while row < rows_s.len() && rows_s[row] <= taken_s {
                 go(angles(row));
                 gaps += usize::from(row > 0 && rows_s[row] - rows_s[row - 1] > gap_s);
                 row += 1;
             }
             // The row that the pose lies in counts to the window before it and to the one after it.
             let within = row < rows_s.len() && row > 0 && rows_s[row] - rows_s[row - 1] > gap_s;
-            go(between(sample.t_s));
+            go(between(taken_s));
             of.t_s.push(sample.t_s);
             of.measured.push(pose);
             of.after.push(of.steps_m.len());
@@ -181,16 +185,16 @@ impl<'t> CalibratedTracks<'t> {
         // Places.
         let poses = |drive: &Drive| tracks.iter().map(|track| track.dead_reckoned(drive)).collect::<Vec<_>>();
         let dead_reckoned = poses(&drive);
-        let rows: Vec<MountingRow> = tracks
+        let rows: Vec<ExtrinsicsRow> = tracks
             .iter()
             .zip(&dead_reckoned)
-            .flat_map(|(track, poses)| mounting_rows(track, poses, windows(track.len(), span)))
+            .flat_map(|(track, poses)| extrinsics_rows(track, poses, windows(track.len(), span)))
             .collect();
-        let (mounting, _) = Mounting::of(&rows)?;
-        let scale = mounting.scale();
+        let (extrinsics, _) = Extrinsics::of(&rows)?;
+        let scale = extrinsics.scale();
         drive.scale = drive.scale.map(|of| of / scale);
         drive.separation_m /= scale;
-        Some(Self { tracks, span, dead_reckoned: poses(&drive), body_from_sensor: mounting.body_from_sensor() })
+        Some(Self { tracks, span, dead_reckoned: poses(&drive), body_from_sensor: extrinsics.body_from_sensor() })
     }
 
     /// Poses of a track by dead reckoning.
@@ -215,22 +219,23 @@ impl<'t> CalibratedTracks<'t> {
 
     /// The instrument's place on the robot in a track, with its covariance (x, y, heading), by the windows
     /// that are taken.
-    pub(crate) fn mounting(
+    pub(crate) fn extrinsics(
         &self,
         track: usize,
         is_taken: impl Fn((usize, usize)) -> bool,
     ) -> Option<(Pose, Matrix3<f64>)> {
         let taken = windows(self.tracks[track].len(), self.span).filter(|window| is_taken(*window));
-        let rows: Vec<MountingRow> = mounting_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
-        if rows.len() < MIN_WINDOWS_PER_MOUNTING {
+        let rows: Vec<ExtrinsicsRow> =
+            extrinsics_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
+        if rows.len() < MIN_WINDOWS_PER_EXTRINSICS {
             return None;
         }
-        let (mounting, covariance) = Mounting::of(&rows)?;
+        let (extrinsics, covariance) = Extrinsics::of(&rows)?;
         // The heading is that of (cos, sin).
-        let ([cos, sin, ..], scale) = (mounting.0.data.0[0], mounting.scale());
+        let ([cos, sin, ..], scale) = (extrinsics.0.data.0[0], extrinsics.scale());
         let per = scale * scale;
         let to = Matrix3x4::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -sin / per, cos / per, 0.0, 0.0);
-        Some((mounting.body_from_sensor(), to * covariance * to.transpose()))
+        Some((extrinsics.body_from_sensor(), to * covariance * to.transpose()))
     }
 }
 
@@ -257,22 +262,22 @@ fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
     WINDOW_SPANS.into_iter().find(reaches)
 }
 
-/// One window in the linear equation of the mounting: the motion by the instrument, that by the wheels, and
+/// One window in the linear equation of the extrinsics: the motion by the instrument, that by the wheels, and
 /// the turn.
-struct MountingRow {
+struct ExtrinsicsRow {
     measured: Vector2<f64>,
     dead_reckoned: Vector2<f64>,
     turn_rad: f64,
 }
 
-fn mounting_rows<'t>(
+fn extrinsics_rows<'t>(
     track: &'t PoseTrack,
     poses: &'t [Pose],
     windows: impl Iterator<Item = (usize, usize)> + 't,
-) -> impl Iterator<Item = MountingRow> + 't {
+) -> impl Iterator<Item = ExtrinsicsRow> + 't {
     windows.map(|(from, to)| {
         let (measured, dead_reckoned) = (track.motion((from, to)), poses[from].to(poses[to]));
-        MountingRow {
+        ExtrinsicsRow {
             measured: Vector2::new(measured.x_m, measured.y_m),
             dead_reckoned: Vector2::new(dead_reckoned.x_m, dead_reckoned.y_m),
             turn_rad: measured.theta_rad,
@@ -281,12 +286,12 @@ fn mounting_rows<'t>(
 }
 
 /// g cos θ_s, g sin θ_s, ℓ_x, ℓ_y.
-struct Mounting(Vector4<f64>);
+struct Extrinsics(Vector4<f64>);
 
-impl Mounting {
+impl Extrinsics {
     /// The mounting of some windows with its covariance by what is left of them.
-    fn of(rows: &[MountingRow]) -> Option<(Self, Matrix4<f64>)> {
-        let design = |row: &MountingRow| {
+    fn of(rows: &[ExtrinsicsRow]) -> Option<(Self, Matrix4<f64>)> {
+        let design = |row: &ExtrinsicsRow| {
             let (m, (sin, cos)) = (row.measured, row.turn_rad.sin_cos());
             [Vector4::new(m.x, -m.y, 1.0 - cos, sin), Vector4::new(m.y, m.x, -sin, 1.0 - cos)]
         };

@@ -11,6 +11,7 @@ use crate::check::{Check, ResidualPersistence};
 use crate::document::{self, Gain, GainLevel, UnlistedTerm, Value, Verdict};
 use crate::finding::Finding;
 use crate::heterogeneity::Heterogeneity;
+use crate::settings::findings::MAX_EVENTS_SHOWN;
 use crate::unknown_motion::{Anomaly, AnomalyKind};
 
 /// A finding as scripts get it.
@@ -219,28 +220,27 @@ fn basis(finding: &Finding) -> String {
 
 /// Where something does not belong, the largest events first.
 fn anomalies(all: &[Anomaly]) -> String {
-    const SHOWN: usize = 3;
     let event = |anomaly: &Anomaly| {
-        let Anomaly { run, span_s: [from_s, to_s], displaced, .. } = anomaly;
+        let Anomaly { run, span_s: [from_s, to_s], displacement, .. } = anomaly;
         let by = format!(
             "{:.0} mm ahead, {:.0} mm to the left, {:.1}°",
-            1e3 * displaced.x_m,
-            1e3 * displaced.y_m,
-            displaced.theta_rad.to_degrees()
+            1e3 * displacement.x_m,
+            1e3 * displacement.y_m,
+            displacement.theta_rad.to_degrees()
         );
         match anomaly.kind {
             AnomalyKind::Frame | AnomalyKind::RobotOrFrame => format!("run {run}, {from_s:.2} s to {to_s:.2} s: {by}"),
-            AnomalyKind::MountingPlace | AnomalyKind::MountingHeading => format!("run {run}: {by}"),
+            AnomalyKind::ExtrinsicPosition | AnomalyKind::ExtrinsicHeading => format!("run {run}: {by}"),
         }
     };
-    let mut shown: Vec<String> = all.iter().take(SHOWN).map(event).collect();
-    if all.len() > SHOWN {
-        shown.push(format!("{} more", all.len() - SHOWN));
+    let mut shown: Vec<String> = all.iter().take(MAX_EVENTS_SHOWN).map(event).collect();
+    if all.len() > MAX_EVENTS_SHOWN {
+        shown.push(format!("{} more", all.len() - MAX_EVENTS_SHOWN));
     }
     let shown = shown.join("; ");
     match all.first().map(|anomaly| anomaly.kind) {
         Some(AnomalyKind::Frame) => format!(
-            "the instrument's poses jump as no robot moves, and stay displaced; nothing is compared across it ({shown})"
+            "the instrument's poses jump as no robot moves, and stay displacement; nothing is compared across it ({shown})"
         ),
         Some(AnomalyKind::RobotOrFrame) => format!(
             "between two poses the robot moved, or the instrument's frame did, as its wheels do not say; nothing is compared across it ({shown})"

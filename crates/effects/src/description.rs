@@ -28,7 +28,7 @@ pub struct Description {
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
     /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
-    pub mounting: Option<Mounting>,
+    pub extrinsic: Option<Extrinsic>,
     /// The ratio of the drive's geometry that it changes, with its size of that meaning; of the geometry that
     /// every calibration fits only.
     pub geometry: Option<(GeometryRatio, &'static str)>,
@@ -38,9 +38,9 @@ pub struct Description {
 
 /// A part of the instrument's mounting on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mounting {
+pub enum Extrinsic {
     /// Where it is.
-    Place,
+    Position,
     /// How it is turned.
     Heading,
 }
@@ -67,7 +67,7 @@ impl Description {
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
             clock_offset: None,
-            mounting: None,
+            extrinsic: None,
             geometry: None,
             benchmark: Benchmark::OF_MEAN,
         }

@@ -40,3 +40,7 @@ pub(crate) const CONSTANT_CURVATURE_SPREAD: f64 = 0.5;
 /// Probability. A term stays open where a new unit has less than half of its size more probably.
 /// Convention: 5 %.
 pub(crate) const MAX_LESS_THAN_HALF: f64 = 0.05;
+
+/// Probability. Level of Cochran's Q at which units are taken to differ.
+/// Convention: 10 %, as its power is low with few units (Higgins and Thompson 2002).
+pub(crate) const HETEROGENEITY_LEVEL: f64 = 0.1;

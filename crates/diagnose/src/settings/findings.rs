@@ -32,3 +32,7 @@ pub(crate) const MIN_CONTROLLER_COUNTS: f64 = 40_000.0;
 /// Seconds. Measurements farther apart, in a run of a few, are readings of the standing robot.
 /// Tuned: by hand; no record of what on.
 pub(crate) const STANDING_READING_INTERVAL_S: f64 = 2.0;
+
+/// Number. So many events of one kind are shown with their times and sizes; the rest are counted.
+/// Convention: three.
+pub(crate) const MAX_EVENTS_SHOWN: usize = 3;

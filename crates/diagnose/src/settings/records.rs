@@ -217,23 +217,23 @@ pub(crate) const IMPLAUSIBLE_SPEED_RATIO: f64 = 2.0;
 /// Radians. A run whose instrument is turned on the robot by more than in the other runs is of another
 /// mounting.
 /// Convention: a degree; a clip-on marker is put back to about that.
-pub(crate) const MIN_OTHER_MOUNTING_RAD: f64 = 0.02;
+pub(crate) const MIN_OTHER_EXTRINSICS_RAD: f64 = 0.02;
 
 /// Wheel separations. The same of its place.
 /// Convention: a fiftieth, 7 mm of 363 mm.
-pub(crate) const MIN_OTHER_MOUNTING_SEPARATIONS: f64 = 0.02;
+pub(crate) const MIN_OTHER_EXTRINSICS_SEPARATIONS: f64 = 0.02;
 
 /// Standard deviations, of the run's own mounting and of how mountings scatter over the runs.
 /// Convention: beyond what normal errors do in any log.
-pub(crate) const MIN_OTHER_MOUNTING_SIGMAS: f64 = 8.0;
+pub(crate) const MIN_OTHER_EXTRINSICS_SIGMAS: f64 = 8.0;
 
 /// Number of runs, or parts of runs, of which one can be the odd one.
 /// Convention: five.
-pub(crate) const MIN_MOUNTINGS: usize = 5;
+pub(crate) const MIN_EXTRINSICS: usize = 5;
 
 /// Number of windows that determine the mounting of a run.
 /// Convention: twice its unknowns.
-pub(crate) const MIN_WINDOWS_PER_MOUNTING: usize = 8;
+pub(crate) const MIN_WINDOWS_PER_EXTRINSICS: usize = 8;
 
 /// Metres and radians. Least standard deviation of windows.
 /// Convention: a tenth of a millimetre; records of simulations may have no noise.
@@ -245,7 +245,7 @@ pub(crate) const LASTING_SHARE: f64 = 0.25;
 
 /// Ratio to the least other mounting. A run that determines its own to no better than this says nothing.
 /// Convention: ten times.
-pub(crate) const MAX_LEAST_MOUNTINGS: f64 = 10.0;
+pub(crate) const MAX_LEAST_EXTRINSICS: f64 = 10.0;
 
 /// Median lengths of a row. A row that lasts longer has others missing before it.
 /// Convention: nearer to two than to one, and beyond ordinary jitter.

@@ -12,7 +12,7 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Mounting, Summary};
+use crate::description::{Description, Extrinsic, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -50,7 +50,7 @@ impl PhysicalEffect for TruthLeverArm {
                 let [ahead, left] = ["lever_x_m", "lever_y_m"].map(|name| values.shown(name, 1e3, "mm"));
                 format!("{MEANING}, but {ahead} ahead and {left} to the left: nothing is wrong with the robot")
             }),
-            mounting: Some(Mounting::Place),
+            extrinsic: Some(Extrinsic::Position),
             ..Description::of(MEANING)
         }
     }

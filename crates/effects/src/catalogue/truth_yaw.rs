@@ -11,7 +11,7 @@ use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Mounting, Summary};
+use crate::description::{Description, Extrinsic, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -46,7 +46,7 @@ impl PhysicalEffect for TruthYaw {
                 let yaw = values.shown("yaw_rad", 180.0 / std::f64::consts::PI, "°");
                 format!("{MEANING} by {yaw} (or both wheels toe by as much)")
             }),
-            mounting: Some(Mounting::Heading),
+            extrinsic: Some(Extrinsic::Heading),
             ..Description::of(MEANING)
         }
     }
