@@ -260,23 +260,21 @@ fn the_catalogue_is_whole_and_every_effect_says_how_data_show_it() {
     catalogue.sort_unstable();
     assert_eq!(catalogue, names);
     for id in CATALOGUE {
-        let [geometry, gross, .., noise, _, _, displaced] = NAMES;
+        let [geometry, gross, .., noise, _, _, events] = NAMES;
         let is = match effects::hypothesis(id).expect("in the catalogue") {
             Hypothesis::Geometry => geometry.contains(id),
             Hypothesis::Records(_) => gross.contains(id),
             Hypothesis::Silent => noise.contains(id),
             Hypothesis::UnknownMotion { is_of_instrument } => {
-                displaced.contains(id) && is_of_instrument == id.starts_with("truth")
+                events.contains(id) && is_of_instrument == id.starts_with("truth")
             }
             Hypothesis::Terms(variants) => {
-                !variants.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
+                !variants.is_empty() && ![geometry, gross, noise, events].concat().contains(id)
             }
             Hypothesis::TermsAndScatter(variants, signs) => {
-                !variants.is_empty() && !signs.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
+                !variants.is_empty() && !signs.is_empty() && ![geometry, gross, noise, events].concat().contains(id)
             }
-            Hypothesis::Scatter(signs) => {
-                !signs.is_empty() && ![geometry, gross, noise, displaced].concat().contains(id)
-            }
+            Hypothesis::Scatter(signs) => !signs.is_empty() && ![geometry, gross, noise, events].concat().contains(id),
         };
         assert!(is, "{id}");
     }

@@ -63,7 +63,7 @@ pub(crate) fn fault(
             if outlying && !visible_in_log {
                 continue;
             }
-            // Compared by the measurements of the records as they are: what is not compared later counts here.
+            // By all measurements of the records: those that are not compared later count here.
             let compared = with_unknown_motion_of(datasets, &records);
             let Ok(fit) = PLAIN.fit(&sessions(&compared)) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless

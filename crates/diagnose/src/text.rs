@@ -240,7 +240,7 @@ fn anomalies(all: &[Anomaly]) -> String {
     let shown = shown.join("; ");
     match all.first().map(|anomaly| anomaly.kind) {
         Some(AnomalyKind::Frame) => format!(
-            "the instrument's poses jump as no robot moves, and stay displacement; nothing is compared across it ({shown})"
+            "the instrument's poses jump as no robot moves, and stay displaced; nothing is compared across it ({shown})"
         ),
         Some(AnomalyKind::RobotOrFrame) => format!(
             "between two poses the robot moved, or the instrument's frame did, as its wheels do not say; nothing is compared across it ({shown})"
