@@ -24,7 +24,9 @@ pub(crate) fn decode(definitions: &Definitions, message: &[u8]) -> Result<Value,
     let is_little_endian = match (message[0], representation) {
         (0, 0) => false,
         (0, 1) => true,
-        (high, low) => return Err(format!("encapsulation 0x{high:02x}{low:02x} is not read; only plain CDR (0x0000, 0x0001) is")),
+        (high, low) => {
+            return Err(format!("encapsulation 0x{high:02x}{low:02x} is not read; only plain CDR (0x0000, 0x0001) is"));
+        }
     };
     let mut walker = Walker { payload, at: 0, is_little_endian, definitions };
     walker.message(&definitions.root, 0)
@@ -49,9 +51,9 @@ impl<'a> Walker<'a> {
             self.take(1)?;
         }
         let decoded = fields.iter().map(|field| {
-            let value = self.field(field, depth).map_err(|why| {
-                if why.starts_with("field ") { why } else { format!("field {}: {why}", field.name) }
-            })?;
+            let value = self
+                .field(field, depth)
+                .map_err(|why| if why.starts_with("field ") { why } else { format!("field {}: {why}", field.name) })?;
             Ok((field.name.clone(), value))
         });
         decoded.collect::<Result<_, String>>().map(Value::Message)
@@ -158,21 +160,26 @@ mod tests {
 
     #[test]
     fn strings_sequences_arrays_and_nested_types_follow_each_other() {
-        let of = definitions("string s\nuint16[] q\nI[2] p\nfloat64[<=3] none\nuint8 last\n===\nMSG: t/I\nuint8 x\nuint32 y\n");
+        let of = definitions(
+            "string s\nuint16[] q\nI[2] p\nfloat64[<=3] none\nuint8 last\n===\nMSG: t/I\nuint8 x\nuint32 y\n",
+        );
         let message = [
             &[0, 1, 0, 0][..],
-            &[3, 0, 0, 0, b'a', b'b', 0],       // s: to byte 7
-            &[0, 2, 0, 0, 0, 1, 0, 2, 0],       // q: at 8, to 16
-            &[5, 0, 0, 0, 6, 0, 0, 0],          // p[0]
-            &[7, 0, 0, 0, 8, 0, 0, 0],          // p[1]
-            &[0, 0, 0, 0],                      // an empty sequence is not aligned to its elements
+            &[3, 0, 0, 0, b'a', b'b', 0], // s: to byte 7
+            &[0, 2, 0, 0, 0, 1, 0, 2, 0], // q: at 8, to 16
+            &[5, 0, 0, 0, 6, 0, 0, 0],    // p[0]
+            &[7, 0, 0, 0, 8, 0, 0, 0],    // p[1]
+            &[0, 0, 0, 0],                // an empty sequence is not aligned to its elements
             &[42],
         ]
         .concat();
         let found = decode(&of, &message).expect("decoded");
         assert_eq!(found.text("s"), Some("ab"));
         assert_eq!(found.list("q"), [Value::Integer(1), Value::Integer(2)]);
-        assert_eq!([found.integer("p[0].y"), found.integer("p[1].x"), found.integer("last")], [Some(6), Some(7), Some(42)]);
+        assert_eq!(
+            [found.integer("p[0].y"), found.integer("p[1].x"), found.integer("last")],
+            [Some(6), Some(7), Some(42)]
+        );
     }
 
     #[test]

@@ -56,8 +56,13 @@ mod tests {
     use super::*;
 
     /// "yair " a thousand times, by the reference tools' Python bindings (zstandard 0.25.0, lz4 4.4.5).
-    const ZSTD: &[u8] = &[40, 181, 47, 253, 96, 136, 18, 109, 0, 0, 40, 121, 97, 105, 114, 32, 1, 0, 128, 131, 190, 104, 1];
-    const LZ4: &[u8] = &[4, 34, 77, 24, 104, 64, 136, 19, 0, 0, 0, 0, 0, 0, 201, 34, 0, 0, 0, 95, 121, 97, 105, 114, 32, 5, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 126, 80, 121, 97, 105, 114, 32, 0, 0, 0, 0];
+    const ZSTD: &[u8] =
+        &[40, 181, 47, 253, 96, 136, 18, 109, 0, 0, 40, 121, 97, 105, 114, 32, 1, 0, 128, 131, 190, 104, 1];
+    const LZ4: &[u8] = &[
+        4, 34, 77, 24, 104, 64, 136, 19, 0, 0, 0, 0, 0, 0, 201, 34, 0, 0, 0, 95, 121, 97, 105, 114, 32, 5, 0, 255, 255,
+        255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 126, 80, 121, 97, 105,
+        114, 32, 0, 0, 0, 0,
+    ];
 
     #[test]
     fn both_formats_give_their_text_back() {
@@ -70,7 +75,9 @@ mod tests {
 
     #[test]
     fn what_is_cut_off_or_unknown_is_a_fault() {
-        for (compression, bytes) in [("zstd", &ZSTD[..ZSTD.len() - 3]), ("lz4", &LZ4[..20]), ("bz2", LZ4), ("zstd", LZ4)] {
+        for (compression, bytes) in
+            [("zstd", &ZSTD[..ZSTD.len() - 3]), ("lz4", &LZ4[..20]), ("bz2", LZ4), ("zstd", LZ4)]
+        {
             assert!(decompress(compression, bytes).fault.is_some(), "{compression}");
         }
     }

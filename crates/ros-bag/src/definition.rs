@@ -116,7 +116,11 @@ fn full_name(name: &str, inside: &str) -> String {
 fn field(line: &str, inside: &str) -> Result<Option<Field>, String> {
     let line = if line.starts_with('#') { "" } else { line };
     let Some((type_name, rest)) = line.split_once(char::is_whitespace) else {
-        return if line.is_empty() { Ok(None) } else { Err(format!("expected a type and a name, found {:?}", clip(line))) };
+        return if line.is_empty() {
+            Ok(None)
+        } else {
+            Err(format!("expected a type and a name, found {:?}", clip(line)))
+        };
     };
     let rest = rest.trim_start();
     let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
@@ -133,8 +137,8 @@ fn field(line: &str, inside: &str) -> Result<Option<Field>, String> {
         Some((element, "")) => (element, Arity::Sequence),
         Some((element, bound)) => match (bound.strip_prefix("<="), bound.parse()) {
             (Some(_), _) => (element, Arity::Sequence),
-            (None, Ok(length)) => (element, Arity::Array(length)),
-            (None, Err(_)) => return Err(format!("expected a length in {:?}", clip(type_name))),
+            (None, Ok(length)) if length > 0 => (element, Arity::Array(length)),
+            (None, _) => return Err(format!("expected a length in {:?}", clip(type_name))),
         },
     };
     let kind = match element.split_once("<=").map_or(element, |(element, _)| element) {
@@ -193,6 +197,7 @@ mod tests {
         let refused = |text: &str| Definitions::parse("a/msg/B", text).expect_err("refused");
         assert!(refused("int32 a\nint32\n").contains("line 2: expected a type and a name"));
         assert!(refused("int32[x] a\n").contains("expected a length"));
+        assert!(refused("int32[0] a\n").contains("expected a length"));
         assert!(refused("Other a\n").contains("a/Other, whose definition is missing"));
         assert!(refused("===\nIDL: a/msg/B\n").contains("ros2idl"));
         assert!(refused("wstring a").contains("wstring"));

@@ -98,7 +98,9 @@ pub enum RosBagError {
         why: String,
     },
     /// Two messages of a topic contradict the order of time.
-    #[error("topic {topic}: message {number}: time runs backwards by {step_s:.3} s; the bag holds two recordings, or a clock was set: give --cut SECONDS to cut the runs there")]
+    #[error(
+        "topic {topic}: message {number}: time runs backwards by {step_s:.3} s; the bag holds two recordings, or a clock was set: give --cut SECONDS to cut the runs there"
+    )]
     TimeRunsBackwards {
         /// The topic.
         topic: String,
@@ -108,7 +110,9 @@ pub enum RosBagError {
         step_s: f64,
     },
     /// Wheels and poses are of two clocks.
-    #[error("wheels of {wheels} span {wheels_span}, poses of {truth} span {truth_span}: two clocks; record both on one")]
+    #[error(
+        "wheels of {wheels} span {wheels_span}, poses of {truth} span {truth_span}: two clocks; record both on one"
+    )]
     TwoClocks {
         /// Topic of the wheels.
         wheels: String,

@@ -98,7 +98,8 @@ mod tests {
         let message = |fields: &[(&str, Value)]| {
             Value::Message(fields.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect())
         };
-        let inner = message(&[("x", Value::Float(1.5)), ("ids", Value::List(vec![Value::Integer(7), Value::Integer(-8)]))]);
+        let inner =
+            message(&[("x", Value::Float(1.5)), ("ids", Value::List(vec![Value::Integer(7), Value::Integer(-8)]))]);
         let value = message(&[("pose", inner), ("name", Value::Text("left".to_owned()))]);
         assert_eq!(value.number("pose.x"), Some(1.5));
         assert_eq!((value.integer("pose.ids[1]"), value.integer("pose.ids.0")), (Some(-8), Some(7)));
