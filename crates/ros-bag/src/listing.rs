@@ -30,6 +30,8 @@ pub struct ListedTopic {
     pub joints: Vec<String>,
     /// Its transforms, parent and child.
     pub frames: Vec<[String; 2]>,
+    /// Paths of numbers in its first message, at most a dozen.
+    pub numbers: Vec<String>,
 }
 
 /// What a bag holds, and what to do with it.
@@ -82,6 +84,7 @@ fn listed(topic: &Topic) -> ListedTopic {
         span_s,
         may_be,
         joints: topic.joints.iter().cloned().collect(),
+        numbers: topic.numbers.clone(),
         frames: topic.frames.keys().map(|(parent, child)| [parent.clone(), child.clone()]).collect(),
     }
 }

@@ -14,6 +14,7 @@ use ruzstd::decoding::StreamingDecoder;
 
 use crate::decompress::{MAX_CHUNK_BYTES, decompress};
 use crate::error::RosBagError;
+use crate::resync::next_chunk;
 
 /// Faults that are told one by one; more are counted.
 const MAX_TOLD: usize = 5;
@@ -59,7 +60,8 @@ pub(crate) fn visit(
 ) -> Result<(), RosBagError> {
     let io = |source| RosBagError::Io { path: path.to_owned(), source };
     let file = BufReader::new(File::open(path).map_err(io)?);
-    let mut reader: Box<dyn Read> = if path.extension().is_some_and(|extension| extension == "zstd") {
+    let is_compressed = path.extension().is_some_and(|extension| extension == "zstd");
+    let mut reader: Box<dyn Read> = if is_compressed {
         let decoder = StreamingDecoder::new(file);
         Box::new(decoder.map_err(|error| no_bag(path, format!("no zstd: {error}")))?)
     } else {
@@ -79,7 +81,24 @@ pub(crate) fn visit(
     }
     let mut reading =
         Reading { path, at: magic.len() as u64, schemas: BTreeMap::new(), channels: BTreeMap::new(), visit, losses };
-    reading.file(&mut *reader)
+    while let Some(Break { at, why }) = reading.file(&mut *reader)? {
+        // Nothing can be sought in what is compressed as a whole.
+        let next = if is_compressed { None } else { next_chunk(path, at + 1).map_err(io)? };
+        let Some((next, behind)) = next else {
+            reading.lose(at, &format!("{why}; everything before was read"));
+            break;
+        };
+        reading.lose(at, &format!("{why}; {} bytes are lost, up to the next chunk at byte {next}", next - at));
+        reading.at = next;
+        reader = Box::new(behind);
+    }
+    Ok(())
+}
+
+/// Where records no longer follow each other.
+struct Break {
+    at: u64,
+    why: String,
 }
 
 fn no_bag(path: &Path, why: String) -> RosBagError {
@@ -104,40 +123,34 @@ struct Reading<'a, V> {
 }
 
 impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
-    fn file(&mut self, reader: &mut dyn Read) -> Result<(), RosBagError> {
+    /// Records up to the end of the data, or to where they no longer follow each other.
+    fn file(&mut self, reader: &mut dyn Read) -> Result<Option<Break>, RosBagError> {
         let mut body = Vec::new();
         loop {
-            let start = self.at;
+            let at = self.at;
+            let broken = |why: String| Ok(Some(Break { at, why }));
             let mut head = Vec::new();
             self.read(reader, 9, &mut head);
             let Some((opcode, length)) = opcode_and_length(&head) else {
                 let why = if head.is_empty() { "the recording was not closed" } else { "the file is cut off" };
-                self.lose(start, &format!("{why}; everything before was read"));
-                return Ok(());
+                return broken(why.to_owned());
             };
             if opcode == op::DATA_END || opcode == op::FOOTER {
-                return Ok(());
+                return Ok(None);
             }
             if opcode == 0 {
-                self.lose(start, "no record, zeros; nothing behind was read");
-                return Ok(());
+                return broken("no record, but zeros".to_owned());
             }
             let is_read = [op::SCHEMA, op::CHANNEL, op::MESSAGE, op::CHUNK].contains(&opcode);
             if !is_read || length > MAX_CHUNK_BYTES {
-                if is_read {
-                    self.lose(
-                        start,
-                        &format!("a record of {length} bytes, more than {} MiB, was left out", MAX_CHUNK_BYTES >> 20),
-                    );
-                }
                 let skipped = std::io::copy(&mut reader.take(length), &mut std::io::sink()).unwrap_or(0);
                 self.at += skipped;
                 if skipped < length {
-                    self.lose(
-                        start,
-                        &format!("a record of {length} bytes goes beyond the file's end; everything before was read"),
-                    );
-                    return Ok(());
+                    return broken(format!("a record of {length} bytes goes beyond the file's end"));
+                }
+                if is_read {
+                    let most = MAX_CHUNK_BYTES >> 20;
+                    self.lose(at, &format!("a record of {length} bytes, more than {most} MiB, was left out"));
                 }
                 continue;
             }
@@ -145,17 +158,12 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
             self.read(reader, length, &mut body);
             let is_cut = (body.len() as u64) < length;
             if opcode == op::CHUNK {
-                self.chunk(start, &body, is_cut)?;
+                self.chunk(at, &body, is_cut)?;
             } else if !is_cut && let Err(why) = self.record(opcode, &body)? {
-                self.lose(start, &why);
+                self.lose(at, &why);
             }
             if is_cut {
-                let why = format!(
-                    "the file is cut off, {} of {length} bytes of a record are there; everything before the cut was read",
-                    body.len()
-                );
-                self.lose(start, &why);
-                return Ok(());
+                return broken(format!("the file is cut off: {} of {length} bytes of a record are there", body.len()));
             }
         }
     }

@@ -25,6 +25,8 @@ pub(crate) struct Topic {
     pub(crate) joints: BTreeSet<String>,
     /// Pairs of parent and child, where it holds transforms, with the number of transforms of each.
     pub(crate) frames: BTreeMap<(String, String), u64>,
+    /// Paths of numbers in its first message, at most a dozen.
+    pub(crate) numbers: Vec<String>,
 }
 
 impl Topic {
@@ -65,14 +67,18 @@ impl Survey {
             topic.count += 1;
             topic.first_ns = topic.first_ns.min(log_time_ns);
             topic.last_ns = topic.last_ns.max(log_time_ns);
+            let is_first = topic.count == 1;
             let names = JOINT_NAMES.iter().find(|(of, _)| *of == channel.type_name).map(|(_, names)| *names);
-            if topic.count <= LOOKED_AT && (names.is_some() || channel.type_name == TRANSFORMS) {
+            if is_first || topic.count <= LOOKED_AT && (names.is_some() || channel.type_name == TRANSFORMS) {
                 if !decoders.contains_key(&channel.topic) {
                     decoders.insert(channel.topic.clone(), definitions(channel).ok());
                 }
                 let decoder = decoders.get(&channel.topic).and_then(Option::as_ref);
                 if let Some(Ok(value)) = decoder.map(|definitions| cdr::decode(definitions, message)) {
                     note_names(topic, names, &value);
+                    if is_first {
+                        topic.numbers = value.paths_of_numbers();
+                    }
                 }
             }
             Ok(())

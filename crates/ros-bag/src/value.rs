@@ -66,6 +66,8 @@ impl Value {
     pub(crate) fn paths_of_numbers(&self) -> Vec<String> {
         let mut paths = Vec::new();
         self.collect_paths("", &mut paths);
+        // The stamp is in most messages, and never what is looked for.
+        paths.retain(|path| !path.starts_with("header."));
         paths.truncate(12);
         paths
     }

@@ -141,8 +141,12 @@ impl WheelReader {
             return Ok((reader, None));
         }
         let Some((_, left, right, quantity, bits)) = WHEEL_TYPES.iter().find(|(of, ..)| *of == topic.type_name) else {
-            let why = "no type whose wheels are known here; say --left-field PATH --right-field PATH --as ticks, rad, radps, mps or twist";
-            return Err(refuse(why.to_owned()));
+            let numbers = match topic.numbers.join(", ") {
+                none if none.is_empty() => String::new(),
+                numbers => format!("; its numbers are {numbers}"),
+            };
+            let flags = "say --left-field PATH --right-field PATH --as ticks, rad, radps, mps or twist";
+            return Err(refuse(format!("no type whose wheels are known here; {flags}{numbers}")));
         };
         let reader = Self::Fields { left: (*left).to_owned(), right: (*right).to_owned(), quantity: *quantity };
         Ok((reader, *bits))
