@@ -222,9 +222,10 @@ fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
     }
     let quoted = |name: &str| if name.contains(' ') { format!("'{name}'") } else { name.to_owned() };
     let topic = |topic: &Option<String>| topic.as_deref().map_or_else(|| "TOPIC".to_owned(), quoted);
+    let flags: String = listing.flags.iter().map(|flag| format!(" {flag}")).collect();
     let ticks = if listing.is_counted { " --ticks-per-rev COUNTS" } else { "" };
     Some(format!(
-        "yair import ros2 {} --out DIR --wheels {} --truth {} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
+        "yair import ros2 {} --out DIR --wheels {} --truth {}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
         quoted(&arguments.bag.display().to_string()),
         topic(&listing.wheels),
         topic(&listing.truth),

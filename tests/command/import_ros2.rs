@@ -10,7 +10,7 @@ use crate::support::{document, everything_in, refusal, run_in, usage};
 /// What the robot of the bags is in truth, metres: wheels left and right, and their distance.
 const TRUE_M: [f64; 3] = [0.153, 0.1527, 0.309];
 /// A third of what is least wrong in the nominal robot (2.7 mm is, of the right wheel, over 5), and ten times what
-/// counts, poses of 0.1 mm and times of receipt make of it: the right wheel of every fifth row alone is off by
+/// counts, poses of 0.1 mm and times of receipt make of it: the right wheel of every third row alone is off by
 /// 0.003 mm, the wheelbase by 0.02.
 const TOLERANCE_M: f64 = 0.5e-3;
 
@@ -163,6 +163,10 @@ fn the_list_says_what_to_type() {
         command.ends_with("--wheels /joint_states --truth /robot/pose --wheel DIAMETER_M --base SEPARATION_M"),
         "{command}"
     );
+    let listed = document(temp.path(), &["import", "ros2", &bag("by_file"), "--list"]);
+    let command = listed["command"].as_str().expect("a command");
+    let flags = "--wheels /encoders --truth /tf --left-field left --right-field right --as WHICH --truth-frames world,base_link";
+    assert!(command.contains(flags), "{command}");
     assert_eq!(everything_in(temp.path()), Vec::<PathBuf>::new());
 }
 

@@ -146,7 +146,7 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
                 let skipped = std::io::copy(&mut reader.take(length), &mut std::io::sink()).unwrap_or(0);
                 self.at += skipped;
                 if skipped < length {
-                    return broken(format!("a record of {length} bytes goes beyond the file's end"));
+                    return broken(format!("the file is cut off: a record of {length} bytes goes beyond its end"));
                 }
                 if is_read {
                     let most = MAX_CHUNK_BYTES >> 20;
@@ -190,6 +190,11 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
                 start,
                 &format!("a chunk of {size} bytes, more than {} MiB, was left out", MAX_CHUNK_BYTES >> 20),
             );
+            return Ok(());
+        }
+        if is_cut && body.ends_with(mcap::MAGIC) {
+            // The file's end is there: bytes are missing or wrong inside, and no checksum tells which.
+            self.lose(start, "a chunk is longer than the rest of the file; it is damaged and was left out");
             return Ok(());
         }
         let whole = decompress(compression, records);

@@ -161,4 +161,31 @@ mod tests {
         assert_eq!(heading_and_tilt(0.0, 0.0, 0.0, 0.0), None);
         assert_eq!(heading_and_tilt(f64::NAN, 0.0, 0.0, 1.0), None);
     }
+
+    #[test]
+    fn positive_variances_are_sigmas_and_others_are_unknown() {
+        let numbers = |names: &str, values: &[f64]| {
+            let of = |(name, value): (char, &f64)| (name.to_string(), Value::Float(*value));
+            Value::Message(names.chars().zip(values).map(of).collect())
+        };
+        let read = |xx: f64, yy: f64, yaw: f64| {
+            let mut covariance = vec![Value::Float(0.0); 36];
+            (covariance[0], covariance[7], covariance[35]) = (Value::Float(xx), Value::Float(yy), Value::Float(yaw));
+            let pose = Value::Message(vec![
+                ("position".to_owned(), numbers("xyz", &[1.0, 2.0, 3.0])),
+                ("orientation".to_owned(), numbers("xyzw", &[0.0, 0.0, 0.0, 1.0])),
+            ]);
+            let with_covariance =
+                Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
+            let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
+            let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
+            let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
+            let readings = reader.read(&message).expect("a pose");
+            assert_eq!((readings[0].1.x_m, readings[0].1.y_m), (1.0, 2.0));
+            (readings[0].1.sigma_xy_m, readings[0].1.sigma_theta_rad)
+        };
+        assert_eq!(read(3.0, 5.0, 0.25), (Some(2.0), Some(0.5)));
+        assert_eq!(read(3.0, 0.0, -1.0), (None, None));
+        assert_eq!(read(f64::NAN, 1.0, f64::INFINITY), (None, None));
+    }
 }

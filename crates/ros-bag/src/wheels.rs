@@ -235,4 +235,29 @@ mod tests {
         assert_eq!(read(&message(&[], ["r", "l"])), reading(WheelQuantity::AngularSpeeds, 4.0, 3.0));
         assert_eq!(read(&message(&[1.0, 2.0], ["r", "arm"])), None);
     }
+
+    #[test]
+    fn dynamic_joints_are_found_by_the_names_of_joints_and_interfaces() {
+        let texts = |names: &[&str]| Value::List(names.iter().map(|name| Value::Text((*name).to_owned())).collect());
+        let interfaces = |names: &[&str], values: &[f64]| {
+            let values = Value::List(values.iter().map(|value| Value::Float(*value)).collect());
+            Value::Message(vec![("interface_names".to_owned(), texts(names)), ("values".to_owned(), values)])
+        };
+        let message = |right: Value| {
+            Value::Message(vec![
+                ("joint_names".to_owned(), texts(&["r", "l"])),
+                (
+                    "interface_values".to_owned(),
+                    Value::List(vec![right, interfaces(&["velocity", "position"], &[5.0, 1.0])]),
+                ),
+            ])
+        };
+        let reader = WheelReader::DynamicJoints { left: "l".to_owned(), right: "r".to_owned() };
+        let read = |right: Value| reader.read(&message(right)).expect("no fault");
+        let reading = |quantity, left, right| Some(WheelReading { quantity, left, right });
+        let angles = interfaces(&["position", "velocity"], &[2.0, 6.0]);
+        assert_eq!(read(angles), reading(WheelQuantity::Angles, 1.0, 2.0));
+        assert_eq!(read(interfaces(&["velocity"], &[6.0])), reading(WheelQuantity::AngularSpeeds, 5.0, 6.0));
+        assert_eq!(read(interfaces(&["velocity"], &[])), None);
+    }
 }
