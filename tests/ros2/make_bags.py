@@ -100,7 +100,7 @@ def compressed(path, **options):
 
 
 def rosbag2(path, mode, every=1):
-    """A folder with metadata.yaml, by another writer: 16-bit counts in a type of one's own, receipts alone for the wheels, transforms for the
+    """A folder with metadata.yaml, by another writer: 16-bit counts that wrap, in a type of one's own, receipts alone for the wheels, transforms for the
     poses."""
     shutil.rmtree(path, ignore_errors=True)
     store = get_typestore(Stores.ROS2_HUMBLE)
@@ -113,7 +113,7 @@ def rosbag2(path, mode, every=1):
         wheels = bag.add_connection("/encoders", "my_robot_msgs/msg/Encoders", typestore=store)
         frames = bag.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=store)
         for number, (t_ns, left, right, x, y, theta) in enumerate(drive()[::every]):
-            counts = [math.floor(angle / math.tau * 4096) % 65536 for angle in (left, right)]
+            counts = [(math.floor(angle / math.tau * 4096) + 50000) % 65536 for angle in (left, right)]
             message = types["my_robot_msgs/msg/Encoders"](*counts)
             bag.write(wheels, START_NS + t_ns, store.serialize_cdr(message, "my_robot_msgs/msg/Encoders"))
             if number % 2:

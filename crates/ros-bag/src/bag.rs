@@ -18,17 +18,17 @@ pub(crate) struct Bag {
     files: Vec<PathBuf>,
     /// Whether each message is compressed by itself.
     has_compressed_messages: bool,
-    /// Files that the folder should have and has not.
-    missing: Vec<String>,
+    /// What should be known of the folder.
+    remarks: Vec<String>,
 }
 
 impl Bag {
     pub(crate) fn open(path: &Path) -> Result<Self, RosBagError> {
-        let bag = |files, has_compressed_messages, missing| Self {
+        let bag = |files, has_compressed_messages, remarks| Self {
             path: path.to_owned(),
             files,
             has_compressed_messages,
-            missing,
+            remarks,
         };
         if !path.is_dir() {
             return match path.extension().and_then(|extension| extension.to_str()) {
@@ -41,10 +41,15 @@ impl Bag {
         if !metadata.exists() {
             // A recorder that was killed has written none.
             let files = files_of(path)?;
-            return if files.is_empty() {
-                Err(no_bag(path, "no metadata.yaml and no .mcap file in it"))
-            } else {
-                Ok(bag(files, false, Vec::new()))
+            let count = files.len();
+            let remark = format!(
+                "{}: no metadata.yaml; its {count} .mcap files were read as one bag, in the order of their names",
+                path.display()
+            );
+            return match count {
+                0 => Err(no_bag(path, "no metadata.yaml and no .mcap file in it")),
+                1 => Ok(bag(files, false, Vec::new())),
+                _ => Ok(bag(files, false, vec![remark])),
             };
         }
         let found = Metadata::read(&metadata)?;
@@ -57,8 +62,9 @@ impl Bag {
             let why = format!("none of its files is there: {}", found.files.join(", "));
             return Err(RosBagError::Metadata { file: metadata, why });
         }
-        let missing = missing.iter().map(|file| file.display().to_string()).collect();
-        Ok(bag(files, found.has_compressed_messages, missing))
+        let remark = |file: &PathBuf| format!("{}: metadata.yaml names it, and it is not there", file.display());
+        let remarks = missing.iter().map(remark).collect();
+        Ok(bag(files, found.has_compressed_messages, remarks))
     }
 
     /// Visits all messages in the order of the files; gives what was lost.
@@ -67,8 +73,8 @@ impl Bag {
         mut visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
     ) -> Result<Losses, RosBagError> {
         let mut losses = Losses::default();
-        for file in &self.missing {
-            losses.add(format!("{file}: metadata.yaml names it, and it is not there"));
+        for remark in &self.remarks {
+            losses.add(remark.clone());
         }
         for file in &self.files {
             if !self.has_compressed_messages {
@@ -165,6 +171,7 @@ mod tests {
         let bag = Bag::open(folder.path()).expect("a bag");
         let names: Vec<_> = bag.files.iter().map(|file| file.file_name().unwrap_or_default().to_owned()).collect();
         assert_eq!(names, ["a_2.mcap", "a_10.mcap"]);
+        assert!(bag.remarks[0].contains("its 2 .mcap files were read as one bag"), "{:?}", bag.remarks);
     }
 
     #[test]
@@ -177,7 +184,7 @@ mod tests {
         };
         let of = |text: &str| {
             let folder = folder(&[("metadata.yaml", text), ("a.mcap", "")]);
-            Bag::open(folder.path()).map(|bag| (bag.files.len(), bag.missing.len(), bag.has_compressed_messages))
+            Bag::open(folder.path()).map(|bag| (bag.files.len(), bag.remarks.len(), bag.has_compressed_messages))
         };
         assert_eq!(of(&yaml("mcap", "MESSAGE")).expect("a bag"), (1, 1, true));
         assert_eq!(of(&yaml("mcap", "FILE")).expect("a bag"), (1, 1, false));

@@ -59,6 +59,14 @@ pub(crate) fn truth_rank(topic: &Topic) -> Rank {
     (!is_own).then_some(1)
 }
 
+/// Are these poses, which the user named, likely the robot's own odometry, or what was fused from it?
+pub(crate) fn is_own_estimate(topic: &Topic, frames: Option<&(String, String)>) -> bool {
+    if topic.type_name == TRANSFORMS {
+        return frames.is_some_and(|(parent, _)| parent.to_lowercase().contains("odom"));
+    }
+    truth_rank(topic).is_none()
+}
+
 /// The candidates of the best rank.
 fn best(survey: &Survey, rank: fn(&Topic) -> Rank) -> Vec<&Topic> {
     let least = survey.topics.values().filter_map(rank).min();
@@ -141,6 +149,8 @@ mod tests {
         assert_eq!(wheels(&without, bag).expect("one").name, "/odom");
         let refused = truth(&without, bag).expect_err("none").to_string();
         assert!(refused.contains("/goal_pose, /odom may be the robot's own estimate; say --truth TOPIC"), "{refused}");
+        let is_own: Vec<bool> = all[1..].iter().map(|topic| is_own_estimate(topic, None)).collect();
+        assert_eq!(is_own, [true, true, false]);
         let two = survey(&[topic("/a/pose", pose), topic("/b/pose", pose)]);
         let refused = truth(&two, bag).expect_err("two").to_string();
         assert!(refused.contains("say --truth /a/pose or --truth /b/pose"), "{refused}");

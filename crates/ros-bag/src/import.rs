@@ -20,8 +20,8 @@ use crate::topics::Survey;
 use crate::truth::{TruthReader, TruthReading};
 use crate::wheels::{WheelFields, WheelQuantity, WheelReader};
 
-/// Largest tilt of the instrument's poses that the plane bears, radians: at 10° a length in the plane is 1.5 %
-/// short (1 − cos 10°), more than what calibration looks for.
+/// Largest tilt of the instrument's poses that the plane bears, radians: at 10° a length in the plane is
+/// 1.5 % short (1 − cos 10°), more than what calibration looks for.
 const MAX_TILT_RAD: f64 = 10.0 * PI / 180.0;
 /// Largest count that a double holds exactly.
 const LARGEST_COUNT: f64 = 9_007_199_254_740_992.0;
@@ -123,6 +123,12 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
     warnings.extend(both.truth.warnings());
+    if choice::is_own_estimate(truth, options.truth_frames.as_ref()) {
+        warnings.push(format!(
+            "topic {}: poses of this name and type are mostly computed from the wheels themselves; calibration needs an independent instrument",
+            truth.name
+        ));
+    }
     let clocks = clocks(&both, &mut warnings)?;
     let took = took(&both, [wheel_reader.describe(), truth_reader.describe()], clocks);
     let dataset = assemble(&both, clocks, (robot, geometry), path, options, &mut warnings)?;

@@ -1,9 +1,9 @@
 //! Bags of ROS 2 as datasets.
 //!
-//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`, `resync`) →
-//! `definition` and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two topics →
-//! `rows` of them by `wheels` and `truth` → `clock` their times → `import` the dataset. `listing` shows the
-//! topics.
+//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
+//! `resync`) → `definition` and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two
+//! topics → `rows` of them by `wheels` and `truth` → `clock` their times → `import` the dataset. `listing`
+//! shows the topics.
 
 mod bag;
 mod cdr;

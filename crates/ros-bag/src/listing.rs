@@ -94,7 +94,8 @@ fn numbers_of_wheels(topic: &Topic) -> Option<(&Topic, &str, &str)> {
     Some((topic, named("left")?, named("right")?)).filter(|_| is_read)
 }
 
-/// The one transform to the robot's base that is neither odometry's nor a map's, which localisation publishes.
+/// The one transform to the robot's base that is neither odometry's nor a map's, which localisation
+/// publishes.
 fn transform_of_instrument(topic: &Topic) -> Option<(&Topic, [&str; 2])> {
     let own = ["odom", "map", "base"];
     let is_instrument = |(parent, child): &&(String, String)| {

@@ -79,8 +79,8 @@ impl RobotGiven {
     /// is missing.
     ///
     /// # Errors
-    /// [`DatasetError::RobotNotGiven`] with the flags of all that is missing; [`DatasetError::NotWritable`] of
-    /// lengths that are no robot's.
+    /// [`DatasetError::RobotNotGiven`] with the flags of all that is missing; [`DatasetError::NotWritable`]
+    /// of lengths that are no robot's.
     pub fn nominal(
         self,
         is_counted: bool,
