@@ -1,6 +1,6 @@
 //! `yair import ros2 BAG --out DIR`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-fn import(arguments: &Arguments, out: &PathBuf, terminal: &Terminal) -> Result<(), Failure> {
+fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let asked = |error: RosBagError| match &error {
         RosBagError::Dataset(missing) => with_command_line(missing).unwrap_or_else(|| error.into()),
         _ => error.into(),
