@@ -129,6 +129,27 @@ fn of_a_bag_that_is_cut_off_everything_before_the_cut_is_read() {
 }
 
 #[test]
+fn time_that_restarts_is_refused_or_cut_there() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    let (whole, _) = imported(at, &bag("zstd.mcap"), &[]);
+    fs::create_dir(at.join("twice")).expect("made");
+    for name in ["twice/a_0.mcap", "twice/a_1.mcap"] {
+        fs::copy(bag("zstd.mcap"), at.join(name)).expect("copied");
+    }
+    let message = refusal(at, &[&["import", "ros2", "twice", "--out", "other"], &ROBOT[..]].concat());
+    assert!(message.contains("message 442: time runs backwards by 22.000 s"), "{message}");
+    let (found, warnings) = imported(at, "twice", &["--cut", "2"]);
+    assert!(warnings.contains("its 2 .mcap files were read as one bag"), "{warnings}");
+    for (found, whole) in found.iter().zip(&whole) {
+        let rows: Vec<&str> = whole.lines().skip(1).collect();
+        let second = rows.join("\n").replace("run-01", "run-02");
+        assert_eq!(*found, format!("{whole}{second}\n"));
+    }
+    calibrates(at);
+}
+
+#[test]
 fn what_lies_behind_damage_is_read() {
     let temp = tempfile::tempdir().expect("a folder");
     let at = temp.path();

@@ -1,5 +1,6 @@
 //! The dataset of a bag, and what was taken for what.
 
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -262,7 +263,7 @@ fn assemble(
     let session = wheel_rows.first().map_or(0, |(_, time_ns)| *time_ns);
     let is_cut = options.cut_s.is_some();
     let mut runs: Vec<Run> = Vec::new();
-    let mut seen = 0;
+    let mut seen = BTreeSet::new();
     for piece in pieces {
         let rows = &wheel_rows[piece.clone()];
         let (Some(&(first, from_ns)), Some(&(last, to_ns))) = (rows.first(), rows.last()) else { continue };
@@ -275,8 +276,14 @@ fn assemble(
                 && seconds(receipt(first), received_ns) >= -RECEIPT_MARGIN_S
                 && seconds(receipt(last), received_ns) <= RECEIPT_MARGIN_S
         };
-        let of_run: Vec<&(usize, i64)> = truth_rows.iter().filter(belongs).collect();
-        seen += of_run.len();
+        // Of recordings with the same times each run has the poses of one.
+        let mut of_run: Vec<&(usize, i64)> = Vec::new();
+        for row in truth_rows.iter().filter(belongs) {
+            let is_later = of_run.last().is_none_or(|last| last.1 < row.1);
+            if is_later && seen.insert(row.0) {
+                of_run.push(row);
+            }
+        }
         if is_cut && of_run.len() < 2 {
             continue;
         }
@@ -302,7 +309,7 @@ fn assemble(
     if let Some(cut_s) = options.cut_s.filter(|_| runs.is_empty()) {
         return Err(RosBagError::NothingLeft { cut_s });
     }
-    let outside = truth_rows.len() - seen;
+    let outside = truth_rows.len() - seen.len();
     if outside > 0 {
         let what =
             if is_cut { "outside of the runs" } else { "before the first or after the last message of the wheels" };
