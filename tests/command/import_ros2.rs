@@ -10,8 +10,8 @@ use crate::support::{document, everything_in, refusal, run_in, usage};
 /// What the robot of the bags is in truth, metres: wheels left and right, and their distance.
 const TRUE_M: [f64; 3] = [0.153, 0.1527, 0.309];
 /// The nominal lengths are wrong by 3.0, 2.7 and 9.0 mm. What counts, poses of 0.1 mm and times of receipt
-/// leave is at most 0.02 mm, in the wheelbase of every third row. Joints exchanged were seen to miss by 8 mm and
-/// more.
+/// leave is at most 0.02 mm, in the wheelbase of every third row. Joints exchanged were seen to miss by 8 mm
+/// and more.
 const TOLERANCE_M: f64 = 0.5e-3;
 
 const ROBOT: [&str; 4] = ["--wheel", "0.15", "--base", "0.3"];
