@@ -43,3 +43,7 @@ challenge:
 # What draws its seed from the clock: 140 cases of the blind benchmark that nobody has seen. It prints the seed
 fresh-seeds:
     .ci/run fresh-seeds
+
+# Make the bags of tests/ros2 anew by the writers of others; needs Python and PyPI
+interop:
+    .ci/run interop

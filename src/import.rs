@@ -8,9 +8,9 @@ use dataset::import::{IMPORTERS, Importer, Source, importer};
 use dataset::{Loaded, read_ahead};
 use serde::Serialize;
 
-use crate::import_csv;
 use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
+use crate::{import_csv, import_ros2};
 
 /// Other people's logs, or your own, into datasets.
 #[derive(Args)]
@@ -19,10 +19,11 @@ pub(crate) struct Arguments {
     format: Format,
 }
 
-/// What is imported: a format of the table, or a file of no format.
+/// What is imported: a format of the table, a file of no format, or a bag.
 enum Format {
     Known(&'static Importer, Plain),
     Csv(Box<import_csv::Arguments>),
+    Ros2(Box<import_ros2::Arguments>),
 }
 
 /// What every format of the table takes.
@@ -40,6 +41,8 @@ struct Plain {
 
 /// The name of the format that is none.
 const CSV: &str = "csv";
+/// Bags.
+const ROS2: &str = "ros2";
 
 impl FromArgMatches for Format {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
@@ -47,6 +50,7 @@ impl FromArgMatches for Format {
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
         match importer(name) {
             Some(importer) => Ok(Self::Known(importer, Plain::from_arg_matches(matches)?)),
+            None if name == ROS2 => Ok(Self::Ros2(Box::new(import_ros2::Arguments::from_arg_matches(matches)?))),
             None => Ok(Self::Csv(Box::new(import_csv::Arguments::from_arg_matches(matches)?))),
         }
     }
@@ -60,9 +64,15 @@ impl FromArgMatches for Format {
 impl Subcommand for Format {
     fn augment_subcommands(command: Command) -> Command {
         let csv = import_csv::Arguments::augment_args(Command::new(CSV));
+        let ros2 = import_ros2::Arguments::augment_args(Command::new(ROS2));
         let known =
             IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name)).about(importer.about));
-        command.subcommand(csv).subcommands(known).subcommand_required(true).subcommand_value_name("FORMAT")
+        command
+            .subcommand(csv)
+            .subcommand(ros2)
+            .subcommands(known)
+            .subcommand_required(true)
+            .subcommand_value_name("FORMAT")
     }
 
     fn augment_subcommands_for_update(command: Command) -> Command {
@@ -70,7 +80,7 @@ impl Subcommand for Format {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        name == CSV || importer(name).is_some()
+        name == CSV || name == ROS2 || importer(name).is_some()
     }
 }
 
@@ -92,6 +102,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     match &arguments.format {
         Format::Known(importer, arguments) => run_known(importer, arguments, terminal),
         Format::Csv(arguments) => import_csv::run(arguments, terminal),
+        Format::Ros2(arguments) => import_ros2::run(arguments, terminal),
     }
 }
 

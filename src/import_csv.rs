@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
+use dataset::Unit;
 use dataset::import::csv::{
-    self, Confidence, Decimal, Delimiter, FromCsv, MapEntry, Options, Rates, RobotGiven, Took, TookFile, Writing,
+    self, Confidence, Decimal, Delimiter, FromCsv, MapEntry, Options, Rates, Took, TookFile, Writing,
 };
-use dataset::{DatasetError, NominalRobot, Unit};
-use kinematics::Wheels;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use crate::import_robot::{RobotArguments, named, positive, rates, with_command_line};
 use crate::simulate::write_dataset;
 use crate::terminal::{Failure, Terminal, table};
 
@@ -45,21 +45,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Columns")]
     cut: Option<f64>,
 
-    /// Nominal wheel diameter, metres; two with a comma are left and right.
-    #[arg(long, value_name = "METRES", value_parser = diameters, help_heading = "Robot")]
-    wheel: Option<Wheels<f64>>,
-    /// Nominal distance between the wheel contacts, metres.
-    #[arg(long, value_name = "METRES", value_parser = base, help_heading = "Robot")]
-    base: Option<f64>,
-    /// Counts for one turn of the wheel, after decoding and gears; need not be whole.
-    #[arg(long, value_name = "COUNTS", value_parser = positive, help_heading = "Robot")]
-    ticks_per_rev: Option<f64>,
-    /// Width of the counters, where they wrap.
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(2..=63), help_heading = "Robot")]
-    counter_bits: Option<u8>,
-    /// A dataset.toml, or a file with its [robot], instead of the four.
-    #[arg(long, value_name = "FILE", help_heading = "Robot")]
-    robot: Option<PathBuf>,
+    #[command(flatten)]
+    robot: RobotArguments,
 
     /// Unit of all times.
     #[arg(long, value_name = "UNIT", value_parser = units(&Unit::TIMES), help_heading = "Units")]
@@ -88,40 +75,6 @@ pub(crate) struct Arguments {
     header: Option<bool>,
 }
 
-/// Largest wheel or base that is taken for metres: beyond it, millimetres are meant.
-const LARGEST_M: f64 = 10.0;
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
-        _ => Err("expected a positive number".to_owned()),
-    }
-}
-
-fn base(text: &str) -> Result<f64, String> {
-    match positive(text)? {
-        length_m if length_m < LARGEST_M => Ok(length_m),
-        length => Err(format!("{length} m is no robot's; metres are expected: {} for millimetres", length / 1e3)),
-    }
-}
-
-fn diameters(text: &str) -> Result<Wheels<f64>, String> {
-    match text.split_once(',') {
-        Some((left, right)) => Ok(Wheels { left: base(left)?, right: base(right)? }),
-        None => base(text).map(Wheels::both),
-    }
-}
-
-/// A value of a fixed list, by its name.
-fn named<T: Copy + Send + Sync + 'static>(
-    all: &[T],
-    name: fn(T) -> &'static str,
-) -> impl TypedValueParser<Value = T> + use<T> {
-    let all = all.to_vec();
-    PossibleValuesParser::new(all.iter().map(|value| name(*value)).collect::<Vec<_>>())
-        .try_map(move |text| all.iter().copied().find(|value| name(*value) == text).ok_or("no such value"))
-}
-
 fn units(units: &[Unit]) -> impl TypedValueParser<Value = Unit> + use<> {
     named(units, Unit::name)
 }
@@ -132,10 +85,6 @@ fn delimiters() -> impl TypedValueParser<Value = Delimiter> {
 
 fn decimals() -> impl TypedValueParser<Value = Decimal> {
     named(&Decimal::ALL, Decimal::name)
-}
-
-fn rates() -> impl TypedValueParser<Value = Rates> {
-    named(&[Rates::IntervalEnd, Rates::Instantaneous], Rates::name)
 }
 
 fn yes_or_no() -> impl TypedValueParser<Value = bool> {
@@ -158,7 +107,8 @@ struct Written {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let FromCsv { imported, took } = csv::read(&arguments.files, &arguments.options()?).map_err(with_command_line)?;
+    let FromCsv { imported, took } = csv::read(&arguments.files, &arguments.options()?)
+        .map_err(|error| with_command_line(&error).unwrap_or_else(|| error.into()))?;
     show(&took, terminal)?;
     for warning in &imported.warnings {
         terminal.remark(&format!("warning: {warning}"));
@@ -182,9 +132,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 
 impl Arguments {
     fn options(&self) -> Result<Options, Failure> {
-        let robot = self.robot.as_ref().map(|file| read_robot(file)).transpose()?;
-        let diameter =
-            |robot: NominalRobot| Wheels { left: robot.left_wheel_diameter_m, right: robot.right_wheel_diameter_m };
         Ok(Options {
             writing: Writing { delimiter: self.delimiter, decimal: self.decimal, header: self.header },
             map: self.map.clone(),
@@ -195,36 +142,9 @@ impl Arguments {
             rates: self.rates,
             runs_by: self.runs_by.clone(),
             cut_s: self.cut,
-            robot: RobotGiven {
-                wheel_diameter_m: self.wheel.or(robot.map(diameter)),
-                wheel_separation_m: self.base.or(robot.map(|robot| robot.wheel_separation_m)),
-                ticks_per_rev: self.ticks_per_rev.or(robot.and_then(|robot| robot.ticks_per_rev)),
-                counter_bits: self.counter_bits.or(robot.and_then(|robot| robot.counter_bits)),
-            },
+            robot: self.robot.given()?,
         })
     }
-}
-
-/// The robot of a dataset.toml.
-fn read_robot(file: &PathBuf) -> Result<NominalRobot, Failure> {
-    #[derive(Deserialize)]
-    struct WithRobot {
-        robot: NominalRobot,
-    }
-    let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    let with_robot: WithRobot = toml::from_str(&text)
-        .map_err(|error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message()))?;
-    Ok(with_robot.robot)
-}
-
-/// What is missing, as the command line to type.
-fn with_command_line(error: DatasetError) -> Failure {
-    let DatasetError::RobotNotGiven { flags, .. } = &error else { return error.into() };
-    let quoted = |argument: String| {
-        if argument.contains([' ', '[', '*', ';', '|']) { format!("'{argument}'") } else { argument }
-    };
-    let typed: Vec<String> = std::env::args().skip(1).map(quoted).collect();
-    format!("{error}, like this: yair {} {flags}", typed.join(" ")).into()
 }
 
 /// What was taken for what.

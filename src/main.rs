@@ -11,6 +11,8 @@ mod diagnosis_page;
 mod evaluate;
 mod import;
 mod import_csv;
+mod import_robot;
+mod import_ros2;
 mod merge;
 mod plan;
 mod reproduce;

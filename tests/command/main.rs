@@ -8,6 +8,7 @@ mod compare;
 mod contract;
 mod correct;
 mod import_csv;
+mod import_ros2;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;

@@ -98,7 +98,7 @@ fn spike(ticks: &[i64]) -> Option<usize> {
 }
 
 /// Warnings of all wheels that show a wrap; none when the width is known, as they have been unwrapped then.
-pub(crate) fn wrap_warnings(dataset: &Dataset) -> Vec<Warning> {
+pub fn wrap_warnings(dataset: &Dataset) -> Vec<Warning> {
     if dataset.robot.counter_bits.is_some() {
         return Vec::new();
     }

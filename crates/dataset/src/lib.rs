@@ -18,13 +18,14 @@ mod record;
 mod row_lengths;
 mod sampling_period;
 mod session;
+mod standstills;
 mod table;
 mod unit;
 mod warning;
 mod write;
 
 pub use column_names::Quantity;
-pub use counter::{suspected_spike, suspected_wrap};
+pub use counter::{suspected_spike, suspected_wrap, wrap_warnings};
 pub use error::DatasetError;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
@@ -35,6 +36,7 @@ pub use record::{
 pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;
 pub use session::{RunView, Session};
+pub use standstills::moving_pieces;
 pub use unit::Unit;
 pub use warning::Warning;
 pub use write::{Existing, Writer, write};

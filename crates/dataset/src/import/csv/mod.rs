@@ -16,8 +16,6 @@ mod units;
 
 use std::path::PathBuf;
 
-use kinematics::DriveGeometry;
-
 pub use options::{MapEntry, Options, Rates, RobotGiven};
 pub use sheet::Writing;
 pub use text::{Decimal, Delimiter};
@@ -105,38 +103,14 @@ fn robot(parts: &[Part], options: &Options) -> Result<(NominalRobot, Drive), Dat
     let with_wheels = parts.iter().find(|part| part.roles.has_wheels()).unwrap_or(&parts[0]);
     let (candidates, _) = units::wheel_candidates(with_wheels, options);
     let counted = candidates == [WheelUnits::Wheels(Unit::Ticks)];
-    let mut flags = Vec::new();
-    let mut ask = |missing: bool, flag: &str| {
-        if missing {
-            flags.push(flag.to_owned());
-        }
+    let names = || {
+        let named = |(quantity, chosen): (&Quantity, &columns::Chosen)| {
+            format!("{} is {}", quantity.key(), with_wheels.sheet.names[chosen.index])
+        };
+        with_wheels.roles.of.iter().map(named).collect::<Vec<_>>().join(", ")
     };
-    ask(given.wheel_diameter_m.is_none(), "--wheel DIAMETER_M");
-    ask(given.wheel_separation_m.is_none(), "--base SEPARATION_M");
-    ask(counted && given.ticks_per_rev.is_none(), "--ticks-per-rev COUNTS");
-    let (Some(diameter_m), Some(wheel_separation_m), true) =
-        (given.wheel_diameter_m, given.wheel_separation_m, flags.is_empty())
-    else {
-        let names: Vec<String> = with_wheels
-            .roles
-            .of
-            .iter()
-            .map(|(quantity, chosen)| format!("{} is {}", quantity.key(), with_wheels.sheet.names[chosen.index]))
-            .collect();
-        let what = if counted { ", the wheels are counted" } else { "" };
-        let why = format!("{}{what}", names.join(", "));
-        return Err(DatasetError::RobotNotGiven { file: with_wheels.sheet.file.clone(), why, flags: flags.join(" ") });
-    };
-    let geometry = DriveGeometry::new(diameter_m, wheel_separation_m)
-        .map_err(|error| DatasetError::NotWritable { what: format!("--wheel and --base: {error}") })?;
+    let (robot, geometry) = given.nominal(counted, &with_wheels.sheet.file, names)?;
     let rates = options.rates.unwrap_or(Rates::IntervalEnd);
-    let robot = NominalRobot {
-        left_wheel_diameter_m: diameter_m.left,
-        right_wheel_diameter_m: diameter_m.right,
-        wheel_separation_m,
-        ticks_per_rev: given.ticks_per_rev,
-        counter_bits: given.counter_bits,
-    };
     Ok((robot, Drive { geometry, ticks_per_rev: given.ticks_per_rev, rates }))
 }
 

@@ -1,9 +1,13 @@
 //! What a user says of the files to be imported; everything that is `None` is found, or asked for.
 
-use kinematics::Wheels;
+use std::path::Path;
+
+use kinematics::{DriveGeometry, Wheels};
 
 use super::sheet::Writing;
 use crate::column_names::Quantity;
+use crate::error::DatasetError;
+use crate::record::NominalRobot;
 use crate::unit::Unit;
 
 /// One entry of `--map`: a quantity and its column, with its unit where that is said.
@@ -68,6 +72,44 @@ pub struct RobotGiven {
     pub ticks_per_rev: Option<f64>,
     /// Width of the counters, where they wrap.
     pub counter_bits: Option<u8>,
+}
+
+impl RobotGiven {
+    /// The robot as its owner describes it; `what` says what was found in `file`, for the question about what
+    /// is missing.
+    ///
+    /// # Errors
+    /// [`DatasetError::RobotNotGiven`] with the flags of all that is missing; [`DatasetError::NotWritable`]
+    /// of lengths that are no robot's.
+    pub fn nominal(
+        self,
+        is_counted: bool,
+        file: &Path,
+        what: impl FnOnce() -> String,
+    ) -> Result<(NominalRobot, DriveGeometry), DatasetError> {
+        let missing = [
+            (self.wheel_diameter_m.is_none(), "--wheel DIAMETER_M"),
+            (self.wheel_separation_m.is_none(), "--base SEPARATION_M"),
+            (is_counted && self.ticks_per_rev.is_none(), "--ticks-per-rev COUNTS"),
+        ];
+        let flags: Vec<&str> = missing.iter().filter(|(is_missing, _)| *is_missing).map(|(_, flag)| *flag).collect();
+        let (Some(diameter_m), Some(wheel_separation_m), true) =
+            (self.wheel_diameter_m, self.wheel_separation_m, flags.is_empty())
+        else {
+            let why = format!("{}{}", what(), if is_counted { ", the wheels are counted" } else { "" });
+            return Err(DatasetError::RobotNotGiven { file: file.to_owned(), why, flags: flags.join(" ") });
+        };
+        let geometry = DriveGeometry::new(diameter_m, wheel_separation_m)
+            .map_err(|error| DatasetError::NotWritable { what: format!("--wheel and --base: {error}") })?;
+        let robot = NominalRobot {
+            left_wheel_diameter_m: diameter_m.left,
+            right_wheel_diameter_m: diameter_m.right,
+            wheel_separation_m,
+            ticks_per_rev: self.ticks_per_rev,
+            counter_bits: self.counter_bits,
+        };
+        Ok((robot, geometry))
+    }
 }
 
 /// All that a user may say.

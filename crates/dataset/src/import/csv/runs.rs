@@ -8,6 +8,7 @@ use super::sheet::Sheet;
 use super::times::seconds;
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
+use crate::standstills::moving_pieces;
 
 /// A file with what was found in it.
 pub(super) struct Part {
@@ -202,28 +203,11 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
             left[row] == left[before] && right[row] == right[before]
         }
     };
-    let time = |index: usize| part.log.time[run.rows[index]];
-    // Ends of pieces: the index of the first row that belongs to the next.
-    let (mut ends, mut stood_since) = (Vec::new(), 0);
-    for index in 1..run.rows.len() {
-        let gap_s = seconds(time(index - 1), time(index));
-        if gap_s < 0.0 || gap_s > cut_s {
-            ends.push(index);
-            stood_since = index;
-        } else if !stands(run.rows[index - 1], run.rows[index]) {
-            if seconds(time(stood_since), time(index - 1)) > cut_s {
-                ends.push(usize::midpoint(stood_since, index - 1));
-            }
-            stood_since = index;
-        }
-    }
-    ends.push(run.rows.len());
+    let step_s = |from: usize, to: usize| seconds(part.log.time[run.rows[from]], part.log.time[run.rows[to]]);
+    let stand = |from: usize, to: usize| stands(run.rows[from], run.rows[to]);
     let mut pieces: Vec<RawRun> = Vec::new();
-    let mut start = 0;
-    for end in ends {
-        let rows: Vec<usize> = run.rows[start..end].to_vec();
-        start = end;
-        let moves = rows.windows(2).any(|pair| !stands(pair[0], pair[1]));
+    for piece in moving_pieces(run.rows.len(), step_s, stand, cut_s) {
+        let rows: Vec<usize> = run.rows[piece].to_vec();
         let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { continue };
         let (from, to) = (part.log.time[first], part.log.time[last]);
         // In one file time may restart: its poses stand beside their odometry.
@@ -231,7 +215,7 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
         let belongs =
             |row: usize| (!is_own || (first..=last).contains(&row)) && (from..=to).contains(&truth.log.time[row]);
         let truth_rows: Vec<usize> = run.truth_rows.iter().copied().filter(|&row| belongs(row)).collect();
-        if moves && truth_rows.len() >= 2 {
+        if truth_rows.len() >= 2 {
             pieces.push(RawRun { start: from, rows, truth_rows, ..run.clone() });
         }
     }

@@ -1,0 +1,196 @@
+//! Which files a bag is: one MCAP file, or a folder of rosbag2 with its `metadata.yaml`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use yaml_rust2::{Yaml, YamlLoader};
+
+use crate::decompress::decompress;
+use crate::error::RosBagError;
+use crate::mcap_file::{self, Channel, Losses};
+
+/// Longest `metadata.yaml` that is read, bytes: a kilobyte a topic and file, and some ten thousand of these.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
+
+/// A bag's files in order.
+pub(crate) struct Bag {
+    pub(crate) path: PathBuf,
+    files: Vec<PathBuf>,
+    /// Whether each message is compressed by itself.
+    has_compressed_messages: bool,
+    /// What should be known of the folder.
+    remarks: Vec<String>,
+}
+
+impl Bag {
+    pub(crate) fn open(path: &Path) -> Result<Self, RosBagError> {
+        let bag = |files, has_compressed_messages, remarks| Self {
+            path: path.to_owned(),
+            files,
+            has_compressed_messages,
+            remarks,
+        };
+        if !path.is_dir() {
+            return match path.extension().and_then(|extension| extension.to_str()) {
+                _ if !path.exists() => Err(no_bag(path, "no such file or folder")),
+                Some("db3") => Err(RosBagError::Sqlite { path: path.to_owned() }),
+                _ => Ok(bag(vec![path.to_owned()], false, Vec::new())),
+            };
+        }
+        let metadata = path.join("metadata.yaml");
+        if !metadata.exists() {
+            // A recorder that was killed has written none.
+            let files = files_of(path)?;
+            let count = files.len();
+            let remark = format!(
+                "{}: no metadata.yaml; its {count} .mcap files were read as one bag, in the order of their names",
+                path.display()
+            );
+            return match count {
+                0 => Err(no_bag(path, "no metadata.yaml and no .mcap file in it")),
+                1 => Ok(bag(files, false, Vec::new())),
+                _ => Ok(bag(files, false, vec![remark])),
+            };
+        }
+        let found = Metadata::read(&metadata)?;
+        if found.storage == "sqlite3" {
+            return Err(RosBagError::Sqlite { path: path.to_owned() });
+        }
+        let named = found.files.iter().map(|name| path.join(Path::new(name).file_name().unwrap_or_default()));
+        let (files, missing): (Vec<PathBuf>, Vec<PathBuf>) = named.partition(|file| file.is_file());
+        if files.is_empty() {
+            let why = format!("none of its files is there: {}", found.files.join(", "));
+            return Err(RosBagError::Metadata { file: metadata, why });
+        }
+        let remark = |file: &PathBuf| format!("{}: metadata.yaml names it, and it is not there", file.display());
+        let remarks = missing.iter().map(remark).collect();
+        Ok(bag(files, found.has_compressed_messages, remarks))
+    }
+
+    /// Visits all messages in the order of the files; gives what was lost.
+    pub(crate) fn visit(
+        &self,
+        mut visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
+    ) -> Result<Losses, RosBagError> {
+        let mut losses = Losses::default();
+        for remark in &self.remarks {
+            losses.add(remark.clone());
+        }
+        for file in &self.files {
+            if !self.has_compressed_messages {
+                mcap_file::visit(file, &mut visit, &mut losses)?;
+                continue;
+            }
+            let mut faulty = 0_u64;
+            let decompressed = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
+                let whole = decompress("zstd", message);
+                if whole.fault.is_some() {
+                    faulty += 1;
+                    return Ok(());
+                }
+                visit(channel, log_time_ns, &whole.bytes)
+            };
+            mcap_file::visit(file, decompressed, &mut losses)?;
+            if faulty > 0 {
+                losses.add(format!("{}: {faulty} messages could not be decompressed", file.display()));
+            }
+        }
+        Ok(losses)
+    }
+}
+
+fn no_bag(path: &Path, why: &str) -> RosBagError {
+    RosBagError::NoBag { path: path.to_owned(), why: why.to_owned() }
+}
+
+/// The MCAP files of a folder, `bag_2.mcap` before `bag_10.mcap`.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, RosBagError> {
+    let io = |source| RosBagError::Io { path: folder.to_owned(), source };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.ends_with(".db3") {
+            return Err(RosBagError::Sqlite { path: folder.to_owned() });
+        }
+        if name.ends_with(".mcap") || name.ends_with(".mcap.zstd") {
+            files.push(path);
+        }
+    }
+    files.sort_by_cached_key(|path| (path.as_os_str().len(), path.clone()));
+    Ok(files)
+}
+
+/// What matters of `metadata.yaml`.
+struct Metadata {
+    files: Vec<String>,
+    storage: String,
+    has_compressed_messages: bool,
+}
+
+impl Metadata {
+    fn read(file: &Path) -> Result<Self, RosBagError> {
+        let io = |source| RosBagError::Io { path: file.to_owned(), source };
+        let wrong = |why: String| RosBagError::Metadata { file: file.to_owned(), why };
+        if fs::metadata(file).map_err(io)?.len() > MAX_METADATA_BYTES {
+            return Err(wrong(format!("longer than {} MiB", MAX_METADATA_BYTES >> 20)));
+        }
+        let text = String::from_utf8_lossy(&fs::read(file).map_err(io)?).into_owned();
+        let documents = YamlLoader::load_from_str(&text).map_err(|error| wrong(format!("no YAML: {error}")))?;
+        let bag = documents.first().map_or(&Yaml::BadValue, |document| &document["rosbag2_bagfile_information"]);
+        let files = bag["relative_file_paths"].as_vec().map_or(&[][..], Vec::as_slice);
+        let files: Vec<String> = files.iter().filter_map(|name| name.as_str().map(str::to_owned)).collect();
+        if files.is_empty() {
+            return Err(wrong("no rosbag2_bagfile_information with relative_file_paths".to_owned()));
+        }
+        let is_message = bag["compression_mode"].as_str().is_some_and(|mode| mode.eq_ignore_ascii_case("message"));
+        let format = bag["compression_format"].as_str().unwrap_or_default().to_owned();
+        if is_message && !format.is_empty() && format != "zstd" {
+            return Err(wrong(format!("messages compressed as {format:?}; zstd is read")));
+        }
+        let storage = bag["storage_identifier"].as_str().unwrap_or_default().to_owned();
+        Ok(Self { files, storage, has_compressed_messages: is_message })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in files {
+            fs::write(folder.path().join(name), text).expect("written");
+        }
+        folder
+    }
+
+    #[test]
+    fn a_folder_without_metadata_is_its_files_in_order() {
+        let folder = folder(&[("a_10.mcap", ""), ("a_2.mcap", ""), ("notes.txt", "")]);
+        let bag = Bag::open(folder.path()).expect("a bag");
+        let names: Vec<_> = bag.files.iter().map(|file| file.file_name().unwrap_or_default().to_owned()).collect();
+        assert_eq!(names, ["a_2.mcap", "a_10.mcap"]);
+        assert!(bag.remarks[0].contains("its 2 .mcap files were read as one bag"), "{:?}", bag.remarks);
+    }
+
+    #[test]
+    fn metadata_says_files_storage_and_compression() {
+        let yaml = |storage: &str, mode: &str| {
+            format!(
+                "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: {storage}\n  relative_file_paths:\n    \
+                 - a.mcap\n    - gone.mcap\n  compression_format: zstd\n  compression_mode: {mode}\n"
+            )
+        };
+        let of = |text: &str| {
+            let folder = folder(&[("metadata.yaml", text), ("a.mcap", "")]);
+            Bag::open(folder.path()).map(|bag| (bag.files.len(), bag.remarks.len(), bag.has_compressed_messages))
+        };
+        assert_eq!(of(&yaml("mcap", "MESSAGE")).expect("a bag"), (1, 1, true));
+        assert_eq!(of(&yaml("mcap", "FILE")).expect("a bag"), (1, 1, false));
+        assert!(matches!(of(&yaml("sqlite3", "")), Err(RosBagError::Sqlite { .. })));
+        for wrong in ["", "a: [", "rosbag2_bagfile_information: 3", "- 1"] {
+            assert!(matches!(of(wrong), Err(RosBagError::Metadata { .. })), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Which topics are the wheels and the poses of an outside instrument, where nobody says.
+
+use crate::error::RosBagError;
+use crate::topics::{Survey, TRANSFORMS, Topic};
+use crate::truth::TRUTH_TYPES;
+use crate::wheels::{WHEEL_TYPES, WheelQuantity, has_joints, wheel_joints};
+
+/// Parts of the names that topics of outside instruments have.
+const INSTRUMENTS: [&str; 11] = [
+    "truth",
+    "mocap",
+    "motion_capture",
+    "vicon",
+    "optitrack",
+    "vrpn",
+    "qualisys",
+    "natnet",
+    "phasespace",
+    "tracker",
+    "total_station",
+];
+/// Parts of the names that poses have which the robot computes from its own odometry, or is to drive to.
+const OWN_POSES: [&str; 13] =
+    ["odom", "amcl", "ekf", "ukf", "filtered", "fused", "slam", "goal", "initial", "target", "setpoint", "plan", "cmd"];
+
+/// How good a candidate a topic is, best first; none where it is no candidate.
+type Rank = Option<u8>;
+
+fn contains(topic: &Topic, parts: &[&str]) -> bool {
+    let name = topic.name.to_lowercase();
+    parts.iter().any(|part| name.contains(part))
+}
+
+/// Counted wheels and joints come before speeds that were computed from them.
+pub(crate) fn wheels_rank(topic: &Topic) -> Rank {
+    if topic.count < 2 || contains(topic, &INSTRUMENTS) || contains(topic, &["cmd"]) {
+        return None;
+    }
+    if has_joints(&topic.type_name) {
+        return wheel_joints(topic).map(|_| 0);
+    }
+    let (_, _, _, quantity, _) = WHEEL_TYPES.iter().find(|(of, ..)| *of == topic.type_name)?;
+    Some(match quantity {
+        WheelQuantity::Ticks | WheelQuantity::Angles => 0,
+        WheelQuantity::AngularSpeeds | WheelQuantity::Speeds => 1,
+        WheelQuantity::Twist => 2,
+    })
+}
+
+/// Poses that are no odometry; those named after an instrument first.
+pub(crate) fn truth_rank(topic: &Topic) -> Rank {
+    if topic.count < 2 || !TRUTH_TYPES.iter().any(|(of, ..)| *of == topic.type_name) {
+        return None;
+    }
+    if contains(topic, &INSTRUMENTS) {
+        return Some(0);
+    }
+    let is_own = contains(topic, &OWN_POSES) || topic.type_name == "nav_msgs/msg/Odometry";
+    (!is_own).then_some(1)
+}
+
+/// Are these poses, which the user named, likely the robot's own odometry, or what was fused from it?
+pub(crate) fn is_own_estimate(topic: &Topic, frames: Option<&(String, String)>) -> bool {
+    if topic.type_name == TRANSFORMS {
+        return frames.is_some_and(|(parent, _)| parent.to_lowercase().contains("odom"));
+    }
+    truth_rank(topic).is_none()
+}
+
+/// The candidates of the best rank.
+fn best(survey: &Survey, rank: fn(&Topic) -> Rank) -> Vec<&Topic> {
+    let least = survey.topics.values().filter_map(rank).min();
+    survey.topics.values().filter(|topic| rank(topic).is_some() && rank(topic) == least).collect()
+}
+
+/// The only topic of the best rank, for a suggestion.
+pub(crate) fn suggested(survey: &Survey, rank: fn(&Topic) -> Rank) -> Option<&Topic> {
+    best(survey, rank).first().copied()
+}
+
+fn choose<'a>(
+    survey: &'a Survey,
+    bag: &std::path::Path,
+    rank: fn(&Topic) -> Rank,
+    flag: &str,
+    none: impl FnOnce() -> String,
+) -> Result<&'a Topic, RosBagError> {
+    let undecided = |why, flag| RosBagError::Undecided { bag: bag.to_owned(), why, flag };
+    match best(survey, rank)[..] {
+        [topic] => Ok(topic),
+        [] => Err(undecided(none(), format!("{flag} TOPIC"))),
+        ref several => {
+            let named: Vec<String> = several.iter().map(|topic| format!("{flag} {}", topic.name)).collect();
+            let what = if flag == "--wheels" { "wheels" } else { "poses of the instrument" };
+            Err(undecided(format!("{} topics may be the {what}", several.len()), named.join(" or ")))
+        }
+    }
+}
+
+/// The topic of the wheels.
+pub(crate) fn wheels<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, RosBagError> {
+    choose(survey, bag, wheels_rank, "--wheels", || {
+        "no topic has wheels of a known type; any other is read with --left-field PATH --right-field PATH --as ticks, rad, radps, mps or twist"
+            .to_owned()
+    })
+}
+
+/// The topic of the poses.
+pub(crate) fn truth<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, RosBagError> {
+    choose(survey, bag, truth_rank, "--truth", || {
+        let is_pose =
+            |topic: &&Topic| topic.type_name == TRANSFORMS || TRUTH_TYPES.iter().any(|(of, ..)| *of == topic.type_name);
+        let own: Vec<&str> = survey.topics.values().filter(is_pose).map(|topic| &topic.name[..]).collect();
+        let what = "no topic has poses of an outside instrument";
+        match own[..] {
+            [] => what.to_owned(),
+            _ => format!("{what}; {} may be the robot's own estimate", own.join(", ")),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn topic(name: &str, type_name: &str) -> Topic {
+        Topic { name: name.to_owned(), type_name: type_name.to_owned(), count: 100, ..Topic::default() }
+    }
+
+    fn survey(topics: &[Topic]) -> Survey {
+        let topics = topics.iter().map(|topic| (topic.name.clone(), topic.clone())).collect();
+        Survey { topics, losses: Vec::new() }
+    }
+
+    #[test]
+    fn the_robots_own_estimate_is_no_truth_and_counts_come_before_twists() {
+        let pose = "geometry_msgs/msg/PoseStamped";
+        let odometry = "nav_msgs/msg/Odometry";
+        let joints = Topic {
+            joints: ["left_wheel", "right_wheel"].map(str::to_owned).into(),
+            ..topic("/joint_states", "sensor_msgs/msg/JointState")
+        };
+        let bag = std::path::Path::new("bag");
+        let all = [joints, topic("/odom", odometry), topic("/goal_pose", pose), topic("/robot/pose", pose)];
+        let with_joints = survey(&all);
+        assert_eq!(wheels(&with_joints, bag).expect("one").name, "/joint_states");
+        assert_eq!(truth(&with_joints, bag).expect("one").name, "/robot/pose");
+        let without = survey(&all[1..3]);
+        assert_eq!(wheels(&without, bag).expect("one").name, "/odom");
+        let refused = truth(&without, bag).expect_err("none").to_string();
+        assert!(refused.contains("/goal_pose, /odom may be the robot's own estimate; say --truth TOPIC"), "{refused}");
+        let is_own: Vec<bool> = all[1..].iter().map(|topic| is_own_estimate(topic, None)).collect();
+        assert_eq!(is_own, [true, true, false]);
+        let two = survey(&[topic("/a/pose", pose), topic("/b/pose", pose)]);
+        let refused = truth(&two, bag).expect_err("two").to_string();
+        assert!(refused.contains("say --truth /a/pose or --truth /b/pose"), "{refused}");
+        let mocap = survey(&[topic("/a/pose", pose), topic("/mocap/robot", odometry)]);
+        assert_eq!(truth(&mocap, bag).expect("one").name, "/mocap/robot");
+    }
+}

@@ -1,0 +1,415 @@
+//! The dataset of a bag, and what was taken for what.
+
+use std::collections::BTreeSet;
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use dataset::import::csv::{Rates, RobotGiven};
+use dataset::{
+    Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
+    moving_pieces, wrap_warnings,
+};
+use kinematics::{DriveGeometry, Wheels};
+use serde::Serialize;
+
+use crate::bag::Bag;
+use crate::choice;
+use crate::clock::{self, Clock, Ordered, seconds};
+use crate::error::RosBagError;
+use crate::rows::{self, BothRows, Rows, WheelRows};
+use crate::topics::Survey;
+use crate::truth::{TruthReader, TruthReading};
+use crate::wheels::{WheelFields, WheelQuantity, WheelReader};
+
+/// Largest tilt of the instrument's poses that the plane bears, radians: at 10° a length in the plane is
+/// 1.5 % short (1 − cos 10°), more than what calibration looks for.
+const MAX_TILT_RAD: f64 = 10.0 * PI / 180.0;
+/// Largest count that a double holds exactly.
+const LARGEST_COUNT: f64 = 9_007_199_254_740_992.0;
+/// Angles that are wrapped exceed half a turn, or a turn, by rounding alone, radians.
+const WRAPPED_MARGIN_RAD: f64 = 1e-3;
+/// Poses that all have the same heading are of an instrument of positions if they reach so far in both
+/// directions, metres: a robot that drives on a straight alone does so in one of its own.
+const MIN_REACH_M: f64 = 0.3;
+/// Received this much before or after a run's wheels, a pose may still be of the run, seconds.
+const RECEIPT_MARGIN_S: f64 = 1.0;
+/// Speeds say nothing of the motion in a gap; this long it is metres, seconds.
+const MAX_GAP_OF_RATES_S: f64 = 1.0;
+
+/// All that a user may say.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Topic of the wheels.
+    pub wheels: Option<String>,
+    /// Topic of the poses of an outside instrument.
+    pub truth: Option<String>,
+    /// Which joints or fields are the wheels.
+    pub fields: WheelFields,
+    /// Parent and child frame of the poses, in a topic of transforms.
+    pub truth_frames: Option<(String, String)>,
+    /// What a speed holds for.
+    pub rates: Option<Rates>,
+    /// Runs are cut at standstills and gaps that are longer, seconds.
+    pub cut_s: Option<f64>,
+    /// The robot.
+    pub robot: RobotGiven,
+}
+
+/// What was taken of a topic.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TookTopic {
+    /// Its name.
+    pub topic: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub type_name: String,
+    /// Which joints, fields or frames.
+    pub what: String,
+    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument.
+    pub quantity: &'static str,
+    /// Rows that were taken.
+    pub rows: usize,
+    /// `header stamps` or `receive times`.
+    pub times: &'static str,
+}
+
+/// What was taken for what.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Took {
+    /// The wheels.
+    pub wheels: TookTopic,
+    /// The poses.
+    pub truth: TookTopic,
+}
+
+/// A dataset from a bag.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FromBag {
+    /// The dataset.
+    pub dataset: Dataset,
+    /// What was taken for what.
+    pub took: Took,
+    /// What is no error but should be known, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a bag as a dataset.
+///
+/// # Errors
+/// [`RosBagError`] of the first fault; what could not be read of a damaged bag is a warning.
+pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
+    let bag = Bag::open(path)?;
+    let survey = Survey::of(&bag)?;
+    let wheels = match &options.wheels {
+        Some(topic) => survey.named("--wheels", topic)?,
+        None => choice::wheels(&survey, path)?,
+    };
+    let truth = match &options.truth {
+        Some(topic) => survey.named("--truth", topic)?,
+        None => choice::truth(&survey, path)?,
+    };
+    if wheels.name == truth.name {
+        let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
+        let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
+        return Err(RosBagError::Unusable { topic, type_name, why });
+    }
+    let (wheel_reader, counter_bits) = WheelReader::new(wheels, &options.fields)?;
+    let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
+    let both = rows::read(&bag, (&wheels.name, &wheel_reader), (&truth.name, &truth_reader))?;
+
+    let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
+    let is_counted = both.quantity == WheelQuantity::Ticks;
+    let (robot, geometry) =
+        given.nominal(is_counted, path, || format!("wheels are {} of {}", wheel_reader.describe(), wheels.name))?;
+    let mut warnings = both.losses.clone();
+    warnings.extend(both.wheels.warnings());
+    warnings.extend(both.truth.warnings());
+    if choice::is_own_estimate(truth, options.truth_frames.as_ref()) {
+        warnings.push(format!(
+            "topic {}: poses of this name and type are mostly computed from the wheels themselves; calibration needs an independent instrument",
+            truth.name
+        ));
+    }
+    let clocks = clocks(&both, &mut warnings)?;
+    let took = took(&both, [wheel_reader.describe(), truth_reader.describe()], clocks);
+    let dataset = assemble(&both, clocks, (robot, geometry), path, options, &mut warnings)?;
+    warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
+    Ok(FromBag { dataset, took, warnings })
+}
+
+fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2]) -> Took {
+    fn topic<T>(rows: &Rows<T>, what: String, quantity: &'static str, clock: Clock) -> TookTopic {
+        TookTopic {
+            topic: rows.topic.clone(),
+            type_name: rows.type_name.clone(),
+            what,
+            quantity,
+            rows: rows.values.len(),
+            times: if clock == Clock::Stamps { "header stamps" } else { "receive times" },
+        }
+    }
+    Took {
+        wheels: topic(&both.wheels, wheels_what, both.quantity.name(), clocks[0]),
+        truth: topic(&both.truth, truth_what, "pose", clocks[1]),
+    }
+}
+
+/// The clocks of wheels and poses; both by receipt where stamps and receipts do not meet.
+fn clocks(both: &BothRows, warnings: &mut Vec<String>) -> Result<[Clock; 2], RosBagError> {
+    let all = [&both.wheels.times[..], &both.truth.times[..]];
+    let topics = [&both.wheels.topic, &both.truth.topic];
+    let clocks = all.map(clock::clock);
+    for (clock, topic) in clocks.iter().zip(topics) {
+        if *clock == Clock::Receipt {
+            warnings.push(format!(
+                "topic {topic}: no header stamps; the times of receipt are used, which are late and irregular"
+            ));
+        }
+    }
+    let ends = |index: usize, clock: Clock| {
+        let times = all[index].iter().filter_map(|times| match clock {
+            Clock::Stamps => times.stamp_ns,
+            Clock::Receipt => Some(times.received_ns),
+        });
+        times.clone().min().zip(times.max()).unwrap_or_default()
+    };
+    let meet = |clocks: [Clock; 2]| {
+        let ((first, last), (from, to)) = (ends(0, clocks[0]), ends(1, clocks[1]));
+        first <= to && from <= last
+    };
+    if meet(clocks) {
+        return Ok(clocks);
+    }
+    let receipts = [Clock::Receipt; 2];
+    if clocks[0] != clocks[1] && meet(receipts) {
+        warnings.push(
+            "stamps and times of receipt are of two clocks; the times of receipt are used for both topics".to_owned(),
+        );
+        return Ok(receipts);
+    }
+    let span = |index: usize| {
+        let (first, last) = ends(index, clocks[index]);
+        format!("{:.3} to {:.3} s", first as f64 / 1e9, last as f64 / 1e9)
+    };
+    Err(RosBagError::TwoClocks {
+        wheels: topics[0].clone(),
+        wheels_span: span(0),
+        truth: topics[1].clone(),
+        truth_span: span(1),
+    })
+}
+
+/// One topic's rows in the order of time, with what was left out said.
+fn in_order<T>(
+    rows: &Rows<T>,
+    clock: Clock,
+    may_restart: bool,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(usize, i64)>, RosBagError> {
+    let Ordered { rows: ordered, duplicates, unstamped } =
+        clock::ordered(&rows.topic, &rows.times, clock, may_restart)?;
+    for (count, why) in
+        [(duplicates, "at the instant of another"), (unstamped, "without a header stamp, which others have,")]
+    {
+        if count > 0 {
+            warnings.push(format!("topic {}: {count} messages {why} were left out", rows.topic));
+        }
+    }
+    Ok(ordered)
+}
+
+fn assemble(
+    both: &BothRows,
+    clocks: [Clock; 2],
+    (robot, geometry): (NominalRobot, DriveGeometry),
+    path: &Path,
+    options: &Options,
+    warnings: &mut Vec<String>,
+) -> Result<Dataset, RosBagError> {
+    let may_restart = options.cut_s.is_some();
+    let wheel_rows = in_order(&both.wheels, clocks[0], may_restart, warnings)?;
+    let truth_rows = in_order(&both.truth, clocks[1], may_restart, warnings)?;
+    let mut wheels: Vec<[f64; 2]> = wheel_rows.iter().map(|(row, _)| both.wheels.values[*row]).collect();
+    if both.quantity == WheelQuantity::Ticks {
+        refuse_fractions(&both.wheels, &wheels)?;
+    }
+    if both.quantity == WheelQuantity::Angles && unwrap_angles(&mut wheels) {
+        warnings.push(format!("topic {}: the angles are wrapped to a turn; whole turns were added", both.wheels.topic));
+    }
+    let has_heading = !is_heading_constant(&both.truth.values);
+    if !has_heading {
+        warnings.push(format!(
+            "topic {}: all headings are the same while the positions are not; they were left out",
+            both.truth.topic
+        ));
+    }
+    let tilt_rad = both.truth.values.iter().map(|reading| reading.tilt_rad).fold(0.0, f64::max);
+    if tilt_rad > MAX_TILT_RAD {
+        warnings.push(format!(
+            "topic {}: poses are tilted by up to {:.0}°; is z up, and are they the robot's?",
+            both.truth.topic,
+            tilt_rad.to_degrees()
+        ));
+    }
+
+    let step_s = |from: usize, to: usize| seconds(wheel_rows[from].1, wheel_rows[to].1);
+    let stands = |from: usize, to: usize| {
+        if both.quantity.is_rate() { wheels[to] == [0.0, 0.0] } else { wheels[from] == wheels[to] }
+    };
+    let pieces = match options.cut_s {
+        Some(cut_s) => moving_pieces(wheel_rows.len(), step_s, stands, cut_s),
+        None => std::iter::once(0..wheel_rows.len()).collect(),
+    };
+    let session = wheel_rows.first().map_or(0, |(_, time_ns)| *time_ns);
+    let is_cut = options.cut_s.is_some();
+    let mut runs: Vec<Run> = Vec::new();
+    let mut seen = BTreeSet::new();
+    for piece in pieces {
+        let rows = &wheel_rows[piece.clone()];
+        let (Some(&(first, from_ns)), Some(&(last, to_ns))) = (rows.first(), rows.last()) else { continue };
+        let t_s: Vec<f64> = rows.iter().map(|(_, time_ns)| seconds(from_ns, *time_ns)).collect();
+        let log = wheel_log(&wheels[piece], both.quantity, geometry, options.rates.unwrap_or(Rates::IntervalEnd));
+        let receipt = |row: usize| both.wheels.times[row].received_ns;
+        let belongs = |(row, time_ns): &&(usize, i64)| {
+            let received_ns = both.truth.times[*row].received_ns;
+            (from_ns..=to_ns).contains(time_ns)
+                && seconds(receipt(first), received_ns) >= -RECEIPT_MARGIN_S
+                && seconds(receipt(last), received_ns) <= RECEIPT_MARGIN_S
+        };
+        // Of recordings with the same times each run has the poses of one.
+        let mut of_run: Vec<&(usize, i64)> = Vec::new();
+        for row in truth_rows.iter().filter(belongs) {
+            let is_later = of_run.last().is_none_or(|last| last.1 < row.1);
+            if is_later && seen.insert(row.0) {
+                of_run.push(row);
+            }
+        }
+        if is_cut && of_run.len() < 2 {
+            continue;
+        }
+        let readings = || of_run.iter().map(|(row, _)| &both.truth.values[*row]);
+        let sample = |(row, time_ns): &&(usize, i64)| {
+            let reading = &both.truth.values[*row];
+            let theta_rad = reading.theta_rad.filter(|_| has_heading);
+            TruthSample::new(seconds(from_ns, *time_ns), reading.x_m, reading.y_m, theta_rad)
+        };
+        let truth: Vec<TruthSample> = of_run.iter().map(sample).collect();
+        let has_sigma = readings().any(|reading| reading.sigma_xy_m.is_some() || reading.sigma_theta_rad.is_some());
+        let sigma = |reading: &TruthReading| TruthSigma {
+            sigma_xy_m: reading.sigma_xy_m,
+            sigma_theta_rad: reading.sigma_theta_rad.filter(|_| has_heading),
+        };
+        let truth_sigma = has_sigma.then(|| readings().map(sigma).collect());
+        let id = format!("run-{:02}", runs.len() + 1);
+        let start_s = is_cut.then(|| seconds(session, from_ns)).filter(|start_s| *start_s >= 0.0);
+        let info = RunInfo { id, start_s, ..RunInfo::default() };
+        let odometry = Odometry { t_s, wheels: log, ..Odometry::default() };
+        runs.push(Run { info, odometry, truth, truth_sigma, ..Run::default() });
+    }
+    if let Some(cut_s) = options.cut_s.filter(|_| runs.is_empty()) {
+        return Err(RosBagError::NothingLeft { cut_s });
+    }
+    let outside = truth_rows.len() - seen.len();
+    if outside > 0 {
+        let what =
+            if is_cut { "outside of the runs" } else { "before the first or after the last message of the wheels" };
+        warnings.push(format!("topic {}: {outside} of {} poses are {what}", both.truth.topic, truth_rows.len()));
+    }
+    if both.quantity.is_rate() && !is_cut {
+        let longest_s = (1..wheel_rows.len()).map(|row| step_s(row - 1, row)).fold(0.0, f64::max);
+        if longest_s > MAX_GAP_OF_RATES_S {
+            warnings.push(format!(
+                "topic {}: a gap of {longest_s:.1} s, in which the speeds say nothing; --cut {MAX_GAP_OF_RATES_S} cuts runs there",
+                both.wheels.topic
+            ));
+        }
+    }
+    let notes = format!(
+        "ROS 2 bag: wheels of {} ({}), poses of {} ({})",
+        both.wheels.topic, both.wheels.type_name, both.truth.topic, both.truth.type_name
+    );
+    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let provenance = Provenance { name, notes: Some(notes), ..Provenance::default() };
+    Ok(Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs })
+}
+
+fn refuse_fractions(rows: &WheelRows, wheels: &[[f64; 2]]) -> Result<(), RosBagError> {
+    let wrong = wheels.as_flattened().iter().find(|value| value.fract() != 0.0 || value.abs() > LARGEST_COUNT);
+    let Some(wrong) = wrong else { return Ok(()) };
+    let (topic, type_name) = (rows.topic.clone(), rows.type_name.clone());
+    Err(RosBagError::Unusable { topic, type_name, why: format!("{wrong} is no count; say --as rad, radps or mps") })
+}
+
+/// Adds whole turns to angles that are wrapped; says whether they are.
+fn unwrap_angles(wheels: &mut [[f64; 2]]) -> bool {
+    let within = |least: f64, most: f64| wheels.as_flattened().iter().all(|angle| (least..=most).contains(angle));
+    let margin = WRAPPED_MARGIN_RAD;
+    let leaps = wheels.windows(2).any(|pair| (0..2).any(|wheel| (pair[1][wheel] - pair[0][wheel]).abs() > PI));
+    if !leaps || !(within(-PI - margin, PI + margin) || within(-margin, TAU + margin)) {
+        return false;
+    }
+    for wheel in 0..2 {
+        let mut turns = 0.0;
+        for row in 1..wheels.len() {
+            let step = wheels[row][wheel] + TAU * turns - wheels[row - 1][wheel];
+            turns -= (step / TAU).round();
+            wheels[row][wheel] += TAU * turns;
+        }
+    }
+    true
+}
+
+/// Is every heading the same, while the robot moves over a plane?
+fn is_heading_constant(readings: &[TruthReading]) -> bool {
+    let Some(first) = readings.first().and_then(|reading| reading.theta_rad) else { return false };
+    let reach = |of: fn(&TruthReading) -> f64| {
+        let (least, most) = readings.iter().map(of).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+        most - least
+    };
+    let is_same = readings.iter().all(|reading| reading.theta_rad == Some(first));
+    is_same && reach(|reading| reading.x_m) > MIN_REACH_M && reach(|reading| reading.y_m) > MIN_REACH_M
+}
+
+fn wheel_log(wheels: &[[f64; 2]], quantity: WheelQuantity, geometry: DriveGeometry, rates: Rates) -> WheelLog {
+    let column = |wheel: usize, scale: f64| -> Vec<f64> {
+        let mean = |row: usize| match (rates, row.checked_sub(1)) {
+            (Rates::Instantaneous, Some(before)) if quantity.is_rate() => {
+                0.5 * (wheels[before][wheel] + wheels[row][wheel])
+            }
+            _ => wheels[row][wheel],
+        };
+        (0..wheels.len()).map(|row| scale * mean(row)).collect()
+    };
+    let both = |scale: Wheels<f64>| Wheels { left: column(0, scale.left), right: column(1, scale.right) };
+    match quantity {
+        WheelQuantity::Ticks => {
+            let count = |wheel: usize| wheels.iter().map(|row| row[wheel] as i64).collect();
+            WheelLog::Ticks(Wheels { left: count(0), right: count(1) })
+        }
+        WheelQuantity::Angles => WheelLog::Angles(both(Wheels::both(1.0))),
+        WheelQuantity::AngularSpeeds => WheelLog::Speeds(both(geometry.m_per_rad())),
+        WheelQuantity::Speeds => WheelLog::Speeds(both(Wheels::both(1.0))),
+        WheelQuantity::Twist => WheelLog::Twist { v_mps: column(0, 1.0), omega_radps: column(1, 1.0) },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrapped_angles_get_their_turns_back_and_others_stay() {
+        let whole: Vec<[f64; 2]> = (0..100).map(|row| [0.4 * f64::from(row), -0.7 * f64::from(row)]).collect();
+        let wrap = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
+        let mut wrapped: Vec<[f64; 2]> = whole.iter().map(|row| row.map(wrap)).collect();
+        assert!(unwrap_angles(&mut wrapped));
+        // Rounding of 70 radians, a few times.
+        let close = wrapped.iter().zip(&whole).all(|(a, b)| (0..2).all(|wheel| (a[wheel] - b[wheel]).abs() < 1e-12));
+        assert!(close, "{wrapped:?}");
+        let mut same = whole.clone();
+        assert!(!unwrap_angles(&mut same));
+        assert_eq!(same, whole);
+        // A leap to a place that no wrapped angle has.
+        assert!(!unwrap_angles(&mut [[0.0, 0.0], [9.0, 0.0]]));
+    }
+}

@@ -1,0 +1,127 @@
+//! What `--list` shows.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::bag::Bag;
+use crate::choice::{suggested, truth_rank, wheels_rank};
+use crate::error::RosBagError;
+use crate::topics::{Survey, Topic};
+use crate::wheels::{WHEEL_TYPES, WheelQuantity, has_joints};
+
+/// One topic.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ListedTopic {
+    /// Its name.
+    pub topic: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub type_name: String,
+    /// Its messages.
+    pub messages: u64,
+    /// Messages a second; none of a single one.
+    pub rate_hz: Option<f64>,
+    /// From the first to the last message, seconds.
+    pub span_s: f64,
+    /// `wheels` or `truth`, where it may be one of them.
+    pub may_be: Option<&'static str>,
+    /// Names of its joints.
+    pub joints: Vec<String>,
+    /// Its transforms, parent and child.
+    pub frames: Vec<[String; 2]>,
+    /// Paths of numbers in its first message, at most a dozen.
+    pub numbers: Vec<String>,
+}
+
+/// What a bag holds, and what to do with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Listing {
+    /// Topics by name.
+    pub topics: Vec<ListedTopic>,
+    /// The most plausible topic of wheels.
+    pub wheels: Option<String>,
+    /// The most plausible topic of poses.
+    pub truth: Option<String>,
+    /// Flags that these topics need besides.
+    pub flags: Vec<String>,
+    /// Whether the wheels are counted, so that the counts of a turn are needed.
+    pub is_counted: bool,
+    /// What could not be read.
+    pub warnings: Vec<String>,
+}
+
+/// Lists a bag's topics.
+///
+/// # Errors
+/// [`RosBagError`] where there is no bag, or not one message in it.
+pub fn list(path: &Path) -> Result<Listing, RosBagError> {
+    let survey = Survey::of(&Bag::open(path)?)?;
+    let (mut wheels, mut truth) = (suggested(&survey, wheels_rank), suggested(&survey, truth_rank));
+    let mut flags = Vec::new();
+    if wheels.is_none()
+        && let Some((topic, left, right)) = survey.topics.values().find_map(numbers_of_wheels)
+    {
+        wheels = Some(topic);
+        flags.push(format!("--left-field {left} --right-field {right} --as WHICH"));
+    }
+    if truth.is_none()
+        && let Some((topic, [parent, child])) = survey.topics.values().find_map(transform_of_instrument)
+    {
+        truth = Some(topic);
+        flags.push(format!("--truth-frames {parent},{child}"));
+    }
+    let counts = |topic: &Topic| {
+        WHEEL_TYPES.iter().any(|(of, _, _, quantity, _)| *of == topic.type_name && *quantity == WheelQuantity::Ticks)
+    };
+    Ok(Listing {
+        is_counted: wheels.is_some_and(counts),
+        wheels: wheels.map(|topic| topic.name.clone()),
+        truth: truth.map(|topic| topic.name.clone()),
+        flags,
+        topics: survey.topics.values().map(listed).collect(),
+        warnings: survey.losses,
+    })
+}
+
+/// Numbers named after the two sides, in a type that is not known.
+fn numbers_of_wheels(topic: &Topic) -> Option<(&Topic, &str, &str)> {
+    let named = |side: &str| {
+        let of: Vec<&String> = topic.numbers.iter().filter(|path| path.to_lowercase().contains(side)).collect();
+        if let [path] = of[..] { Some(path.as_str()) } else { None }
+    };
+    let is_read = topic.count > 1 && !has_joints(&topic.type_name) && !topic.name.contains("cmd");
+    Some((topic, named("left")?, named("right")?)).filter(|_| is_read)
+}
+
+/// The one transform to the robot's base that is neither odometry's nor a map's, which localisation
+/// publishes.
+fn transform_of_instrument(topic: &Topic) -> Option<(&Topic, [&str; 2])> {
+    let own = ["odom", "map", "base"];
+    let is_instrument = |(parent, child): &&(String, String)| {
+        child.contains("base") && !own.iter().any(|part| parent.to_lowercase().contains(part))
+    };
+    let of: Vec<&(String, String)> = topic.frames.keys().filter(is_instrument).collect();
+    if let [(parent, child)] = of[..] { Some((topic, [parent, child])) } else { None }
+}
+
+fn listed(topic: &Topic) -> ListedTopic {
+    let span_s = topic.span_s();
+    let rate_hz = (topic.count > 1 && span_s > 0.0).then(|| (topic.count - 1) as f64 / span_s);
+    let may_be = match (wheels_rank(topic), truth_rank(topic)) {
+        (Some(_), _) => Some("wheels"),
+        (None, Some(_)) => Some("truth"),
+        (None, None) => None,
+    };
+    ListedTopic {
+        topic: topic.name.clone(),
+        type_name: topic.type_name.clone(),
+        messages: topic.count,
+        rate_hz,
+        span_s,
+        may_be,
+        joints: topic.joints.iter().cloned().collect(),
+        numbers: topic.numbers.clone(),
+        frames: topic.frames.keys().map(|(parent, child)| [parent.clone(), child.clone()]).collect(),
+    }
+}

@@ -1,0 +1,300 @@
+//! Messages of one MCAP file, from its start to its end, with or without an index.
+//!
+//! A record is an opcode, a length and so many bytes; chunks hold records, compressed. One chunk is in memory
+//! at a time, and no length is believed before the bytes are there. A damaged chunk is left out, of one that
+//! is cut off everything before the cut is read. Reference: MCAP specification 1.0, <https://mcap.dev/spec>.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use mcap::records::{Record, op};
+use ruzstd::decoding::StreamingDecoder;
+
+use crate::decompress::{MAX_CHUNK_BYTES, decompress};
+use crate::error::RosBagError;
+use crate::resync::next_chunk;
+
+/// Faults that are told one by one; more are counted.
+const MAX_TOLD: usize = 5;
+
+/// A topic as a file declares it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Channel {
+    pub(crate) topic: String,
+    pub(crate) type_name: String,
+    pub(crate) message_encoding: String,
+    pub(crate) schema_encoding: String,
+    pub(crate) definition: String,
+}
+
+/// What could not be read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Losses {
+    told: Vec<String>,
+    count: usize,
+}
+
+impl Losses {
+    pub(crate) fn add(&mut self, loss: String) {
+        self.count += 1;
+        if self.told.len() < MAX_TOLD {
+            self.told.push(loss);
+        }
+    }
+
+    /// One line a loss; of many the first.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        let more = self.count - self.told.len();
+        let rest = (more > 0).then(|| format!("{more} more places of the bag could not be read"));
+        self.told.iter().cloned().chain(rest).collect()
+    }
+}
+
+/// Visits the messages of a file: channel, time of receipt in nanoseconds, bytes.
+pub(crate) fn visit(
+    path: &Path,
+    visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
+    losses: &mut Losses,
+) -> Result<(), RosBagError> {
+    let io = |source| RosBagError::Io { path: path.to_owned(), source };
+    let file = BufReader::new(File::open(path).map_err(io)?);
+    let is_compressed = path.extension().is_some_and(|extension| extension == "zstd");
+    let mut reader: Box<dyn Read> = if is_compressed {
+        let decoder = StreamingDecoder::new(file);
+        Box::new(decoder.map_err(|error| no_bag(path, format!("no zstd: {error}")))?)
+    } else {
+        Box::new(file)
+    };
+    let mut magic = Vec::new();
+    reader.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(io)?;
+    match &magic[..] {
+        magic if *magic == *mcap::MAGIC => {}
+        [] => return Err(no_bag(path, "an empty file".to_owned())),
+        magic if b"SQLite format 3".starts_with(magic) => return Err(RosBagError::Sqlite { path: path.to_owned() }),
+        magic if b"#ROSBAG V2.0".starts_with(magic) => {
+            let why = "a bag of ROS 1; convert it with `rosbags-convert --src FILE --dst converted --dst-storage mcap`";
+            return Err(no_bag(path, why.to_owned()));
+        }
+        _ => return Err(no_bag(path, "no MCAP file by its first bytes".to_owned())),
+    }
+    let mut reading =
+        Reading { path, at: magic.len() as u64, schemas: BTreeMap::new(), channels: BTreeMap::new(), visit, losses };
+    while let Some(Break { at, why }) = reading.file(&mut *reader)? {
+        // Nothing can be sought in what is compressed as a whole.
+        let next = if is_compressed { None } else { next_chunk(path, at + 1).map_err(io)? };
+        let Some((next, behind)) = next else {
+            reading.lose(at, &format!("{why}; everything before was read"));
+            break;
+        };
+        reading.lose(at, &format!("{why}; {} bytes are lost, up to the next chunk at byte {next}", next - at));
+        reading.at = next;
+        reader = Box::new(behind);
+    }
+    Ok(())
+}
+
+/// Where records no longer follow each other.
+struct Break {
+    at: u64,
+    why: String,
+}
+
+fn no_bag(path: &Path, why: String) -> RosBagError {
+    RosBagError::NoBag { path: path.to_owned(), why }
+}
+
+/// What a schema record says: name, encoding, text.
+struct Schema {
+    name: String,
+    encoding: String,
+    text: String,
+}
+
+struct Reading<'a, V> {
+    path: &'a Path,
+    /// Byte of the file.
+    at: u64,
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, Channel>,
+    visit: V,
+    losses: &'a mut Losses,
+}
+
+impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
+    /// Records up to the end of the data, or to where they no longer follow each other.
+    fn file(&mut self, reader: &mut dyn Read) -> Result<Option<Break>, RosBagError> {
+        let mut body = Vec::new();
+        loop {
+            let at = self.at;
+            let broken = |why: String| Ok(Some(Break { at, why }));
+            let mut head = Vec::new();
+            self.read(reader, 9, &mut head);
+            let Some((opcode, length)) = opcode_and_length(&head) else {
+                let why = if head.is_empty() { "the recording was not closed" } else { "the file is cut off" };
+                return broken(why.to_owned());
+            };
+            if opcode == op::DATA_END || opcode == op::FOOTER {
+                return Ok(None);
+            }
+            if opcode == 0 {
+                return broken("no record, but zeros".to_owned());
+            }
+            let is_read = [op::SCHEMA, op::CHANNEL, op::MESSAGE, op::CHUNK].contains(&opcode);
+            if !is_read || length > MAX_CHUNK_BYTES {
+                let skipped = std::io::copy(&mut reader.take(length), &mut std::io::sink()).unwrap_or(0);
+                self.at += skipped;
+                if skipped < length {
+                    return broken(format!("the file is cut off: a record of {length} bytes goes beyond its end"));
+                }
+                if is_read {
+                    let most = MAX_CHUNK_BYTES >> 20;
+                    self.lose(at, &format!("a record of {length} bytes, more than {most} MiB, was left out"));
+                }
+                continue;
+            }
+            body.clear();
+            self.read(reader, length, &mut body);
+            let is_cut = (body.len() as u64) < length;
+            if opcode == op::CHUNK {
+                self.chunk(at, &body, is_cut)?;
+            } else if !is_cut && let Err(why) = self.record(opcode, &body)? {
+                self.lose(at, &why);
+            }
+            if is_cut {
+                return broken(format!("the file is cut off: {} of {length} bytes of a record are there", body.len()));
+            }
+        }
+    }
+
+    /// Reads up to `count` bytes; a fault of the file is its end.
+    fn read(&mut self, reader: &mut dyn Read, count: u64, into: &mut Vec<u8>) {
+        // What was read before a fault stays in `into`.
+        let _ = reader.take(count).read_to_end(into);
+        self.at += into.len() as u64;
+    }
+
+    fn lose(&mut self, at: u64, why: &str) {
+        self.losses.add(format!("{}: byte {at}: {why}", self.path.display()));
+    }
+
+    /// Records of a chunk; of one that is cut off, those before the cut.
+    fn chunk(&mut self, start: u64, body: &[u8], is_cut: bool) -> Result<(), RosBagError> {
+        let Some(ChunkBody { size, crc, compression, records }) = ChunkBody::parse(body, is_cut) else {
+            self.lose(start, &format!("a chunk's header is damaged; its {} bytes were left out", body.len()));
+            return Ok(());
+        };
+        if size > MAX_CHUNK_BYTES {
+            self.lose(
+                start,
+                &format!("a chunk of {size} bytes, more than {} MiB, was left out", MAX_CHUNK_BYTES >> 20),
+            );
+            return Ok(());
+        }
+        if is_cut && body.ends_with(mcap::MAGIC) {
+            // The file's end is there: bytes are missing or wrong inside, and no checksum tells which.
+            self.lose(start, "a chunk is longer than the rest of the file; it is damaged and was left out");
+            return Ok(());
+        }
+        let whole = decompress(compression, records);
+        if !is_cut {
+            let why = match whole.fault {
+                Some(fault) => Some(fault),
+                None if whole.bytes.len() as u64 != size => {
+                    Some(format!("{} bytes instead of {size}", whole.bytes.len()))
+                }
+                None if crc != 0 && crc32fast::hash(&whole.bytes) != crc => Some("its checksum differs".to_owned()),
+                None => None,
+            };
+            if let Some(why) = why {
+                self.lose(start, &format!("a chunk of {} bytes is damaged and was left out: {why}", body.len()));
+                return Ok(());
+            }
+        }
+        let mut rest = &whole.bytes[..];
+        while !rest.is_empty() {
+            let record = opcode_and_length(rest).and_then(|(opcode, length)| {
+                let end = usize::try_from(length).ok()?.checked_add(9)?;
+                Some((opcode, rest.get(9..end)?, rest.get(end..)?))
+            });
+            let Some((opcode, body, behind)) = record else {
+                if !is_cut {
+                    self.lose(start, &format!("the last {} bytes of a chunk are no record", rest.len()));
+                }
+                return Ok(());
+            };
+            if let Err(why) = self.record(opcode, body)? {
+                self.lose(start, &why);
+            }
+            rest = behind;
+        }
+        Ok(())
+    }
+
+    /// One record that is no chunk; the inner error is a fault of its bytes.
+    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<Result<(), String>, RosBagError> {
+        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
+            return Ok(Ok(()));
+        }
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Schema { header, data }) => {
+                let text = String::from_utf8_lossy(&data).into_owned();
+                self.schemas.insert(header.id, Schema { name: header.name, encoding: header.encoding, text });
+            }
+            Ok(Record::Channel(channel)) => {
+                let schema = self.schemas.get(&channel.schema_id);
+                let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
+                let declared = Channel {
+                    topic: channel.topic,
+                    message_encoding: channel.message_encoding,
+                    type_name: of(|schema| &schema.name),
+                    schema_encoding: of(|schema| &schema.encoding),
+                    definition: of(|schema| &schema.text),
+                };
+                self.channels.insert(channel.id, declared);
+            }
+            Ok(Record::Message { header, data }) => match self.channels.get(&header.channel_id) {
+                Some(channel) => (self.visit)(channel, header.log_time, &data)?,
+                None => return Ok(Err(format!("a message of channel {}, which was not declared", header.channel_id))),
+            },
+            Ok(_) => {}
+            Err(error) => return Ok(Err(format!("a record is damaged: {error}"))),
+        }
+        Ok(Ok(()))
+    }
+}
+
+fn opcode_and_length(head: &[u8]) -> Option<(u8, u64)> {
+    let (&opcode, rest) = head.split_first()?;
+    Some((opcode, u64::from_le_bytes(*rest.first_chunk()?)))
+}
+
+/// A chunk's record, by hand: of one that is cut off too.
+struct ChunkBody<'a> {
+    /// Length of the records, uncompressed.
+    size: u64,
+    crc: u32,
+    compression: &'a str,
+    records: &'a [u8],
+}
+
+impl<'a> ChunkBody<'a> {
+    fn parse(body: &'a [u8], is_cut: bool) -> Option<Self> {
+        // The times of its first and last message.
+        let rest = body.get(16..)?;
+        let (size, rest) = rest.split_first_chunk::<8>()?;
+        let (crc, rest) = rest.split_first_chunk::<4>()?;
+        let (name_length, rest) = rest.split_first_chunk::<4>()?;
+        let (name, rest) = rest.split_at_checked(u32::from_le_bytes(*name_length) as usize)?;
+        let (length, rest) = rest.split_first_chunk::<8>()?;
+        let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+        let records = if is_cut { rest } else { rest.get(..length)? };
+        Some(Self {
+            size: u64::from_le_bytes(*size),
+            crc: u32::from_le_bytes(*crc),
+            compression: std::str::from_utf8(name).ok()?,
+            records,
+        })
+    }
+}

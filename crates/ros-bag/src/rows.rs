@@ -1,0 +1,158 @@
+//! Rows of the two topics: one pass over the bag.
+
+use crate::bag::Bag;
+use crate::cdr;
+use crate::clock::Times;
+use crate::definition::Definitions;
+use crate::error::RosBagError;
+use crate::mcap_file::Channel;
+use crate::topics::definitions;
+use crate::truth::{TruthReader, TruthReading};
+use crate::value::Value;
+use crate::wheels::{WheelQuantity, WheelReader};
+
+/// Rows of one topic.
+#[derive(Debug)]
+pub(crate) struct Rows<T> {
+    pub(crate) topic: String,
+    pub(crate) type_name: String,
+    pub(crate) times: Vec<Times>,
+    pub(crate) values: Vec<T>,
+    /// Messages that are about something else.
+    pub(crate) others: u64,
+    /// Messages whose numbers are NaN or infinite.
+    pub(crate) not_finite: u64,
+    /// Messages that are not what the definition says, and why the first is not.
+    pub(crate) faulty: u64,
+    pub(crate) first_fault: Option<(u64, String)>,
+    messages: u64,
+    decoder: Option<Definitions>,
+}
+
+impl<T> Rows<T> {
+    fn new(topic: &str, type_name: &str) -> Self {
+        Self {
+            topic: topic.to_owned(),
+            type_name: type_name.to_owned(),
+            times: Vec::new(),
+            values: Vec::new(),
+            others: 0,
+            not_finite: 0,
+            faulty: 0,
+            first_fault: None,
+            messages: 0,
+            decoder: None,
+        }
+    }
+
+    fn push(&mut self, times: Times, value: T, is_finite: bool) {
+        if is_finite {
+            self.times.push(times);
+            self.values.push(value);
+        } else {
+            self.not_finite += 1;
+        }
+    }
+
+    /// Decodes a message; none of one that is faulty.
+    fn decode(&mut self, channel: &Channel, message: &[u8]) -> Result<Option<Value>, RosBagError> {
+        self.messages += 1;
+        if self.decoder.is_none() {
+            self.decoder = Some(definitions(channel)?);
+        }
+        let decoded = self.decoder.as_ref().map(|definitions| cdr::decode(definitions, message));
+        Ok(decoded.and_then(|decoded| decoded.map_err(|why| self.note_fault(why)).ok()))
+    }
+
+    fn note_fault(&mut self, why: String) {
+        self.faulty += 1;
+        let number = self.messages;
+        self.first_fault.get_or_insert((number, why));
+    }
+
+    /// Refuses a topic of which nothing could be read.
+    fn refuse_none(&self, what: &str) -> Result<(), RosBagError> {
+        if self.values.len() >= 2 {
+            return Ok(());
+        }
+        if let Some((number, why)) = self.first_fault.clone() {
+            return Err(RosBagError::Message { topic: self.topic.clone(), number, why });
+        }
+        let why = format!("{} of {} messages have {what}; two are needed at least", self.values.len(), self.messages);
+        Err(RosBagError::Unusable { topic: self.topic.clone(), type_name: self.type_name.clone(), why })
+    }
+
+    /// What was left out, one line a reason.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        let topic = &self.topic;
+        let mut lines = Vec::new();
+        if self.others > 0 {
+            lines.push(format!("topic {topic}: {} of {} messages are of something else", self.others, self.messages));
+        }
+        if self.not_finite > 0 {
+            lines.push(format!("topic {topic}: {} messages with NaN or infinity were left out", self.not_finite));
+        }
+        if let Some((number, why)) = &self.first_fault {
+            lines.push(format!("topic {topic}: {} messages were left out; of message {number}: {why}", self.faulty));
+        }
+        lines
+    }
+}
+
+/// Rows of the wheels, with what their numbers are.
+pub(crate) type WheelRows = Rows<[f64; 2]>;
+
+/// What was read of a bag.
+pub(crate) struct BothRows {
+    pub(crate) wheels: WheelRows,
+    pub(crate) quantity: WheelQuantity,
+    pub(crate) truth: Rows<TruthReading>,
+    pub(crate) losses: Vec<String>,
+}
+
+/// Reads wheels and poses.
+pub(crate) fn read(
+    bag: &Bag,
+    wheels: (&str, &WheelReader),
+    truth: (&str, &TruthReader),
+) -> Result<BothRows, RosBagError> {
+    let (wheel_topic, wheel_reader) = wheels;
+    let (truth_topic, truth_reader) = truth;
+    let mut wheels: WheelRows = Rows::new(wheel_topic, "");
+    let mut truth: Rows<TruthReading> = Rows::new(truth_topic, "");
+    let mut quantity = None;
+    let losses = bag.visit(|channel, received_ns, message| {
+        if channel.topic == wheel_topic {
+            wheels.type_name.clone_from(&channel.type_name);
+            if let Some(value) = wheels.decode(channel, message)? {
+                match wheel_reader.read(&value) {
+                    Ok(Some(reading)) if *quantity.get_or_insert(reading.quantity) == reading.quantity => {
+                        let is_finite = reading.left.is_finite() && reading.right.is_finite();
+                        wheels.push(Times::of(&value, received_ns), [reading.left, reading.right], is_finite);
+                    }
+                    Ok(_) => wheels.others += 1,
+                    Err(why) => wheels.note_fault(why),
+                }
+            }
+        }
+        if channel.topic == truth_topic {
+            truth.type_name.clone_from(&channel.type_name);
+            if let Some(value) = truth.decode(channel, message)? {
+                match truth_reader.read(&value) {
+                    Ok(readings) => {
+                        for (stamped, reading) in readings {
+                            let is_finite = reading.x_m.is_finite() && reading.y_m.is_finite();
+                            truth.push(Times::of(stamped, received_ns), reading, is_finite);
+                        }
+                    }
+                    Err(why) => truth.note_fault(why),
+                }
+            }
+        }
+        Ok(())
+    })?;
+    wheels.refuse_none("both wheels")?;
+    truth.refuse_none("a pose")?;
+    let quantity = quantity.unwrap_or(WheelQuantity::Angles);
+    Ok(BothRows { wheels, quantity, truth, losses: losses.lines() })
+}

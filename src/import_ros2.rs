@@ -1,0 +1,233 @@
+//! `yair import ros2 BAG --out DIR`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use dataset::import::csv::Rates;
+use ros_bag::{FromBag, Listing, Options, RosBagError, Took, TookTopic, WheelFields, WheelQuantity};
+use serde::Serialize;
+
+use crate::import_robot::{RobotArguments, named, positive, rates, with_command_line};
+use crate::simulate::write_dataset;
+use crate::terminal::{Failure, Terminal, table};
+
+/// A bag of ROS 2: a folder of rosbag2 or one .mcap file, plain or compressed
+///
+/// Two topics become a dataset: the robot's wheels and the poses of an outside instrument. --list shows what
+/// a bag holds and what to type. Known types of wheels: JointState and DynamicJointState (joints by name),
+/// SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the Create 3, and the twists of Odometry
+/// and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
+/// PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and TFMessage with
+/// --truth-frames.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Folder with metadata.yaml, or one .mcap or .mcap.zstd file.
+    bag: PathBuf,
+    /// Folder for the dataset.
+    #[arg(long, value_name = "DIR", required_unless_present = "list")]
+    out: Option<PathBuf>,
+    /// Replace a dataset that is already there.
+    #[arg(long)]
+    force: bool,
+    /// Show the topics and what to type; write nothing.
+    #[arg(long)]
+    list: bool,
+
+    /// Topic of the wheels.
+    #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
+    wheels: Option<String>,
+    /// Topic of the poses of an outside instrument.
+    #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
+    truth: Option<String>,
+    /// Which transform is the robot's pose, where --truth is a topic of transforms.
+    #[arg(long, value_name = "PARENT,CHILD", value_parser = frames, help_heading = "Topics")]
+    truth_frames: Option<(String, String)>,
+    /// Cut runs where the robot stands still, or the log has a gap, for longer than that.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Topics")]
+    cut: Option<f64>,
+
+    /// Joint of the left wheel.
+    #[arg(long, value_name = "NAME", requires = "right_joint", help_heading = "Wheels")]
+    left_joint: Option<String>,
+    /// Joint of the right wheel.
+    #[arg(long, value_name = "NAME", requires = "left_joint", help_heading = "Wheels")]
+    right_joint: Option<String>,
+    /// Number of the left wheel in a message of any type, such as encoders.left or data[0]; the forward speed
+    /// of a twist.
+    #[arg(long, value_name = "PATH", requires_all = ["right_field", "quantity"], help_heading = "Wheels")]
+    left_field: Option<String>,
+    /// Number of the right wheel; the yaw rate of a twist.
+    #[arg(long, value_name = "PATH", requires_all = ["left_field", "quantity"], help_heading = "Wheels")]
+    right_field: Option<String>,
+    /// What these numbers are: counts, angles, angular speeds, contact speeds in m/s, or speed and yaw rate.
+    #[arg(
+        id = "quantity",
+        long = "as",
+        value_name = "WHICH",
+        value_parser = named(&WheelQuantity::ALL, WheelQuantity::name),
+        requires_all = ["left_field", "right_field"],
+        help_heading = "Wheels"
+    )]
+    quantity: Option<WheelQuantity>,
+    /// Whether a speed is the mean over the interval that ends there, or that of the instant.
+    #[arg(long, value_name = "WHICH", value_parser = rates(), help_heading = "Wheels")]
+    rates: Option<Rates>,
+
+    #[command(flatten)]
+    robot: RobotArguments,
+}
+
+fn frames(text: &str) -> Result<(String, String), String> {
+    match text.split_once(',').map(|(parent, child)| (parent.trim(), child.trim())) {
+        Some((parent, child)) if !parent.is_empty() && !child.is_empty() => Ok((parent.to_owned(), child.to_owned())),
+        _ => Err("expected two frames with a comma, such as map,base_link".to_owned()),
+    }
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    format: &'static str,
+    source: String,
+    datasets: [Written; 1],
+    took: &'a Took,
+    warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Written {
+    dataset: String,
+    runs: usize,
+    odometry_rows: usize,
+    truth_rows: usize,
+}
+
+#[derive(Serialize)]
+struct Listed<'a> {
+    format: &'static str,
+    source: String,
+    #[serde(flatten)]
+    listing: &'a Listing,
+    command: Option<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    match &arguments.out {
+        Some(out) if !arguments.list => import(arguments, out, terminal)?,
+        _ => list(arguments, terminal)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    let asked = |error: RosBagError| match &error {
+        RosBagError::Dataset(missing) => with_command_line(missing).unwrap_or_else(|| error.into()),
+        _ => error.into(),
+    };
+    let FromBag { dataset, took, warnings } = ros_bag::import(&arguments.bag, &arguments.options()?).map_err(asked)?;
+    for (what, flag, topic) in [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)] {
+        let TookTopic { topic, type_name, what: of, quantity, rows, times } = topic;
+        terminal.say(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
+    }
+    for warning in &warnings {
+        terminal.remark(&format!("warning: {warning}"));
+    }
+    write_dataset(&dataset, out, arguments.force)?;
+    let written = Written {
+        dataset: out.display().to_string(),
+        runs: dataset.runs.len(),
+        odometry_rows: dataset.runs.iter().map(|run| run.odometry.t_s.len()).sum(),
+        truth_rows: dataset.runs.iter().map(|run| run.truth.len()).sum(),
+    };
+    let Written { dataset: out, runs, odometry_rows, truth_rows } = &written;
+    terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows, {truth_rows} truth rows in {out}"))?;
+    terminal.document(&Document {
+        format: "ros2",
+        source: arguments.bag.display().to_string(),
+        datasets: [written],
+        took: &took,
+        warnings: &warnings,
+    })
+}
+
+impl Arguments {
+    fn options(&self) -> Result<Options, Failure> {
+        Ok(Options {
+            wheels: self.wheels.clone(),
+            truth: self.truth.clone(),
+            fields: WheelFields {
+                left_joint: self.left_joint.clone(),
+                right_joint: self.right_joint.clone(),
+                left_field: self.left_field.clone(),
+                right_field: self.right_field.clone(),
+                quantity: self.quantity,
+            },
+            truth_frames: self.truth_frames.clone(),
+            rates: self.rates,
+            cut_s: self.cut,
+            robot: self.robot.given()?,
+        })
+    }
+}
+
+fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
+    let listing = ros_bag::list(&arguments.bag)?;
+    for warning in &listing.warnings {
+        terminal.remark(&format!("warning: {warning}"));
+    }
+    let mut lines = table(&["topic", "type", "messages", "Hz", "s", "may be"], 2);
+    for topic in &listing.topics {
+        let rate = topic.rate_hz.map_or_else(|| "–".to_owned(), |rate_hz| format!("{rate_hz:.1}"));
+        let row = [
+            topic.topic.clone(),
+            topic.type_name.clone(),
+            topic.messages.to_string(),
+            rate,
+            format!("{:.1}", topic.span_s),
+            topic.may_be.unwrap_or_default().to_owned(),
+        ];
+        lines.add_row(row);
+    }
+    terminal.say(&lines.to_string())?;
+    for topic in &listing.topics {
+        if !topic.joints.is_empty() {
+            terminal.say(&format!("joints of {}: {}", topic.topic, topic.joints.join(", ")))?;
+        }
+        if !topic.frames.is_empty() {
+            let frames: Vec<String> = topic.frames.iter().map(|pair| pair.join(",")).collect();
+            terminal.say(&format!("frames of {}: {}", topic.topic, frames.join(" ")))?;
+        }
+    }
+    let command = command(arguments, &listing);
+    if let Some(command) = &command {
+        terminal.say(&format!("to import it: {command}"))?;
+    }
+    let missing =
+        [(listing.wheels.is_none(), "wheels of a known type"), (listing.truth.is_none(), "poses of an instrument")];
+    for (_, what) in missing.iter().filter(|(is_missing, _)| *is_missing) {
+        terminal.say(&format!("no topic is plainly one of {what}; --help says how to name any other"))?;
+    }
+    terminal.document(&Listed {
+        format: "ros2",
+        source: arguments.bag.display().to_string(),
+        listing: &listing,
+        command,
+    })
+}
+
+/// The command line that imports the most plausible topics.
+fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
+    if listing.wheels.is_none() && listing.truth.is_none() {
+        return None;
+    }
+    let quoted = |name: &str| if name.contains(' ') { format!("'{name}'") } else { name.to_owned() };
+    let topic = |topic: &Option<String>| topic.as_deref().map_or_else(|| "TOPIC".to_owned(), quoted);
+    let flags: String = listing.flags.iter().map(|flag| format!(" {flag}")).collect();
+    let ticks = if listing.is_counted { " --ticks-per-rev COUNTS" } else { "" };
+    Some(format!(
+        "yair import ros2 {} --out DIR --wheels {} --truth {}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
+        quoted(&arguments.bag.display().to_string()),
+        topic(&listing.wheels),
+        topic(&listing.truth),
+    ))
+}
