@@ -23,6 +23,20 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
         "diagnose",
         &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario", "estimation", "calib"],
     ),
+    (
+        "export",
+        &[
+            "kinematics",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "estimation",
+            "calib",
+            "diagnose",
+        ],
+    ),
     ("report", &["atomic-file"]),
     (
         "bench",
@@ -91,6 +105,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "blind-benchmark",
             "paper-reproduction",
             "preflight",
+            "export",
         ],
     ),
 ];

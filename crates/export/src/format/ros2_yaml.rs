@@ -189,9 +189,9 @@ mod tests {
              \u{20}   left_wheel_radius_multiplier: 1.01  # ± 0.00010: 101.000 mm ± 0.010 mm instead of 100.000 mm\n\
              \u{20}   right_wheel_radius_multiplier: 0.99  # ± 0.00010: 99.000 mm ± 0.010 mm instead of 100.000 mm\n\
              \u{20}   # Covariances are of x, y, z, roll, pitch, yaw, from the fitted noise of the wheels, 1.0 mm/√m.\n\
-             \u{20}   #  Twist: over one interval at 50.0 Hz, 0.25 m/s straight on; it grows in proportion to speed and\n\
-             \u{20}   #  rate. Sideways the model has no motion: the variance ahead stands there. Pose: after 1.0 m\n\
-             \u{20}   #  straight on; that of dead reckoning grows without bound, which no constant can say: let a\n\
+             \u{20}   #  Twist: over one interval at 50.0 Hz, 0.25 m/s straight on; it grows in proportion to speed\n\
+             \u{20}   #  and rate. Sideways the model has no motion: the variance ahead stands there. Pose: after 1.0\n\
+             \u{20}   #  m straight on; that of dead reckoning grows without bound, which no constant can say: let a\n\
              \u{20}   #  filter take the twist.\n\
              \u{20}   pose_covariance_diagonal: [5.00e-7, 4.00e-6, 1.00e6, 1.00e6, 1.00e6, 1.20e-5]\n\
              \u{20}   twist_covariance_diagonal: [6.25e-6, 6.25e-6, 1.00e6, 1.00e6, 1.00e6, 1.50e-4]\n\

@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn regress_text_of_a_small_calibration() {
         let text = render(&specimen(), &Options::default()).expect("has all");
-        // √(0.101 · 0.099) m; (0.198 − 0.202)/0.19999/0.408 rad/m.
+        // √(0.101 · 0.099) m, to the nanometre; (0.198 − 0.202)/0.19999/0.408 rad/m.
         assert_eq!(
             text,
             "# By `yair export turtlebot3` from robot.toml (joint).\n\
@@ -70,7 +70,7 @@ mod tests {
              #  cmd_vel.\n\
              /**:\n  turtlebot3_node:\n    ros__parameters:\n      wheels:\n\
              \u{20}       separation: 0.408  # m, ± 0.20 mm, instead of 400.000 mm\n\
-             \u{20}       radius: 0.099994999875  # m, geometric mean of both wheels, instead of 100.000 mm\n\
+             \u{20}       radius: 0.099995  # m, geometric mean of both wheels, instead of 100.000 mm\n\
              # What these parameters cannot express: the wheels differ, 101.000 mm left and 99.000 mm right in\n\
              #  radius. Odometry with one radius misses -2.8 degrees of turn for each metre.\n"
         );
