@@ -274,41 +274,43 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         None => std::borrow::Cow::Borrowed(&dataset),
     };
     let session = records.session();
+    let is_chosen = |id: &str| arguments.run.as_deref().is_none_or(|only| only == id);
+    let ids = || session.runs.iter().map(|run| run.info().id.clone()).collect::<Vec<_>>().join(", ");
+    match (&arguments.run, session.runs.iter().filter(|run| is_chosen(&run.info().id)).count()) {
+        (Some(id), 0) => return Err(format!("{place}: it has no run \"{id}\"; it has {}", ids()).into()),
+        (None, several) if several > 1 && arguments.out.is_none() => {
+            return Err(format!("{place}: it has {several} runs ({}); give --out DIR, or --run ID", ids()).into());
+        }
+        _ => {}
+    }
     let mut texts = Vec::new();
     let mut driven_m = 0.0;
     for run in &session.runs {
         let id = &run.info().id;
+        // Runs before the chosen one count: effects may go by the distance driven in the session.
         let text = match &calibration {
             Some(calibration) => {
-                let corrected =
-                    corrected_run(&session, run, calibration.calibration(), &mut driven_m).ok_or_else(|| {
-                        format!(
-                            "{place}: run \"{id}\": its wheels say no motion; counts need ticks_per_rev in dataset.toml"
-                        )
-                    })?;
-                tum(corrected.poses)
+                let corrected = corrected_run(&session, run, calibration.calibration(), &mut driven_m);
+                let why = "its wheels say no motion; counts need ticks_per_rev in dataset.toml";
+                tum(corrected.ok_or_else(|| format!("{place}: run \"{id}\": {why}"))?.poses)
             }
+            None if !is_chosen(id) => continue,
             None => {
                 let (text, without) = tum_of_truth(&run.run().truth);
                 if without > 0 {
-                    let why = "its headings in the file are 0";
-                    terminal.remark(&format!(
-                        "warning: {place}: run \"{id}\": {without} positions without a heading: {why}"
-                    ));
+                    let what = format!("{without} positions without a heading: the file's headings are 0 there");
+                    terminal.remark(&format!("warning: {place}: run \"{id}\": {what}"));
                 }
                 text
             }
         };
-        if arguments.run.as_ref().is_none_or(|only| only == id) {
+        if is_chosen(id) {
             texts.push((id.clone(), text));
         }
     }
-    let ids = || session.runs.iter().map(|run| run.info().id.clone()).collect::<Vec<_>>().join(", ");
-    if let (Some(id), true) = (&arguments.run, texts.is_empty()) {
-        return Err(format!("{place}: it has no run \"{id}\"; it has {}", ids()).into());
-    }
     if let Some((id, _)) = texts.iter().find(|(_, text)| text.is_empty()) {
-        return Err(format!("{place}: run \"{id}\" has no truth.csv rows; give --calibration for its odometry").into());
+        let why = "has no truth of poses (truth.csv); --calibration FILE exports its odometry";
+        return Err(format!("{place}: run \"{id}\" {why}").into());
     }
     let text = match (&arguments.out, &texts[..]) {
         (Some(out), _) => {
@@ -319,12 +321,10 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             terminal.say(&format!("{} runs in {}", texts.len(), out.display()))?;
             None
         }
-        (None, [(_, text)]) => {
+        (None, texts) => {
+            let text: String = texts.iter().map(|(_, text)| &text[..]).collect();
             terminal.say(text.trim_end_matches('\n'))?;
-            Some(text.clone())
-        }
-        (None, _) => {
-            return Err(format!("{place}: it has {} runs ({}); give --out DIR, or --run ID", texts.len(), ids()).into());
+            Some(text)
         }
     };
     terminal.document(&Document {

@@ -34,7 +34,7 @@ pub struct Exporter {
 pub const EXPORTERS: &[Exporter] = &[
     Exporter {
         name: "c",
-        about: "odometry for a controller: one C99 header with pose, covariance and effects of an extended model",
+        about: "odometry as one C99 header, effects of an extended model too",
         takes: &["counter-bits"],
         has_effects: true,
         render: c::render,
