@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     /// ros2-yaml: nominal lengths, and multipliers that make them the calibrated ones (the default).
     #[arg(long, conflicts_with = "lengths")]
     multipliers: bool,
-    /// ros2-yaml: calibrated lengths; multipliers hold the difference of the wheels alone.
+    /// ros2-yaml: the calibrated geometry; multipliers hold the difference of the wheels alone.
     #[arg(long)]
     lengths: bool,
     /// ros2-yaml: speed at which the twist's covariance is stated [default: 0.25].
@@ -69,6 +69,8 @@ pub(crate) struct Arguments {
 
 /// The format of datasets; all others are of calibrations.
 const TUM: &str = "tum";
+/// Ids of runs in a message.
+const SHOWN_RUNS: usize = 6;
 /// Flags of calibrations alone, and of datasets alone.
 const OF_CALIBRATIONS: [&str; 2] = ["dataset", "method"];
 const OF_DATASETS: [&str; 2] = ["calibration", "run"];
@@ -275,7 +277,11 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     };
     let session = records.session();
     let is_chosen = |id: &str| arguments.run.as_deref().is_none_or(|only| only == id);
-    let ids = || session.runs.iter().map(|run| run.info().id.clone()).collect::<Vec<_>>().join(", ");
+    let ids = || {
+        let all: Vec<&str> = session.runs.iter().map(|run| &run.info().id[..]).collect();
+        let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
+        all[..all.len().min(SHOWN_RUNS)].join(", ") + more
+    };
     match (&arguments.run, session.runs.iter().filter(|run| is_chosen(&run.info().id)).count()) {
         (Some(id), 0) => return Err(format!("{place}: it has no run \"{id}\"; it has {}", ids()).into()),
         (None, several) if several > 1 && arguments.out.is_none() => {

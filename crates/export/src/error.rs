@@ -52,6 +52,14 @@ pub enum ExportError {
         /// What does not fit.
         what: String,
     },
+    /// The noise is no standard deviation.
+    #[error("{place}: a noise of {value}; expected a standard deviation, or no [methods.noise]")]
+    BadNoise {
+        /// The calibration file.
+        place: String,
+        /// What stands there.
+        value: f64,
+    },
     /// The values are no drive.
     #[error("{place}: {source}")]
     NotADrive {

@@ -72,7 +72,7 @@ pub struct CalibratedRobot {
     pub cautions: Vec<String>,
 }
 
-/// The three lengths that every robot needs.
+/// The geometry parameters that every robot needs.
 const LENGTHS: [Parameter; 3] =
     [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
 
@@ -87,11 +87,18 @@ impl CalibratedRobot {
             return Err(ExportError::NoResult { place: place.to_owned(), method, why });
         }
         refuse_other_robot(place, method, robot)?;
+        if let Some(OdometryNoise { wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad }) = method.noise {
+            for value in [wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad] {
+                if !(value.is_finite() && value >= 0.0) {
+                    return Err(ExportError::BadNoise { place: place.to_owned(), value });
+                }
+            }
+        }
         let ticks_per_rev = ticks_per_rev(method, robot);
         let [left, right, separation] = LENGTHS.map(|parameter| length(place, method, parameter, ticks_per_rev, robot));
         let caution =
             |blind: &calib::ReportedBlindness| format!("{} is not determined: {}", blind.parameter, blind.why);
-        let robot = Self {
+        let mut robot = Self {
             place: place.to_owned(),
             name: method.method.clone(),
             wheel_diameter: Wheels { left: left?, right: right? },
@@ -103,6 +110,10 @@ impl CalibratedRobot {
             effects: Vec::new(),
             cautions: method.not_observable.iter().map(caution).chain(method.warnings.iter().cloned()).collect(),
         };
+        // A file that somebody wrote by hand says nothing of runs.
+        if method.runs_used > 0 && !method.converged {
+            robot.cautions.push("the fit did not converge: its numbers are no result".to_owned());
+        }
         robot.geometry()?;
         Ok(robot)
     }
@@ -253,7 +264,11 @@ fn length(
     let ratio = |of: Parameter| method.parameters.get(of.key()).and_then(|reported| reported.ratio_to_nominal);
     let stated_m = robot.and_then(|robot| nominal_value(robot, parameter.key()));
     let from_ratio = || ratio(parameter).or_else(|| ratio(per_tick?)).map(|ratio| value_m / ratio);
-    Ok(Length { value_m, sigma_m, nominal_m: stated_m.or_else(from_ratio) })
+    Ok(Length {
+        value_m,
+        sigma_m: sigma_m.filter(|sigma_m| sigma_m.is_finite() && *sigma_m >= 0.0),
+        nominal_m: stated_m.or_else(from_ratio).filter(|nominal_m| nominal_m.is_finite() && *nominal_m > 0.0),
+    })
 }
 
 /// Refuses a dataset that states other lengths than those that the calibration corrects.
@@ -293,5 +308,89 @@ pub(crate) fn specimen() -> CalibratedRobot {
         is_extended: false,
         effects: Vec::new(),
         cautions: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calib::ReportedBlindness;
+
+    /// A method as a file has it.
+    fn method(values: &[(Parameter, f64, Option<f64>)]) -> MethodReport {
+        let reported = |(parameter, value, ratio): &(Parameter, f64, Option<f64>)| {
+            let value =
+                calib::ReportedValue { ratio_to_nominal: *ratio, ..calib::ReportedValue::of(*value, Some(1e-5)) };
+            (parameter.key().to_owned(), value)
+        };
+        MethodReport {
+            method: "joint".to_owned(),
+            error: None,
+            parameters: values.iter().map(reported).collect(),
+            group_instruments: Vec::new(),
+            noise: None,
+            not_observable: Vec::new(),
+            runs_used: 1,
+            runs_rejected: Vec::new(),
+            one_step: None,
+            converged: true,
+            warnings: Vec::new(),
+        }
+    }
+
+    const WHOLE: [(Parameter, f64, Option<f64>); 5] = [
+        (Parameter::LeftWheelDiameter, 0.202, Some(1.01)),
+        (Parameter::RightWheelDiameter, 0.198, Some(0.99)),
+        (Parameter::WheelSeparation, 0.408, Some(1.02)),
+        (Parameter::LeftPerTick, PI * 0.202 / 1000.0, Some(1.01)),
+        (Parameter::RightPerTick, PI * 0.198 / 1000.0, Some(0.99)),
+    ];
+
+    const NOMINAL: NominalRobot = NominalRobot {
+        left_wheel_diameter_m: 0.2,
+        right_wheel_diameter_m: 0.2,
+        wheel_separation_m: 0.4,
+        ticks_per_rev: Some(1000.0),
+        counter_bits: Some(16),
+    };
+
+    #[test]
+    fn lengths_nominal_values_and_counts_come_from_the_file_or_the_dataset() {
+        let of = |values: &[_], robot| CalibratedRobot::of_method("c.toml", &method(values), robot).expect("has all");
+        let whole = of(&WHOLE, None);
+        assert_eq!(whole.ticks_per_rev, Some(1000.0));
+        // A ratio of two doubles and back.
+        assert!(whole.wheel_separation.nominal_m.is_some_and(|nominal_m| (nominal_m - 0.4).abs() < 1e-15));
+        // Travels per tick and the dataset make diameters.
+        let of_ticks = of(&WHOLE[2..], Some(&NOMINAL));
+        assert!((of_ticks.wheel_diameter.left.value_m - 0.202).abs() < 1e-15);
+        assert!(of_ticks.wheel_diameter.left.sigma_m.is_some_and(|sigma_m| (sigma_m - 1e-2 / PI).abs() < 1e-15));
+        assert_eq!((of_ticks.wheel_diameter.right.nominal_m, of_ticks.counter_bits), (Some(0.2), Some(16)));
+        let mut odd = WHOLE;
+        odd[2].2 = Some(0.0);
+        assert_eq!(of(&odd, None).wheel_separation.nominal_m, None);
+    }
+
+    #[test]
+    fn what_no_robot_should_use_is_refused_or_cautioned_of() {
+        let of = |method: &MethodReport, robot| CalibratedRobot::of_method("c.toml", method, robot);
+        // Travels per tick alone do not say the counts of a turn.
+        assert!(matches!(of(&method(&WHOLE[2..]), None), Err(ExportError::NoTicks { .. })));
+        let mut blind = method(&WHOLE[..2]);
+        blind.not_observable =
+            vec![ReportedBlindness { parameter: "wheel_separation_m".to_owned(), why: "no turns".to_owned() }];
+        let error = of(&blind, None).err();
+        assert!(
+            matches!(error, Some(ExportError::NotDetermined { parameter: "wheel_separation_m", why, .. }) if why == "no turns")
+        );
+        let other = NominalRobot { wheel_separation_m: 0.401, ..NOMINAL };
+        assert!(matches!(of(&method(&WHOLE), Some(&other)), Err(ExportError::OtherRobot { .. })));
+        assert!(of(&method(&WHOLE), Some(&NOMINAL)).is_ok());
+        let mut noisy = method(&WHOLE);
+        noisy.noise = Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: f64::NAN, turn_sigma_rad_per_sqrt_rad: 0.0 });
+        assert!(matches!(of(&noisy, None), Err(ExportError::BadNoise { .. })));
+        let mut stopped = method(&WHOLE);
+        stopped.converged = false;
+        assert_eq!(of(&stopped, None).expect("has all").cautions.len(), 1);
     }
 }

@@ -1,9 +1,9 @@
 //! `ros2-yaml`: parameters of ROS 2's `diff_drive_controller`.
 //!
 //! The controller goes by `wheel_separation · wheel_separation_multiplier` and, side by side, by
-//! `wheel_radius · …_wheel_radius_multiplier`. The file has nominal lengths with multipliers, or calibrated
-//! lengths with a separation's multiplier of 1 and wheels' multipliers about 1: there is one radius, so that
-//! they alone can hold the difference of the wheels.
+//! `wheel_radius · …_wheel_radius_multiplier`. The file has nominal lengths with multipliers, or the
+//! calibrated geometry with a separation's multiplier of 1 and wheels' multipliers about 1: there is one
+//! radius, so that they alone can hold the difference of the wheels.
 //!
 //! Covariance: with wheels that scatter by k·√s over a travel s, a speed v that is measured over an interval
 //! of 1/f has per wheel a variance of k² v f; the mean of both has half of it, their difference over the
@@ -33,7 +33,7 @@ pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<Strin
              If the lengths of your own file differ from these, replace them too."
         }
         Lengths::Calibrated => {
-            "Calibrated lengths: replace lengths and multipliers of your own file, all of them. \
+            "Calibrated geometry: replace lengths and multipliers of your own file, all of them. \
              The wheels' multipliers hold their difference, since there is one radius."
         }
     };
@@ -84,7 +84,7 @@ fn lengths(text: &mut String, robot: &CalibratedRobot, lengths: Lengths) -> Resu
     let (base_m, radius_m, bases) = match lengths {
         Lengths::Nominal => {
             let nominal = |length: &Length, parameter| {
-                let or = ", or --lengths for calibrated lengths";
+                let or = ", or --lengths for the calibrated geometry";
                 length.nominal_m.ok_or(ExportError::NoNominal { place: robot.place.clone(), parameter, or })
             };
             let base_m = nominal(&separation, "wheel_separation_m")?;
