@@ -1,6 +1,7 @@
 //! The C header, compiled and driven over an hour of counts, against the same arithmetic in Rust.
 //!
-//! Seen to be rejected: half of an effect's size (1e-3 m and more) and the midpoint rule for exact arcs (1e-4 m).
+//! Seen to be rejected: half of an effect's size (1e-3 m and more) and the midpoint rule for exact arcs (1e-4
+//! m).
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -99,7 +100,7 @@ fn compiled(header: &str, log: &[(Wheels<i64>, f64)]) -> Vec<Vec<f64>> {
     text.lines().map(|line| line.split(' ').map(number).collect()).collect()
 }
 
-/// Largest difference of positions (m) and headings (rad), and of the covariance relative to its trace's part.
+/// Largest difference of positions (m) and headings (rad), and of the covariance over standard deviations.
 fn differences(robot: &CalibratedRobot, bits: u8, scaled: Option<f64>) -> (f64, f64) {
     let options = Options { counter_bits: Some(bits), ..Options::default() };
     let render = exporter("c").expect("a format").render;

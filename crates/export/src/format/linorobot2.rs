@@ -86,15 +86,17 @@ mod tests {
         let text = render(&specimen(), &Options::default()).expect("has all");
         assert_eq!(
             text,
-            "// By `yair export linorobot2` from robot.toml (joint).\n\
-             // Replace these defines in lino_base_config.h. Diameters 202.000 mm left (± 0.020 mm) and 198.000\n\
-             //  mm right (± 0.020 mm) are in the counts of a turn, 10000.0 before.\n\
-             #define WHEEL_DIAMETER 0.1999899 // m\n\
-             #define LR_WHEELS_DISTANCE 0.408 // m, ± 0.20 mm, instead of 400.000 mm\n\
-             #define COUNTS_PER_REV1 9900 // left; COUNTS_PER_REV3 of four wheels too\n\
-             #define COUNTS_PER_REV2 10101 // right; COUNTS_PER_REV4 of four wheels too\n\
-             // What these defines cannot express: counts of a turn are whole numbers, which leaves the left\n\
-             //  wheel wrong by 0.0099 % against the right one; anything that goes with speed, load or direction.\n"
+            concat!(
+                "// By `yair export linorobot2` from robot.toml (joint).\n",
+                "// Replace these defines in lino_base_config.h. Diameters 202.000 mm left (± 0.020 mm) and 198.000\n",
+                "//  mm right (± 0.020 mm) are in the counts of a turn, 10000.0 before.\n",
+                "#define WHEEL_DIAMETER 0.1999899 // m\n",
+                "#define LR_WHEELS_DISTANCE 0.408 // m, ± 0.20 mm, instead of 400.000 mm\n",
+                "#define COUNTS_PER_REV1 9900 // left; COUNTS_PER_REV3 of four wheels too\n",
+                "#define COUNTS_PER_REV2 10101 // right; COUNTS_PER_REV4 of four wheels too\n",
+                "// What these defines cannot express: counts of a turn are whole numbers, which leaves the left\n",
+                "//  wheel wrong by 0.0099 % against the right one; anything that goes with speed, load or direction.\n",
+            )
         );
     }
 

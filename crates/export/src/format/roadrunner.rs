@@ -54,14 +54,16 @@ mod tests {
         // π · 0.202 m / 10000 / 0.0254 m = 0.00249843 in; 408 mm are 16.063 in.
         assert_eq!(
             text,
-            "// By `yair export roadrunner` from robot.toml (joint).\n\
-             // TankDrive.Params\n\
-             public double inPerTick = 0.002473571315; // geometric mean of both sides\n\
-             public double trackWidthTicks = 6493.846379; // 408.000 mm ± 0.20 mm instead of 400.000 mm\n\
-             // left side alone: 0.002498431953 in per tick\n\
-             // right side alone: 0.002448958053 in per tick\n\
-             // What these parameters cannot express: the difference of the sides, unless your localizer scales\n\
-             //  the ticks of each by the values above; anything that goes with speed, load or direction.\n"
+            concat!(
+                "// By `yair export roadrunner` from robot.toml (joint).\n",
+                "// TankDrive.Params\n",
+                "public double inPerTick = 0.002473571315; // geometric mean of both sides\n",
+                "public double trackWidthTicks = 6493.846379; // 408.000 mm ± 0.20 mm instead of 400.000 mm\n",
+                "// left side alone: 0.002498431953 in per tick\n",
+                "// right side alone: 0.002448958053 in per tick\n",
+                "// What these parameters cannot express: the difference of the sides, unless your localizer scales\n",
+                "//  the ticks of each by the values above; anything that goes with speed, load or direction.\n",
+            )
         );
     }
 

@@ -7,8 +7,8 @@
 //!
 //! Covariance: with wheels that scatter by k·√s over a travel s, a speed v that is measured over an interval
 //! of 1/f has per wheel a variance of k² v f; the mean of both has half of it, their difference over the
-//! separation b gives 2 k² v f/b² of the yaw rate. The pose's is that of dead reckoning after a metre straight
-//! on (`kinematics::OdometryCovariance`).
+//! separation b gives 2 k² v f/b² of the yaw rate. The pose's is that of dead reckoning after a metre
+//! straight on (`kinematics::OdometryCovariance`).
 //! Reference: diff_drive_controller's `diff_drive_controller_parameter.yaml` (ros2_controllers).
 
 use std::fmt::Write;

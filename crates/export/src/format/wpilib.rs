@@ -52,20 +52,22 @@ mod tests {
         let text = render(&robot, &Options::default()).expect("has all");
         assert_eq!(
             text,
-            "// By `yair export wpilib` from robot.toml (joint).\n\
-             public final class DriveCalibration {\n  private DriveCalibration() {}\n\n\
-             \u{20} /** ± 0.20 mm, instead of 400.000 mm. */\n\
-             \u{20} public static final double kTrackwidthMeters = 0.408;\n\
-             \u{20} /** The same in inches. */\n\
-             \u{20} public static final double kTrackwidthInches = 16.062992126;\n\
-             \u{20} /** Of the wheel, after gears: ± 0.063 mm, instead of 628.319 mm. */\n\
-             \u{20} public static final double kLeftMetersPerRotation = 0.634601716;\n\
-             \u{20} /** Of the wheel, after gears: ± 0.063 mm, instead of 628.319 mm. */\n\
-             \u{20} public static final double kRightMetersPerRotation = 0.622035345;\n\
-             }\n\
-             // What these constants cannot express: anything that goes with speed, load, direction or the phase\n\
-             //  of a wheel.\n\
-             // Caution: common_scale is not determined: * / closed.\n"
+            concat!(
+                "// By `yair export wpilib` from robot.toml (joint).\n",
+                "public final class DriveCalibration {\n  private DriveCalibration() {}\n\n",
+                "  /** ± 0.20 mm, instead of 400.000 mm. */\n",
+                "  public static final double kTrackwidthMeters = 0.408;\n",
+                "  /** The same in inches. */\n",
+                "  public static final double kTrackwidthInches = 16.062992126;\n",
+                "  /** Of the wheel, after gears: ± 0.063 mm, instead of 628.319 mm. */\n",
+                "  public static final double kLeftMetersPerRotation = 0.634601716;\n",
+                "  /** Of the wheel, after gears: ± 0.063 mm, instead of 628.319 mm. */\n",
+                "  public static final double kRightMetersPerRotation = 0.622035345;\n",
+                "}\n",
+                "// What these constants cannot express: anything that goes with speed, load, direction or the phase\n",
+                "//  of a wheel.\n",
+                "// Caution: common_scale is not determined: * / closed.\n",
+            )
         );
     }
 }
