@@ -108,7 +108,7 @@ impl GivenCalibration {
 
 /// Whether a file is TOML with a robot, as scenarios have it and calibration files do not. What is neither is
 /// refused as a calibration.
-fn is_scenario(path: &Path) -> bool {
+pub(crate) fn is_scenario(path: &Path) -> bool {
     let mut text = String::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE_BYTES).read_to_string(&mut text));
     read.is_ok() && text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("robot"))

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use calib::{CorrectedRun, corrected_run};
 use clap::Args;
 use dataset::{Dataset, Loaded, RunByRun, Warning};
-use kinematics::{Pose, sin_cos};
+use kinematics::Pose;
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-fn only(calibrations: Vec<GivenCalibration>) -> Result<GivenCalibration, Failure> {
+pub(crate) fn only(calibrations: Vec<GivenCalibration>) -> Result<GivenCalibration, Failure> {
     match <[GivenCalibration; 1]>::try_from(calibrations) {
         Ok([calibration]) => Ok(calibration),
         Err(several) => {
@@ -156,7 +156,7 @@ fn correct(
             let (csv, tum) = (file_of(inside, id, "csv", &place)?, file_of(inside, id, "tum", &place)?);
             let [csv_path, tum_path] = [&csv, &tum].map(|file| out.join(file).display().to_string());
             files.write(csv, &csv_of(&poses))?;
-            files.write(tum, &tum_of(&poses))?;
+            files.write(tum, &::export::tum(poses.iter().copied()))?;
             runs.push(RunDocument {
                 run: id.clone(),
                 rows: poses.len(),
@@ -190,7 +190,7 @@ fn correct(
 }
 
 /// The file of a run; an id that is no name of a file is refused.
-fn file_of(inside: &Path, id: &str, extension: &str, place: &str) -> Result<PathBuf, Failure> {
+pub(crate) fn file_of(inside: &Path, id: &str, extension: &str, place: &str) -> Result<PathBuf, Failure> {
     let mut parts = Path::new(id).components();
     let is_name = matches!((parts.next(), parts.next()), (Some(Component::Normal(name)), None) if name == id);
     if !is_name || id.contains(['/', '\\']) {
@@ -203,16 +203,6 @@ fn csv_of(poses: &[(f64, Pose)]) -> String {
     let mut text = "t_s,x_m,y_m,theta_rad\n".to_owned();
     for (t_s, Pose { x_m, y_m, theta_rad }) in poses {
         let _ = writeln!(text, "{t_s},{x_m},{y_m},{theta_rad}");
-    }
-    text
-}
-
-/// As the TUM benchmark has it: `t x y z qx qy qz qw`, without a header.
-fn tum_of(poses: &[(f64, Pose)]) -> String {
-    let mut text = String::new();
-    for (t_s, Pose { x_m, y_m, theta_rad }) in poses {
-        let (qz, qw) = sin_cos(0.5 * theta_rad);
-        let _ = writeln!(text, "{t_s} {x_m} {y_m} 0 0 0 {qz} {qw}");
     }
     text
 }

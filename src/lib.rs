@@ -18,6 +18,7 @@
 
 pub use ::bench;
 pub use ::diagnose;
+pub use ::export;
 pub use blind_benchmark;
 pub use calib;
 pub use dataset;

@@ -9,6 +9,7 @@ mod correct;
 mod diagnose;
 mod diagnosis_page;
 mod evaluate;
+mod export;
 mod import;
 mod import_csv;
 mod import_robot;
@@ -53,6 +54,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Compare(compare::Arguments),
     Correct(correct::Arguments),
+    Export(export::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
     Plan(plan::Arguments),
@@ -72,6 +74,7 @@ fn main() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::run(arguments, &terminal),
         Command::Compare(arguments) => compare::run(arguments, &terminal),
         Command::Correct(arguments) => correct::run(arguments, &terminal),
+        Command::Export(arguments) => export::run(arguments, &terminal),
         Command::Sweep(arguments) => sweep::run(arguments, &terminal),
         Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Plan(arguments) => plan::run(arguments, &terminal),

@@ -24,6 +24,20 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
         "diagnose",
         &["kinematics", "dataset", "motion-programs", "model-term", "effects", "scenario", "estimation", "calib"],
     ),
+    (
+        "export",
+        &[
+            "kinematics",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "estimation",
+            "calib",
+            "diagnose",
+        ],
+    ),
     ("report", &["atomic-file"]),
     (
         "bench",
@@ -93,6 +107,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "blind-benchmark",
             "paper-reproduction",
             "preflight",
+            "export",
         ],
     ),
 ];

@@ -236,6 +236,11 @@ mod documents_show_what_commands_print {
     }
 
     #[test]
+    fn export() {
+        shows_what_its_commands_print("docs/export.md", 2);
+    }
+
+    #[test]
     fn real_robots() {
         shows_what_its_commands_print("docs/real-robots.md", 0);
     }

@@ -1,5 +1,5 @@
-//! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected,
-//! campaigns that are stopped, and the gate on accuracy.
+//! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, files
+//! for robots, campaigns that are stopped, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;
@@ -7,6 +7,7 @@ mod bad_logs;
 mod compare;
 mod contract;
 mod correct;
+mod export;
 mod import_csv;
 mod import_ros2;
 #[path = "../support/mod.rs"]

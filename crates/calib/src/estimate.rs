@@ -106,6 +106,15 @@ pub struct GroupInstrument {
     pub latency_s: Option<f64>,
 }
 
+/// Noise of the odometry, for methods that estimate it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OdometryNoise {
+    /// Of each wheel's travel: one standard deviation is this times the root of the travel, m/√m.
+    pub wheel_sigma_m_per_sqrt_m: f64,
+    /// Of the heading beyond that of the wheels: this times the root of the turn, rad/√rad.
+    pub turn_sigma_rad_per_sqrt_rad: f64,
+}
+
 /// A parameter that the data do not determine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotObservable {
@@ -142,6 +151,8 @@ pub struct Calibration {
     pub latency_s: Option<(f64, Option<f64>)>,
     /// Extrinsics and latencies of sessions or runs that have their own; the two above are then their means.
     pub group_instruments: Vec<GroupInstrument>,
+    /// Noise of the odometry; `None` for methods that do not estimate it.
+    pub noise: Option<OdometryNoise>,
     /// What the data do not determine.
     pub not_observable: Vec<NotObservable>,
     /// How many runs the values rest on.
@@ -167,6 +178,7 @@ impl Calibration {
             extrinsics: None,
             latency_s: None,
             group_instruments: Vec::new(),
+            noise: None,
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),

@@ -27,8 +27,8 @@ pub use compare::{
 pub use drift::{CalibrationDrift, RunDrift, evaluate, evaluate_runs};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
-    CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, Parameter,
-    Rejected,
+    CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
+    Parameter, Rejected,
 };
 pub use methods::{METHODS, method};
 pub use report::{

@@ -9,7 +9,7 @@ use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{CalibError, Calibration, GroupInstrument, Parameter, is_implausible};
+use crate::estimate::{CalibError, Calibration, GroupInstrument, OdometryNoise, Parameter, is_implausible};
 use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO, MAX_FILE_BYTES};
 use crate::stated::nominal_value;
 use crate::trained_on::TrainedOn;
@@ -93,6 +93,9 @@ pub struct MethodReport {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[serde(rename = "own_instruments")]
     pub group_instruments: Vec<GroupInstrument>,
+    /// Noise of the odometry, where the method estimates it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<OdometryNoise>,
     /// What the data do not determine.
     #[serde(default)]
     pub not_observable: Vec<ReportedBlindness>,
@@ -185,6 +188,7 @@ impl MethodReport {
             error: None,
             parameters: BTreeMap::new(),
             group_instruments: Vec::new(),
+            noise: None,
             not_observable: Vec::new(),
             runs_used: 0,
             runs_rejected: Vec::new(),
@@ -207,6 +211,7 @@ impl MethodReport {
                 .map(|estimate| (estimate.parameter.key().to_owned(), value(estimate)))
                 .collect(),
             group_instruments: calibration.group_instruments.clone(),
+            noise: calibration.noise,
             not_observable: calibration
                 .not_observable
                 .iter()
@@ -408,6 +413,7 @@ mod tests {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
                 group_instruments: Vec::new(),
+                noise: Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3 }),
                 method: "umbmark".to_owned(),
                 error: None,
                 parameters: [

@@ -5,6 +5,8 @@
 //! not say. Where a scenario has no such estimates, an effect whose sizes are those of its mean term gives
 //! it.
 
+use std::ops::Range;
+
 use calib::{AugmentedCalibration, NamedCalibration, Parameter};
 use dataset::{Dataset, NominalRobot};
 use effects::{Effect, Hypothesis, RecordCorrection, Variant, effect_from_estimates};
@@ -48,11 +50,24 @@ pub enum ExtendedModelError {
     OtherRobot(String),
 }
 
+/// An effect of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelledEffect {
+    /// Its id; of a term outside of the catalogue that of such terms.
+    pub id: &'static str,
+    /// Sizes of its mean term by name, with what is held of it; empty where it has none.
+    pub values: Vec<(String, f64)>,
+    /// Its mean terms among those of the calibration.
+    pub terms: Range<usize>,
+}
+
 /// What dead reckoning applies of a scenario.
 #[derive(Debug, Clone)]
 pub struct ExtendedModel {
     /// Geometry, extrinsics, and mean terms with their sizes.
     pub calibration: AugmentedCalibration,
+    /// All effects of the scenario, applied or not.
+    pub effects: Vec<ModelledEffect>,
     /// What dead reckoning does without, for people.
     pub remarks: Vec<String>,
     /// Faults of the records in the order in which they act.
@@ -73,9 +88,11 @@ impl ExtendedModel {
             return Err(ExtendedModelError::NotOfAnEffect { kind: other.kind.clone() });
         }
         let (mut terms, mut term_values): (Vec<Box<dyn ModelTerm>>, Vec<f64>) = Default::default();
-        let (mut faults, mut remarks) = (Vec::new(), Vec::new());
+        let (mut faults, mut remarks, mut effects) = (Vec::new(), Vec::new(), Vec::new());
         for effect in &scenario.effects {
             let id = effect.id();
+            let first = terms.len();
+            let mut of_mean = Vec::new();
             match effect.hypothesis().ok_or(ExtendedModelError::NoTerm { id })? {
                 Hypothesis::Geometry | Hypothesis::Silent => {}
                 Hypothesis::UnknownMotion { .. } => {
@@ -97,11 +114,13 @@ impl ExtendedModel {
                         terms.push(term);
                         term_values.extend(values);
                     }
+                    of_mean = values;
                 }
             }
+            effects.push(ModelledEffect { id, values: of_mean, terms: first..terms.len() });
         }
         let calibration = NamedCalibration { name: scenario.name.clone(), values: calibrated(scenario)? };
-        Ok(Self { calibration: AugmentedCalibration { calibration, terms, term_values }, remarks, faults })
+        Ok(Self { calibration: AugmentedCalibration { calibration, terms, term_values }, effects, remarks, faults })
     }
 
     /// Whether records must be changed before dead reckoning, which takes whole datasets.

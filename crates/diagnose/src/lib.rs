@@ -61,6 +61,6 @@ pub use document::{
     Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, LevelGain, NextExperiment,
     PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
 };
-pub use extended_model::{ExtendedModel, ExtendedModelError};
+pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};

@@ -7,6 +7,7 @@
 
 use crate::benchmark::Benchmark;
 use crate::estimates::Estimates;
+use crate::on_board::OnBoard;
 
 /// Properties of an effect, whatever its sizes.
 #[derive(Clone)]
@@ -32,6 +33,8 @@ pub struct Description {
     /// The ratio of the drive's geometry that it changes, with its size of that meaning; of the geometry that
     /// every calibration fits only.
     pub geometry: Option<(GeometryRatio, &'static str)>,
+    /// What a robot's own odometry can do of it.
+    pub on_board: OnBoard,
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
 }
@@ -69,6 +72,7 @@ impl Description {
             clock_offset: None,
             extrinsic: None,
             geometry: None,
+            on_board: OnBoard::LeftOut,
             benchmark: Benchmark::OF_MEAN,
         }
     }

@@ -22,6 +22,7 @@ mod exemption;
 mod forward;
 mod hypothesis;
 mod motion_history;
+mod on_board;
 mod stream;
 mod term;
 mod time_shift;
@@ -35,6 +36,7 @@ pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};
 pub use forward::{Command, Forward, Hooks, PoseReading, Readout, RunStart, SampleClock, Step};
 pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
+pub use on_board::OnBoard;
 pub use stream::{Address, Stream, StreamName};
 pub use term::{Sparse, SparseTerm};
 

@@ -12,14 +12,15 @@
 //! Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
-use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, OneStepError, fit_large};
+use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, fit_large};
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, Rejected,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
+    Rejected,
     covariance_of_lengths, drive, nominal,
 };
 
@@ -113,6 +114,7 @@ pub fn calibrated_drive(
     Ok(Calibration {
         covariance: covariance
             .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m)),
+        noise: Some(noise(fit)),
         not_observable: not_observable(fit),
         runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         converged: fit.solution.converged,
@@ -140,6 +142,15 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
         runs_rejected: rejected(fit),
         ..calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?
     })
+}
+
+/// The noise of the odometry that the fit found.
+fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
+    let noise = &fit.solution.noise;
+    OdometryNoise {
+        wheel_sigma_m_per_sqrt_m: noise.sigma(NoiseComponent::Wheel),
+        turn_sigma_rad_per_sqrt_rad: noise.sigma(NoiseComponent::Turn),
+    }
 }
 
 /// What the measurements do not determine of the geometry.

@@ -16,9 +16,18 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the castor resists rolling aside";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+const double aside_m = castor_behind_m * turn_rad;
+const double rolled_m = sqrt(aside_m * aside_m + distance_m * distance_m);
+if (rolled_m > 0.0) {
+    turn_change_rad -= drag_rad_m * 0.5 * (fabs(left_m) + fabs(right_m)) * aside_m / rolled_m;
+}";
 
 /// Places of the castor that are tried, metres behind the axle.
 const CASTOR_BEHIND_M: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
@@ -56,6 +65,7 @@ impl PhysicalEffect for CastorDrag {
                 format!("{MEANING}: {lost} of turn lost for each metre that it rolls so")
             }),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("castor_behind_m", stream.uniform_in(0.1, 0.4))]),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

@@ -14,9 +14,15 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "forward and backward metres count differently";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+left_change_m += 0.5 * left_asymmetry * fabs(left_m);
+right_change_m += 0.5 * right_asymmetry * fabs(right_m);";
 
 /// Asymmetry of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,6 +58,7 @@ impl PhysicalEffect for DirectionAsymmetry {
                 let [left, right] = ["left_asymmetry", "right_asymmetry"].map(|name| values.shown(name, 100.0, "%"));
                 format!("{MEANING}: by {left} on the left wheel, {right} on the right")
             }),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

@@ -18,9 +18,14 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the robot slides outwards in bends";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+across_m -= skid_s * v_m_s * turn_rad;";
 
 /// Sideways motion in bends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -58,6 +63,7 @@ impl PhysicalEffect for LateralSkid {
                         skid_s * centripetal_m_s2 / (1.0 + centripetal_m_s2.abs() / knee_m_s2) * step.dt_s;
                 })
             }),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

@@ -15,9 +15,15 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "in bends the outer tyre is pressed flatter";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+left_change_m += compression_s2_m * v_m_s * omega_rad_s * left_m;
+right_change_m -= compression_s2_m * v_m_s * omega_rad_s * right_m;";
 
 /// Compression of the tyres by side force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +52,7 @@ impl PhysicalEffect for LoadTransfer {
                 let differ = values.shown("compression_s2_m", 100.0, "%");
                 format!("{MEANING}: radii differ by {differ} for each m/s² of side acceleration, each way")
             }),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

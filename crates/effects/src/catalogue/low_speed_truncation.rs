@@ -20,10 +20,16 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// What it is, in one line.
 const MEANING: &str = "fractions of counts are thrown away step by step";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+left_change_m += loss_m_s * yair_sense(left_m) * dt_s;
+right_change_m += loss_m_s * yair_sense(right_m) * dt_s;";
 
 /// Fractions thrown away.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,6 +69,7 @@ impl PhysicalEffect for LowSpeedTruncation {
                 has_random_signature: true,
                 ..Benchmark::of_mean_at(|_, _, stream| vec![("cycle_s", stream.log_uniform(0.005, 0.05))])
             },
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

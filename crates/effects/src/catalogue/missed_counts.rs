@@ -17,9 +17,15 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "counts are lost at high speed";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+left_change_m += left_lost_share * yair_sense(left_m) * fmax(fabs(left_m_s) - hinge_speed_m_s, 0.0) * dt_s;
+right_change_m += right_lost_share * yair_sense(right_m) * fmax(fabs(right_m_s) - hinge_speed_m_s, 0.0) * dt_s;";
 
 /// Hinge speeds that are tried, m/s: indoor robots.
 const HINGE_M_S: [f64; 6] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.6];
@@ -81,6 +87,7 @@ impl PhysicalEffect for MissedCounts {
                     })
                 })
             },
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

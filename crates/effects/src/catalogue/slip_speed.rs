@@ -15,9 +15,15 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the wheels lose distance in proportion to their speed";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+left_change_m -= slip_s_m * left_m * fabs(left_m_s);
+right_change_m -= slip_s_m * right_m * fabs(right_m_s);";
 
 /// Slip in proportion to speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,6 +60,7 @@ impl PhysicalEffect for SlipSpeed {
                     step.travel_m = step.travel_m.zip_with(speed_m_s, |travel_m, v| travel_m * share(v));
                 })
             }),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

@@ -15,6 +15,7 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Sign, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Errors of the outside instrument that last.
@@ -50,6 +51,7 @@ impl PhysicalEffect for TruthCorrelatedNoise {
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("sigma_xy_m", 1e-3), ("sigma_theta_rad", 1e-3)], vec![("tau_s", stream.log_uniform(0.3, 3.0))])
             }),
+            on_board: OnBoard::OfInstrument,
             ..Description::of("the instrument's errors are autocorrelated: it is less precise than its single measurements seem")
         }
     }

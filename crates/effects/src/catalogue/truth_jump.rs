@@ -16,6 +16,7 @@ use crate::description::{Description, Excitation};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Steps of the outside instrument's frame.
@@ -49,6 +50,7 @@ impl PhysicalEffect for TruthJump {
     fn description() -> Description {
         Description {
             excitation: Excitation::Conditions("watch the instrument where its pose jumps, or use another one"),
+            on_board: OnBoard::OfInstrument,
             ..Description::of("the instrument's frame jumps, and the poses after it are displaced")
         }
     }

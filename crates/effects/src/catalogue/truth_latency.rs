@@ -17,6 +17,7 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 use crate::time_shift::{LONGEST_S, TimeShift};
 
 /// What it is, in one line.
@@ -49,6 +50,7 @@ impl PhysicalEffect for TruthLatency {
             summary: Summary::WithValues(|values| {
                 format!("{MEANING} by {}: nothing is wrong with the robot", values.shown("delay_s", 1e3, "ms"))
             }),
+            on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
         }
     }

@@ -16,6 +16,7 @@ use crate::description::{Description, Extrinsic, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's marker is not over the axle's centre";
@@ -51,6 +52,7 @@ impl PhysicalEffect for TruthLeverArm {
                 format!("{MEANING}, but {ahead} ahead and {left} to the left: nothing is wrong with the robot")
             }),
             extrinsic: Some(Extrinsic::Position),
+            on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
         }
     }

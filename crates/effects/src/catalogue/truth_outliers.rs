@@ -17,6 +17,7 @@ use crate::description::{Description, IsolatedError, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Sign, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Gross errors of the outside instrument.
@@ -58,6 +59,7 @@ impl PhysicalEffect for TruthOutliers {
             benchmark: Benchmark::of_scatter(|_, stream| {
                 (vec![("jump_m", 0.02), ("jump_rad", 0.02)], vec![("probability", stream.log_uniform(0.003, 0.03))])
             }),
+            on_board: OnBoard::OfInstrument,
             ..Description::of("single measurements of the instrument are outliers")
         }
     }

@@ -15,6 +15,7 @@ use crate::description::{Description, Extrinsic, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the instrument's frame is turned on the robot";
@@ -47,6 +48,7 @@ impl PhysicalEffect for TruthYaw {
                 format!("{MEANING} by {yaw} (or both wheels toe by as much)")
             }),
             extrinsic: Some(Extrinsic::Heading),
+            on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
         }
     }

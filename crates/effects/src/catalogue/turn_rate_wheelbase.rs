@@ -17,9 +17,14 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 
 /// What it is, in one line.
 const MEANING: &str = "the faster the robot turns, the farther apart its wheels act";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: &str = "\
+turn_change_rad -= beta_s * turn_rad * fabs(omega_rad_s);";
 
 /// Wheelbase that grows with the yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,6 +59,7 @@ impl PhysicalEffect for TurnRateWheelbase {
                     step.wheel_separation_m *= 1.0 + beta_s * omega_rad_s.powi(2) / at_rad_s;
                 })
             }),
+            on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }
     }

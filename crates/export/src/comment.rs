@@ -1,0 +1,115 @@
+//! Text of files in comments, and numbers as programs of robots take them.
+
+use crate::robot::{CalibratedRobot, Length};
+
+/// Longest text of a file in a comment, characters.
+const MAX_CHARS: usize = 160;
+
+/// Text of a file as any comment may hold it: on one line, without what ends a comment of C or Java, and
+/// clipped.
+pub(crate) fn comment(text: &str) -> String {
+    let plain = |letter: char| if letter.is_control() { ' ' } else { letter };
+    let mut line: String = text.chars().map(plain).take(MAX_CHARS).collect();
+    if text.chars().nth(MAX_CHARS).is_some() {
+        line.push('…');
+    }
+    // A backslash would go on to the next line (C) or begin an escape (\u in Java).
+    line.replace('\\', "/").replace("*/", "* /").replace("/*", "/ *")
+}
+
+/// Text wrapped into lines that begin alike; continuation lines are indented by two more columns.
+pub(crate) fn wrapped(start: &str, text: &str) -> String {
+    const WIDTH: usize = 100;
+    let mut lines = String::new();
+    let mut line = start.to_owned();
+    for word in text.split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines.push_str(&line);
+            lines.push('\n');
+            line = format!("{start} ");
+        }
+        line.push(' ');
+        line.push_str(word);
+    }
+    lines.push_str(&line);
+    lines.push('\n');
+    lines
+}
+
+/// Where a file's numbers are from: format, calibration and its file.
+pub(crate) fn origin(start: &str, format: &str, robot: &CalibratedRobot) -> String {
+    let (place, name) = (comment(&robot.place), comment(&robot.name));
+    wrapped(start, &format!("By `yair export {format}` from {place} ({name})."))
+}
+
+/// What the calibration cautions of, and which effects of an extended model the format leaves out;
+/// `has_static` says that those with statements in C are not left out.
+pub(crate) fn limits(start: &str, robot: &CalibratedRobot, has_static: bool) -> String {
+    let mut lines = String::new();
+    for caution in &robot.cautions {
+        lines.push_str(&wrapped(start, &format!("Caution: {}.", comment(caution))));
+    }
+    for effect in robot.left_out(has_static) {
+        lines.push_str(&wrapped(start, &format!("Left out: {} ({}).", effect.id, effect.meaning)));
+    }
+    lines
+}
+
+/// A number with a decimal point, as YAML and Java tell it from an integer: at most so many decimals, without
+/// zeros at its end.
+pub(crate) fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let short = text.trim_end_matches('0');
+    if short.ends_with('.') { format!("{short}0") } else { short.to_owned() }
+}
+
+/// A variance: three digits, with a decimal point and an exponent.
+pub(crate) fn variance(value: f64) -> String {
+    format!("{value:.2e}")
+}
+
+/// "± 0.031 mm", or that nothing is known of it.
+pub(crate) fn plus_minus_mm(length: &Length) -> String {
+    length.sigma_m.map_or_else(|| "± not known".to_owned(), |sigma_m| format!("± {} mm", digits(1e3 * sigma_m)))
+}
+
+/// A standard deviation with two digits.
+pub(crate) fn digits(sigma: f64) -> String {
+    let decimals = if sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize } else { 1 };
+    format!("{sigma:.decimals$}")
+}
+
+/// A length in millimetres, to the micrometre.
+pub(crate) fn mm(value_m: f64) -> String {
+    format!("{:.3}", 1e3 * value_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_of_a_file_ends_a_comment() {
+        assert_eq!(comment("a */ int x; /* b\n#define C\r\tend \\"), "a * / int x; / * b #define C  end /");
+        assert_eq!(comment("**/"), "** /");
+        assert_eq!(comment(&"x".repeat(1000)).chars().count(), MAX_CHARS + 1);
+    }
+
+    #[test]
+    fn numbers_keep_their_point() {
+        assert_eq!(
+            (decimal(1.0, 9), decimal(0.1235, 9), decimal(1e-12, 9)),
+            ("1.0".into(), "0.1235".into(), "0.0".into())
+        );
+        assert_eq!((digits(0.03123), digits(12.3), digits(0.0)), ("0.031".into(), "12".into(), "0.0".into()));
+        assert_eq!(variance(1.234e-5), "1.23e-5");
+    }
+
+    #[test]
+    fn lines_are_wrapped_behind_their_start() {
+        let text = "word ".repeat(40);
+        let lines = wrapped("#", &text);
+        assert!(lines.lines().all(|line| line.starts_with("# ") && line.chars().count() <= 100), "{lines}");
+        assert_eq!(lines.matches("word").count(), 40);
+    }
+}

@@ -1,0 +1,347 @@
+//! `yair export FORMAT CALIBRATION|MODEL|DATASET`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use ::diagnose::ExtendedModel;
+use ::export::format::{EXPORTERS, Exporter, exporter};
+use ::export::{CalibratedRobot, Lengths, Options, tum, tum_of_truth};
+use calib::{CalibrationReport, MethodReport, corrected_run};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use dataset::{Loaded, NominalRobot, Warning};
+use scenario::Scenario;
+use serde::Serialize;
+
+use crate::calibration_file::{GivenCalibration, is_scenario};
+use crate::correct::{file_of, only};
+use crate::simulate::{refuse_filled, write_whole};
+use crate::terminal::{Failure, Terminal};
+
+/// Calibrated parameters for a robot's own program, or a dataset's truth for other tools.
+#[derive(Args)]
+#[command(after_help = formats())]
+pub(crate) struct Arguments {
+    /// What to write.
+    #[arg(value_name = "FORMAT", hide_possible_values = true, value_parser = PossibleValuesParser::new(EXPORTERS.iter().map(|format| format.name).chain([TUM])))]
+    format: String,
+    /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; for `tum`
+    /// a dataset.
+    #[arg(value_name = "CALIBRATION|MODEL|DATASET")]
+    source: PathBuf,
+    /// File to write; standard output when left out. For `tum` a folder, with RUN.tum of every run.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace a file that is already there.
+    #[arg(long)]
+    force: bool,
+    /// A dataset of the robot, for nominal values that the calibration file does not have.
+    #[arg(long, value_name = "DIR")]
+    dataset: Option<PathBuf>,
+    /// Which calibration of a file with several.
+    #[arg(long, value_name = "METHOD")]
+    method: Option<String>,
+    /// ros2-yaml: name of the controller's node [default: diff_drive_controller].
+    #[arg(long, value_name = "NAME")]
+    controller: Option<String>,
+    /// ros2-yaml: nominal lengths, and multipliers that make them the calibrated ones (the default).
+    #[arg(long, conflicts_with = "lengths")]
+    multipliers: bool,
+    /// ros2-yaml: the calibrated geometry; multipliers hold the difference of the wheels alone.
+    #[arg(long)]
+    lengths: bool,
+    /// ros2-yaml: speed at which the twist's covariance is stated [default: 0.25].
+    #[arg(long, value_name = "M/S")]
+    speed: Option<f64>,
+    /// ros2-yaml: rate of the controller's twists [default: 50].
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// c: width of the wheels' counters, 8 to 64 bits [default: the dataset's, or 32].
+    #[arg(long, value_name = "BITS")]
+    counter_bits: Option<u8>,
+    /// tum: dead reckoning under this calibration instead of the truth.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// tum: this run alone.
+    #[arg(long, value_name = "ID")]
+    run: Option<String>,
+}
+
+/// The format of datasets; all others are of calibrations.
+const TUM: &str = "tum";
+/// Ids of runs in a message.
+const SHOWN_RUNS: usize = 6;
+/// Flags of calibrations alone, and of datasets alone.
+const OF_CALIBRATIONS: [&str; 2] = ["dataset", "method"];
+const OF_DATASETS: [&str; 2] = ["calibration", "run"];
+
+fn formats() -> String {
+    let of_dataset = (TUM, "a dataset's truth, for evo and its like: t x y z qx qy qz qw");
+    let all = EXPORTERS.iter().map(|format| (format.name, format.about)).chain([of_dataset]);
+    let lines: Vec<String> = all.map(|(name, about)| format!("  {name:12} {about}")).collect();
+    format!("Formats:\n{}", lines.join("\n"))
+}
+
+#[derive(Serialize)]
+struct Document {
+    format: String,
+    source: String,
+    calibration: Option<String>,
+    /// The file or folder; null where the text stands in this document.
+    out: Option<String>,
+    text: Option<String>,
+    /// Effects of an extended model that the format cannot express.
+    left_out: Vec<LeftOut>,
+    cautions: Vec<String>,
+    /// Runs of a dataset.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    runs: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct LeftOut {
+    id: &'static str,
+    meaning: &'static str,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let format = exporter(&arguments.format);
+    let takes: Vec<&str> = match format {
+        Some(format) => [&OF_CALIBRATIONS, format.takes].concat(),
+        None => OF_DATASETS.to_vec(),
+    };
+    if let Some(flag) = arguments.given().into_iter().find(|flag| !takes.contains(flag)) {
+        let flags: Vec<String> = takes.iter().map(|flag| format!("--{flag}")).collect();
+        let why = format!("--{flag} is not for the format {}; it takes {}", arguments.format, flags.join(", "));
+        terminal.failure(&why);
+        return Ok(ExitCode::from(2));
+    }
+    match format {
+        Some(format) => export_calibration(format, arguments, terminal),
+        None => export_dataset(arguments, terminal),
+    }
+}
+
+impl Arguments {
+    /// The flags of single formats that are given.
+    fn given(&self) -> Vec<&'static str> {
+        let given = [
+            ("dataset", self.dataset.is_some()),
+            ("method", self.method.is_some()),
+            ("controller", self.controller.is_some()),
+            ("multipliers", self.multipliers),
+            ("lengths", self.lengths),
+            ("speed", self.speed.is_some()),
+            ("rate", self.rate.is_some()),
+            ("counter-bits", self.counter_bits.is_some()),
+            ("calibration", self.calibration.is_some()),
+            ("run", self.run.is_some()),
+        ];
+        given.into_iter().filter_map(|(flag, is_given)| is_given.then_some(flag)).collect()
+    }
+
+    fn options(&self) -> Options {
+        let Options { controller, lengths, speed_m_s, rate_hz, .. } = Options::default();
+        Options {
+            controller: self.controller.clone().unwrap_or(controller),
+            lengths: if self.lengths { Lengths::Calibrated } else { lengths },
+            speed_m_s: self.speed.unwrap_or(speed_m_s),
+            rate_hz: self.rate.unwrap_or(rate_hz),
+            counter_bits: self.counter_bits,
+        }
+    }
+}
+
+fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    if let Some(out) = &arguments.out {
+        refuse_taken(out, arguments.force)?;
+    }
+    let options = arguments.options();
+    options.check()?;
+    let robot = robot(arguments, terminal)?;
+    let text = (format.render)(&robot, &options)?;
+    let left_out: Vec<LeftOut> =
+        robot.left_out(format.has_effects).map(|effect| LeftOut { id: effect.id, meaning: effect.meaning }).collect();
+    for LeftOut { id, meaning } in &left_out {
+        terminal.remark(&format!("{}: left out: {id} ({meaning})", arguments.source.display()));
+    }
+    for caution in &robot.cautions {
+        terminal.remark(&format!("warning: {}: {caution}", arguments.source.display()));
+    }
+    match &arguments.out {
+        Some(out) => {
+            write_whole(out, text.as_bytes())?;
+            terminal.say(&format!("{} in {}", format.name, out.display()))?;
+        }
+        None => terminal.say(text.trim_end_matches('\n'))?,
+    }
+    terminal.document(&Document {
+        format: format.name.to_owned(),
+        source: arguments.source.display().to_string(),
+        calibration: Some(robot.name.clone()),
+        out: arguments.out.as_ref().map(|out| out.display().to_string()),
+        text: arguments.out.is_none().then_some(text),
+        left_out,
+        cautions: robot.cautions,
+        runs: Vec::new(),
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses to replace a file, unless that is asked for.
+fn refuse_taken(out: &Path, force: bool) -> Result<(), Failure> {
+    if out.is_dir() {
+        return Err(format!("{}: it is a folder, where a file belongs; give a file's name", out.display()).into());
+    }
+    if out.exists() && !force {
+        let why = "already exists; nothing was written: choose another name, or give --force";
+        return Err(format!("{}: {why}", out.display()).into());
+    }
+    Ok(())
+}
+
+/// The robot of a calibration file or an extended model.
+fn robot(arguments: &Arguments, terminal: &Terminal) -> Result<CalibratedRobot, Failure> {
+    let source = &arguments.source;
+    let place = source.display().to_string();
+    if source.is_dir() {
+        let why = format!(
+            "it is a folder; {} takes a calibration file, from yair calibrate DATASET --out FILE",
+            arguments.format
+        );
+        return Err(format!("{place}: {why}").into());
+    }
+    let nominal = arguments.dataset.as_ref().map(|path| stated(path, terminal)).transpose()?;
+    if is_scenario(source) {
+        if let Some(method) = &arguments.method {
+            return Err(
+                format!("{place}: it is an extended model and has no method {method}; leave --method out").into()
+            );
+        }
+        let scenario = Scenario::read(source)?;
+        let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
+        return Ok(CalibratedRobot::of_model(&place, &scenario, &model, nominal.as_ref())?);
+    }
+    let report = CalibrationReport::read(source)?;
+    let method = chosen(&report, arguments.method.as_deref(), &place)?;
+    Ok(CalibratedRobot::of_method(&place, method, nominal.as_ref())?)
+}
+
+/// What a dataset states of its robot.
+fn stated(path: &Path, terminal: &Terminal) -> Result<NominalRobot, Failure> {
+    let opened = dataset::RunByRun::open(path)?;
+    warn(path, opened.warnings(), terminal);
+    Ok(opened.header().robot)
+}
+
+fn warn(path: &Path, warnings: &[Warning], terminal: &Terminal) {
+    for warning in warnings {
+        terminal.remark(&format!("warning: {}: {warning}", path.display()));
+    }
+}
+
+/// The method of a file that is asked for, or its only one.
+fn chosen<'r>(report: &'r CalibrationReport, name: Option<&str>, place: &str) -> Result<&'r MethodReport, Failure> {
+    let of = |method: &&MethodReport| name.is_none_or(|name| method.method == name);
+    let found: Vec<&MethodReport> = report.methods.iter().filter(of).collect();
+    let names: Vec<&str> = report.methods.iter().map(|method| &method.method[..]).collect();
+    match (&found[..], name) {
+        ([method], _) => Ok(method),
+        ([], Some(name)) => Err(format!("{place}: it has no method {name}; it has {}", names.join(", ")).into()),
+        ([], None) => Err(format!("{place}: it holds no calibration").into()),
+        _ => Err(format!(
+            "{place}: it holds {} calibrations ({}); choose one by --method",
+            names.len(),
+            names.join(", ")
+        )
+        .into()),
+    }
+}
+
+/// Poses of a dataset's runs.
+fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let path = &arguments.source;
+    let place = path.display().to_string();
+    if let Some(out) = &arguments.out {
+        refuse_filled(out, arguments.force)?;
+    }
+    let calibration = arguments.calibration.as_ref().map(|file| only(GivenCalibration::read(file)?)).transpose()?;
+    let Loaded { dataset, warnings } = dataset::read(path)?;
+    warn(path, &warnings, terminal);
+    let records = match &calibration {
+        Some(calibration) => {
+            calibration.check(&dataset.robot, &place)?;
+            calibration.undone(&dataset, &place, terminal)?
+        }
+        None => std::borrow::Cow::Borrowed(&dataset),
+    };
+    let session = records.session();
+    let is_chosen = |id: &str| arguments.run.as_deref().is_none_or(|only| only == id);
+    let ids = || {
+        let all: Vec<&str> = session.runs.iter().map(|run| &run.info().id[..]).collect();
+        let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
+        all[..all.len().min(SHOWN_RUNS)].join(", ") + more
+    };
+    match (&arguments.run, session.runs.iter().filter(|run| is_chosen(&run.info().id)).count()) {
+        (Some(id), 0) => return Err(format!("{place}: it has no run \"{id}\"; it has {}", ids()).into()),
+        (None, several) if several > 1 && arguments.out.is_none() => {
+            return Err(format!("{place}: it has {several} runs ({}); give --out DIR, or --run ID", ids()).into());
+        }
+        _ => {}
+    }
+    let mut texts = Vec::new();
+    let mut driven_m = 0.0;
+    for run in &session.runs {
+        let id = &run.info().id;
+        // Runs before the chosen one count: effects may go by the distance driven in the session.
+        let text = match &calibration {
+            Some(calibration) => {
+                let corrected = corrected_run(&session, run, calibration.calibration(), &mut driven_m);
+                let why = "its wheels say no motion; counts need ticks_per_rev in dataset.toml";
+                tum(corrected.ok_or_else(|| format!("{place}: run \"{id}\": {why}"))?.poses)
+            }
+            None if !is_chosen(id) => continue,
+            None => {
+                let (text, without) = tum_of_truth(&run.run().truth);
+                if without > 0 {
+                    let what = format!("{without} positions without a heading: the file's headings are 0 there");
+                    terminal.remark(&format!("warning: {place}: run \"{id}\": {what}"));
+                }
+                text
+            }
+        };
+        if is_chosen(id) {
+            texts.push((id.clone(), text));
+        }
+    }
+    if let Some((id, _)) = texts.iter().find(|(_, text)| text.is_empty()) {
+        let why = "has no truth of poses (truth.csv); --calibration FILE exports its odometry";
+        return Err(format!("{place}: run \"{id}\" {why}").into());
+    }
+    let text = match (&arguments.out, &texts[..]) {
+        (Some(out), _) => {
+            std::fs::create_dir_all(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+            for (id, text) in &texts {
+                write_whole(&file_of(out, id, TUM, &place)?, text.as_bytes())?;
+            }
+            terminal.say(&format!("{} runs in {}", texts.len(), out.display()))?;
+            None
+        }
+        (None, texts) => {
+            let text: String = texts.iter().map(|(_, text)| &text[..]).collect();
+            terminal.say(text.trim_end_matches('\n'))?;
+            Some(text)
+        }
+    };
+    terminal.document(&Document {
+        format: TUM.to_owned(),
+        source: place,
+        calibration: calibration.map(|of| of.calibration().calibration.name.clone()),
+        out: arguments.out.as_ref().map(|out| out.display().to_string()),
+        text,
+        left_out: Vec::new(),
+        cautions: Vec::new(),
+        runs: texts.into_iter().map(|(id, _)| id).collect(),
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
