@@ -83,7 +83,7 @@ fn run(line: &str, folder: &Path) -> Option<String> {
     for word in &mut words {
         if let Some((name, part)) = ORIGINALS.iter().find(|(name, _)| word.starts_with(name)) {
             *word = real_data("the documents' commands", part)?.join(&word[name.len()..]).display().to_string();
-        } else if word.starts_with("scenarios/") || word.starts_with("baselines/") {
+        } else if ["scenarios/", "baselines/", "tests/"].iter().any(|folder| word.starts_with(folder)) {
             *word = root().join(&*word).display().to_string();
         }
     }

@@ -88,8 +88,8 @@ fn joint_writes_what_an_export_needs() {
     succeed(at, &["simulate", "s.toml", "--out", "set"]);
     let found = document(at, &["calibrate", "set", "--out", "c.toml"]);
     let noise = found["methods"][0]["noise"]["wheel_sigma_m_per_sqrt_m"].as_f64().expect("a noise");
-    // The scenario has 0.5 mm/√m, beside imperfections that only show in motion: 0.67 mm/√m is found. A factor
-    // of two tells a standard deviation from its variance, and metres from millimetres.
+    // The scenario has 0.5 mm/√m, beside imperfections that only show in motion: 0.67 mm/√m is found. A
+    // factor of two tells a standard deviation from its variance, and metres from millimetres.
     assert!(noise > 2.5e-4 && noise < 1e-3, "{noise}");
     let text = succeed(at, &["export", "ros2-yaml", "c.toml"]).stdout;
     assert!(text.contains("twist_covariance_diagonal: ["), "{text}");

@@ -148,8 +148,8 @@ mod tests {
         assert_eq!(difference(0, 1, 8), -1.0);
     }
 
-    /// The same rule from the same counts; headings are summed here and functions of the counts there: seen are
-    /// 6e-16 m over these 100 steps. Seen to reject exact arcs, which differ by 1.4e-5 m.
+    /// The same rule from the same counts; headings are summed here and functions of the counts there: they
+    /// differ by 6e-16 m over these 100 steps. Seen to reject exact arcs, which differ by 1.4e-5 m.
     #[test]
     fn a_plain_calibration_is_dead_reckoned_as_evaluation_does() {
         let robot = specimen();

@@ -90,7 +90,9 @@ fn lengths(text: &mut String, robot: &CalibratedRobot, lengths: Lengths) -> Resu
             let base_m = nominal(&separation, "wheel_separation_m")?;
             let (left_m, right_m) =
                 (nominal(&left, "left_wheel_diameter_m")?, nominal(&right, "right_wheel_diameter_m")?);
-            let which = if left_m == right_m { "nominal" } else { "mean of the nominal ones, which differ" };
+            // A nominal value comes from a ratio, to the last digits.
+            let are_alike = (left_m / right_m - 1.0).abs() < 1e-12;
+            let which = if are_alike { "nominal" } else { "mean of the nominal ones, which differ" };
             (base_m, 0.25 * (left_m + right_m), ["nominal".to_owned(), which.to_owned()])
         }
         Lengths::Calibrated => (
