@@ -446,6 +446,7 @@ fn both_engines_mean_the_same_by_an_effect_or_the_closed_form_refuses_it() {
         "traction_loss",
         "stick_slip",
         "bumps",
+        "robot_displaced",
         "castor_kick",
         "encoder_cycle",
         "low_speed_truncation",

@@ -63,9 +63,11 @@ pub(crate) fn decimal(value: f64, decimals: usize) -> String {
     if short.ends_with('.') { format!("{short}0") } else { short.to_owned() }
 }
 
-/// A variance: three digits, with a decimal point and an exponent.
+/// A variance: three digits, with a decimal point and an exponent that has a sign: YAML 1.1 takes a number
+/// without one for a string.
 pub(crate) fn variance(value: f64) -> String {
-    format!("{value:.2e}")
+    let text = format!("{value:.2e}");
+    if text.contains("e-") { text } else { text.replace('e', "e+") }
 }
 
 /// "± 0.031 mm", or that nothing is known of it.
@@ -102,7 +104,7 @@ mod tests {
             ("1.0".into(), "0.1235".into(), "0.0".into())
         );
         assert_eq!((digits(0.03123), digits(12.3), digits(0.0)), ("0.031".into(), "12".into(), "0.0".into()));
-        assert_eq!(variance(1.234e-5), "1.23e-5");
+        assert_eq!((variance(1.234e-5), variance(1e6)), ("1.23e-5".into(), "1.00e+6".into()));
     }
 
     #[test]

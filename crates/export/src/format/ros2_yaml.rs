@@ -195,8 +195,8 @@ mod tests {
              \u{20}   #  and rate. Sideways the model has no motion: the variance ahead stands there. Pose: after 1.0\n\
              \u{20}   #  m straight on; that of dead reckoning grows without bound, which no constant can say: let a\n\
              \u{20}   #  filter take the twist.\n\
-             \u{20}   pose_covariance_diagonal: [5.00e-7, 4.00e-6, 1.00e6, 1.00e6, 1.00e6, 1.20e-5]\n\
-             \u{20}   twist_covariance_diagonal: [6.25e-6, 6.25e-6, 1.00e6, 1.00e6, 1.00e6, 1.50e-4]\n\
+             \u{20}   pose_covariance_diagonal: [5.00e-7, 4.00e-6, 1.00e+6, 1.00e+6, 1.00e+6, 1.20e-5]\n\
+             \u{20}   twist_covariance_diagonal: [6.25e-6, 6.25e-6, 1.00e+6, 1.00e+6, 1.00e+6, 1.50e-4]\n\
              # What these parameters cannot express: anything that goes with speed, load, direction or the phase\n\
              #  of a wheel.\n"
         );
