@@ -174,3 +174,25 @@ fn the_arrows_reject_an_estimator_that_links_the_truth_and_a_room_that_nobody_kn
     let unknown = complaints(&edge("attic", "kinematics"));
     assert!(unknown.len() == 1 && unknown[0].contains("add it to ARROWS"), "{unknown:?}");
 }
+
+/// Packages with their features as Cargo builds them for some arguments.
+fn packages_with_features(arguments: &[&str]) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--prefix", "none", "--no-dedupe", "-f", "{p} [{f}]"])
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
+}
+
+/// A package with fewer features than the tests' is built a second time for the command, and with it all that
+/// stands on it.
+#[test]
+fn the_command_is_built_of_what_the_tests_are_built_of() {
+    let tests = packages_with_features(&["--workspace", "-e", "normal,build,dev"]);
+    let command = packages_with_features(&["-p", "yair", "-e", "normal,build"]);
+    let twice: Vec<&String> = command.difference(&tests).collect();
+    assert!(command.len() > 100 && twice.is_empty(), "built twice: {twice:?}");
+}
