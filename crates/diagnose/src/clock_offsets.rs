@@ -188,7 +188,7 @@ impl Profile {
 }
 
 /// Turns of the wheels at an instant of the log, between rows in proportion.
-fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wheels<f64> {
+pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wheels<f64> {
     let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
     let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
     turns.as_ref().map(|turns| turns[row] + share * (turns[row + 1] - turns[row]))

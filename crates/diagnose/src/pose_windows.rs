@@ -12,6 +12,7 @@ use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
 
+use crate::clock_offsets::turns_at;
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
     MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_EXTRINSICS, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS,
@@ -53,11 +54,7 @@ impl PoseTrack {
         let rows_s = &run.odometry().t_s;
         let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
         let angles = |row: usize| track.turns().as_ref().map(|turns| turns[row]);
-        let between = |t_s: f64| {
-            let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
-            let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
-            angles(row).zip_with(angles(row + 1), |start, end| start + share * (end - start))
-        };
+        let between = |t_s: f64| turns_at(rows_s, track.turns(), t_s);
         let mut lengths_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         lengths_s.sort_by(f64::total_cmp);
         let gap_s = MIN_GAP_RATIO * lengths_s.get(lengths_s.len() / 2).copied()?;

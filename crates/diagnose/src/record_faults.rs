@@ -4,6 +4,8 @@
 //! A factor on both wheels does not change the likelihood, which fits any geometry; the prior of the
 //! geometry decides. A fault that the fit absorbs is worse than none.
 
+use std::borrow::Cow;
+
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
 use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
@@ -105,13 +107,19 @@ pub(crate) fn fault(
 }
 
 /// Records whose motion is unknown where that of others is.
-fn with_unknown_motion_of(of: &[Dataset], records: &[Dataset]) -> Vec<Dataset> {
+fn with_unknown_motion_of<'r>(of: &[Dataset], records: &'r [Dataset]) -> Cow<'r, [Dataset]> {
+    let spans = |datasets: &'_ [Dataset]| -> Vec<_> {
+        datasets.iter().flat_map(|dataset| &dataset.runs).map(|run| run.unknown_motion.clone()).collect()
+    };
+    if spans(of) == spans(records) {
+        return Cow::Borrowed(records);
+    }
     let mut records = records.to_vec();
     let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
     for (run, other) in runs.zip(of.iter().flat_map(|dataset| &dataset.runs)) {
         run.unknown_motion.clone_from(&other.unknown_motion);
     }
-    records
+    Cow::Owned(records)
 }
 
 /// How implausible the geometry parameters of a fit are, as a part of its cost.

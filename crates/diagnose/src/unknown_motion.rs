@@ -77,6 +77,9 @@ pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64) -> Option<Unkno
     {
         events.clear();
     }
+    if events.is_empty() && otherwise.is_empty() {
+        return None;
+    }
     let mut records = datasets.to_vec();
     let mut anomalies: Vec<Anomaly> = Vec::new();
     let id = |(session, run): (usize, usize)| datasets[session].runs[run].info.id.clone();
@@ -93,9 +96,6 @@ pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64) -> Option<Unkno
         left_out.push(track.run);
         let span_s = [track.t_s[0], track.t_s[track.len() - 1]];
         anomalies.push(Anomaly { kind, run: id(track.run), span_s, displacement, sigmas });
-    }
-    if anomalies.is_empty() {
-        return None;
     }
     left_out.sort_unstable();
     for (session, run) in left_out.into_iter().rev() {
