@@ -44,6 +44,10 @@ challenge:
 fresh-seeds:
     .ci/run fresh-seeds
 
+# Test what the optional features write: Parquet files, PNG pictures
+features:
+    .ci/run features
+
 # Make the bags of tests/ros2 anew by the writers of others; needs Python and PyPI
 interop:
     .ci/run interop

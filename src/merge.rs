@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let merged = bench::merge(&arguments.shards)?;
-    bench::can_be_written(&arguments.out)?;
+    bench::can_be_written(&arguments.out, false)?;
     bench::write_merged(&merged, &arguments.out)?;
     sweep_table::show(&merged.result, terminal)?;
     terminal.document(&merged.result)?;

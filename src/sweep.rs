@@ -38,7 +38,8 @@ pub(crate) struct Arguments {
     /// Go on with the interrupted sweep in the folder of --out.
     #[arg(long, requires = "out")]
     resume: bool,
-    /// Keep every trial's estimates: trials.parquet in the folder of --out.
+    /// Keep every trial's estimates: trials.parquet in the folder of --out. Needs a build with the feature
+    /// parquet.
     #[arg(long, requires = "out")]
     rows: bool,
     /// Write sweep.json, sweep.csv and a picture into this folder.
@@ -96,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         _ => None,
     };
     if let Some(out) = &arguments.out {
-        bench::can_be_written(out)?;
+        bench::can_be_written(out, arguments.rows)?;
     }
     let stop = Arc::new(AtomicBool::new(false));
     if arguments.out.is_some() {

@@ -11,14 +11,15 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use crate::support::{document, refusal, run_in, succeed, usage};
-use bench::{BenchError, Campaign, Outcome, Shard, SweepOptions, SweepPlan};
+use bench::{BenchError, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use motion_programs::Schedule;
-use parquet::file::serialized_reader::SerializedFileReader;
-use parquet::record::Field;
+#[cfg(feature = "parquet")]
+use parquet::{file::serialized_reader::SerializedFileReader, record::Field};
 use scenario::Scenario;
 
-/// The state's file, as documented.
+/// The state's file, as documented, and the file in which estimates are collected for rows.
 const STATE: &str = "sweep.state.json";
+const SPOOL: &str = "sweep.trials.spool";
 
 /// The paper's robot on few runs, at four points: 301 trials leave the last chunk of each unfilled.
 fn scenario() -> Scenario {
@@ -71,8 +72,18 @@ fn whole(plan: &SweepPlan, folder: &Path, jobs: usize) -> BTreeMap<String, Vec<u
     let Outcome::Whole(result) = run(plan, folder, Shard::WHOLE, jobs, false, u32::MAX).expect("runs") else {
         panic!("one shard that nobody stops")
     };
-    bench::write_results(plan, &result, true, folder).expect("written");
-    contents(folder)
+    finished(plan, &result, folder)
+}
+
+/// The estimates as they were collected, and the files that are made in the end; rows only where this build
+/// writes them.
+fn finished(plan: &SweepPlan, result: &SweepResult, folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let spool = fs::read(folder.join(SPOOL)).expect("a spool");
+    bench::write_results(plan, result, cfg!(feature = "parquet"), folder).expect("written");
+    let mut all = contents(folder);
+    assert!(!all.contains_key(SPOOL) && !all.contains_key(STATE), "they are taken away");
+    all.insert(SPOOL.to_owned(), spool);
+    all
 }
 
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -101,10 +112,17 @@ fn threads_stops_and_shards_end_in_the_same_bytes() {
         let temporary = tempfile::tempdir().expect("a folder");
         let at = |name: &str| temporary.path().join(name);
         let undisturbed = whole(&plan, &at("one"), 1);
-        assert_eq!(
-            undisturbed.keys().collect::<Vec<_>>(),
-            ["sweep.csv", "sweep.json", "sweep.png", "sweep.svg", "trials.parquet"]
-        );
+        let names = [
+            "sweep.csv",
+            "sweep.json",
+            #[cfg(feature = "png")]
+            "sweep.png",
+            "sweep.svg",
+            SPOOL,
+            #[cfg(feature = "parquet")]
+            "trials.parquet",
+        ];
+        assert_eq!(undisturbed.keys().collect::<Vec<_>>(), names);
         assert_same(&undisturbed, &whole(&plan, &at("two"), 2));
 
         // Stopped again and again, after one wave, two, three.
@@ -118,14 +136,13 @@ fn threads_stops_and_shards_end_in_the_same_bytes() {
                 Outcome::Shard => panic!("one shard"),
             }
             // What a killed process leaves behind its state: a longer spool.
-            let spool = folder.join("sweep.trials.spool");
+            let spool = folder.join(SPOOL);
             let mut bytes = fs::read(&spool).expect("a spool");
             bytes.extend([7; 33]);
             fs::write(&spool, bytes).expect("written");
         };
         assert!(stops >= 3, "it was stopped {stops} times only");
-        bench::write_results(&plan, &result, true, &folder).expect("written");
-        assert_same(&undisturbed, &contents(&folder));
+        assert_same(&undisturbed, &finished(&plan, &result, &folder));
 
         // Shards, some of which begin within a point; merged in another order.
         for of in [2, 5] {
@@ -137,10 +154,21 @@ fn threads_stops_and_shards_end_in_the_same_bytes() {
                 assert_eq!(run(&plan, &folder, shard, 2, false, u32::MAX).expect("runs"), Outcome::Shard);
                 folders.insert(0, folder);
             }
-            let out = at(&format!("merged-{of}"));
+            // The first shard comes last.
+            let spools = folders.iter().rev().map(|folder| fs::read(folder.join(SPOOL)).expect("a spool"));
+            assert!(spools.flatten().eq(undisturbed[SPOOL].iter().copied()), "the shards' estimates are all");
             let merged = bench::merge(&folders).expect("a whole");
-            bench::write_merged(&merged, &out).expect("written");
-            assert_same(&undisturbed, &contents(&out));
+            let mut json = serde_json::to_vec_pretty(&merged.result).expect("JSON");
+            json.push(b'\n');
+            assert!(json == undisturbed["sweep.json"], "the merged result differs");
+            #[cfg(feature = "parquet")]
+            {
+                let out = at(&format!("merged-{of}"));
+                bench::write_merged(&merged, &out).expect("written");
+                let mut merged = contents(&out);
+                merged.insert(SPOOL.to_owned(), undisturbed[SPOOL].clone());
+                assert_same(&undisturbed, &merged);
+            }
         }
     }
 }
@@ -221,7 +249,17 @@ fn killed_after_a_state(here: &Path, arguments: &[&str], state: &Path) -> bool {
 fn a_killed_command_goes_on_where_it_was() {
     let temporary = tempfile::tempdir().expect("a folder");
     let here = temporary.path();
-    let arguments = ["sweep", "small.toml", "--rows", "--json", "--quiet", "--jobs", "1", "--out"];
+    let arguments = [
+        "sweep",
+        "small.toml",
+        #[cfg(feature = "parquet")]
+        "--rows",
+        "--json",
+        "--quiet",
+        "--jobs",
+        "1",
+        "--out",
+    ];
     let state = here.join("killed").join(STATE);
     let mut trials = 16_000;
     // A state is written every two seconds: a machine on which the campaign ends before its second one gets a
@@ -288,24 +326,10 @@ fn what_does_not_fit_together_is_refused_with_the_reason() {
     assert!(refusal(here, &["sweep", "small.toml", "--out", "file"]).contains("cannot write results there"));
 }
 
-/// A trial of a sweep is a dataset that can be looked into: what the rows say of it is what a method finds in
-/// it.
-#[test]
-fn a_trial_of_a_sweep_can_be_looked_into() {
-    let temporary = tempfile::tempdir().expect("a folder");
-    let here = temporary.path();
-    write_scenario(here, 20);
-    succeed(here, &["simulate", "small.toml", "--point", "3", "--trial", "7", "--method", "direct", "--out", "trial"]);
+/// Rows of the sweep's third point and seventh trial, which is `found ± sigma`.
+#[cfg(feature = "parquet")]
+fn the_rows_of_the_trial_say(here: &Path, found: f64, sigma: f64) {
     succeed(here, &["sweep", "small.toml", "--rows", "--out", "rows"]);
-    let found = document(here, &["calibrate", "trial", "--method", "direct"]);
-    let found = found["methods"][0]["parameters"]["wheel_separation_m"]["value"].as_f64().expect("a number");
-    let scenario = Scenario::read(&here.join("small.toml")).expect("as written");
-    let plan = SweepPlan::new(&scenario, SweepOptions::default()).expect("a sweep");
-    let mut trial = bench::Trial::new(&plan.points()[2].scenario, plan.seed()).expect("simulates").at_point(2);
-    let session = [trial.drive(7).expect("drives")];
-    let expected = calib::method("direct").expect("there").calibrate(&session).expect("applies");
-    // Written with all digits and read again: the same.
-    assert_eq!(found, expected.geometry.wheel_separation_m());
     let file = fs::File::open(here.join("rows/trials.parquet")).expect("rows");
     let rows = SerializedFileReader::new(file).expect("a Parquet file").into_iter();
     let rows = rows.map(|row| row.expect("a row").get_column_iter().map(|(k, v)| (k.clone(), v.clone())).collect());
@@ -318,11 +342,39 @@ fn a_trial_of_a_sweep_can_be_looked_into() {
             && (row["method"] == text("direct") && row["parameter"] == text("wheel_separation_m"))
     };
     let row = rows.iter().find(the_row).expect("the trial's row");
-    let sigma = expected.estimate(calib::Parameter::WheelSeparation).expect("has it").sigma.expect("of many spins");
     for (column, value) in
         [("estimate", found), ("sigma", sigma), ("truth", 0.363), ("instrument.floor_grid.reading_sigma_m", 0.001)]
     {
         assert_eq!(row[column], Field::Double(value), "{column}");
+    }
+}
+
+/// A trial of a sweep is a dataset that can be looked into: what the rows say of it is what a method finds in
+/// it.
+#[test]
+fn a_trial_of_a_sweep_can_be_looked_into() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let here = temporary.path();
+    write_scenario(here, 20);
+    succeed(here, &["simulate", "small.toml", "--point", "3", "--trial", "7", "--method", "direct", "--out", "trial"]);
+    let found = document(here, &["calibrate", "trial", "--method", "direct"]);
+    let found = found["methods"][0]["parameters"]["wheel_separation_m"]["value"].as_f64().expect("a number");
+    let scenario = Scenario::read(&here.join("small.toml")).expect("as written");
+    let plan = SweepPlan::new(&scenario, SweepOptions::default()).expect("a sweep");
+    let mut trial = bench::Trial::new(&plan.points()[2].scenario, plan.seed()).expect("simulates").at_point(2);
+    let session = [trial.drive(7).expect("drives")];
+    let expected = calib::method("direct").expect("there").calibrate(&session).expect("applies");
+    // Written with all digits and read again: the same.
+    assert_eq!(found, expected.geometry.wheel_separation_m());
+    #[cfg(feature = "parquet")]
+    {
+        let sigma = expected.estimate(calib::Parameter::WheelSeparation).expect("has it").sigma.expect("of many spins");
+        the_rows_of_the_trial_say(here, found, sigma);
+    }
+    #[cfg(not(feature = "parquet"))]
+    {
+        let message = refusal(here, &["sweep", "small.toml", "--rows", "--out", "rows"]);
+        assert!(message.contains("--features parquet") && !here.join("rows").exists(), "{message}");
     }
     assert!(refusal(here, &["simulate", "small.toml", "--point", "5", "--out", "t"]).contains("1 to 4"));
     assert!(refusal(here, &["simulate", "small.toml", "--point", "0", "--out", "t"]).contains("1 to 4"));
@@ -330,7 +382,7 @@ fn a_trial_of_a_sweep_can_be_looked_into() {
 }
 
 /// A device that is always full stands where the estimates of the trials would go.
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", feature = "parquet"))]
 #[test]
 fn a_full_disk_is_a_clear_error() {
     let temporary = tempfile::tempdir().expect("a folder");

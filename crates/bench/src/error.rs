@@ -49,6 +49,12 @@ pub enum BenchError {
         /// The reason.
         why: String,
     },
+    /// Rows are asked of a build without the feature that writes them.
+    #[error(
+        "--rows: this build writes no Parquet files. Build with the feature parquet: \
+         cargo install --path . --locked --features parquet"
+    )]
+    NoParquet,
     /// The folder holds an unfinished campaign that nobody asked to go on with.
     #[error("{path}: an unfinished sweep stands there; go on with --resume, or remove that file")]
     Unfinished {

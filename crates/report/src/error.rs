@@ -187,6 +187,7 @@ pub enum ReportError {
         character: char,
     },
     /// A PNG scale that is not positive or gives an enormous picture.
+    #[cfg(feature = "png")]
     #[error("figure \"{figure}\": a PNG scale of {scale} is not in 0.1 to {most}")]
     PngScale {
         /// The figure's title.
@@ -197,6 +198,7 @@ pub enum ReportError {
         most: f64,
     },
     /// The SVG could not be turned into pixels.
+    #[cfg(feature = "png")]
     #[error("figure \"{figure}\": no PNG: {why}")]
     Raster {
         /// The figure's title.

@@ -1,13 +1,9 @@
 //! The embedded font: widths of texts, so that a layout can leave room for them, and line breaks.
 
-use skrifa::instance::{LocationRef, Size};
-use skrifa::{FontRef, MetadataProvider};
+use ttf_parser::Face;
 
 /// What a browser tries in turn. The first is what the PNG is drawn with.
 pub(crate) const FAMILIES: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
-
-/// Advances are read at this size and scaled: at small sizes they are rounded to 1/64 px each.
-const MEASURED_PX: f64 = 1000.0;
 
 /// A weight of the font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,18 +14,18 @@ pub(crate) enum Weight {
 
 /// DejaVu Sans, regular and bold.
 pub(crate) struct Font {
-    regular: FontRef<'static>,
-    bold: FontRef<'static>,
+    regular: Face<'static>,
+    bold: Face<'static>,
 }
 
 impl Font {
     /// The font that is part of the program.
     pub(crate) fn embedded() -> Self {
-        let read = |bytes| FontRef::new(bytes).expect("the embedded font is readable, which a test checks");
+        let read = |bytes| Face::parse(bytes, 0).expect("the embedded font is readable, which a test checks");
         Self { regular: read(dejavu::sans::regular()), bold: read(dejavu::sans::bold()) }
     }
 
-    fn face(&self, weight: Weight) -> &FontRef<'static> {
+    fn face(&self, weight: Weight) -> &Face<'static> {
         match weight {
             Weight::Regular => &self.regular,
             Weight::Bold => &self.bold,
@@ -40,17 +36,16 @@ impl Font {
     /// or two).
     pub(crate) fn width_px(&self, text: &str, size_px: f64, weight: Weight) -> f64 {
         let face = self.face(weight);
-        let (map, metrics) =
-            (face.charmap(), face.glyph_metrics(Size::new(MEASURED_PX as f32), LocationRef::default()));
+        let em = f64::from(face.units_per_em());
         let advance =
-            |c: char| map.map(c).and_then(|glyph| metrics.advance_width(glyph)).map_or(MEASURED_PX, f64::from);
-        text.chars().map(advance).sum::<f64>() * size_px / MEASURED_PX
+            |c: char| face.glyph_index(c).and_then(|glyph| face.glyph_hor_advance(glyph)).map_or(em, f64::from);
+        text.chars().map(advance).sum::<f64>() * size_px / em
     }
 
     /// The first character of a text that the font lacks.
     pub(crate) fn missing(&self, text: &str) -> Option<char> {
         text.chars()
-            .find(|&c| c.is_control() || [&self.regular, &self.bold].iter().any(|face| face.charmap().map(c).is_none()))
+            .find(|&c| c.is_control() || [&self.regular, &self.bold].iter().any(|face| face.glyph_index(c).is_none()))
     }
 
     /// A text broken at spaces into lines of at most `width_px`; a longer word stays whole.

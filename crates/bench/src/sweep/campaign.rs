@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::plan::{ChunkOutcome, PointSetup, SweepPlan};
 use super::result::SweepResult;
-use super::rows::Spool;
+use super::spool::Spool;
 use super::state::{ChunkIndex, STATE_FILE, Shard, State};
 use crate::error::BenchError;
 

@@ -6,7 +6,7 @@ use scenario::Scenario;
 
 use super::plan::SweepPlan;
 use super::result::{PointResult, SweepResult};
-use super::rows::spool_in;
+use super::spool::spool_in;
 use super::state::{ChunkIndex, STATE_FILE, State};
 use super::tally::PointSum;
 use crate::error::BenchError;

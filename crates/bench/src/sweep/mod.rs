@@ -8,7 +8,9 @@ mod page;
 mod plan;
 mod quantile;
 mod result;
+#[cfg(feature = "parquet")]
 mod rows;
+mod spool;
 mod state;
 mod table;
 mod tally;

@@ -1,13 +1,12 @@
 //! Every trial's estimates as a Parquet file, for who wants distributions instead of moments.
 //!
-//! A Parquet file is readable only when it is whole, so trials are first appended to a spool of fixed
-//! records, which an interrupted campaign cuts back to what its state knows of. At the end the spool becomes
-//! `trials.parquet`: a row a trial, method and parameter, in that order, with the number of its point,
-//! counted from 1, and its levels. The `parquet` crate (Apache Arrow's own) writes it, without its
+//! A Parquet file is readable only when it is whole, so trials are first appended to a spool (`spool.rs`). At
+//! the end it becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the number of
+//! its point, counted from 1, and its levels. The `parquet` crate (Apache Arrow's own) writes it, without its
 //! compressors: estimates are noise, and noise does not compress.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -20,67 +19,14 @@ use scenario::Level;
 
 use super::plan::{SweepPlan, TRACKED};
 use super::result::SweepResult;
-use super::tally::Outcome;
+use super::spool::{RECORD, failed};
 use crate::error::BenchError;
-
-/// The spool's file in the folder of results.
-const SPOOL_FILE: &str = "sweep.trials.spool";
 
 /// The rows' file in the folder of results.
 const ROWS_FILE: &str = "trials.parquet";
 
-/// Bytes of one estimate: value and sigma.
-const RECORD: usize = 16;
-
 /// Trials whose rows are held together: a row group.
 const TRIALS_PER_GROUP: u64 = 1 << 14;
-
-fn failed(path: &Path, why: &impl ToString) -> BenchError {
-    BenchError::Write { path: path.display().to_string(), why: why.to_string() }
-}
-
-/// The growing file of estimates.
-pub(super) struct Spool {
-    path: PathBuf,
-    file: BufWriter<File>,
-}
-
-impl Spool {
-    /// Opens the spool in a folder with its first `keep` bytes.
-    pub(super) fn open(folder: &Path, keep: u64) -> Result<Self, BenchError> {
-        let path = folder.join(SPOOL_FILE);
-        let open = || {
-            let mut file = OpenOptions::new().create(true).truncate(keep == 0).write(true).open(&path)?;
-            if keep > 0 {
-                file.set_len(keep)?;
-            }
-            file.seek(SeekFrom::Start(keep))?;
-            Ok(file)
-        };
-        let file = open().map_err(|error: std::io::Error| failed(&path, &error))?;
-        Ok(Self { file: BufWriter::new(file), path })
-    }
-
-    /// Appends estimates and says how many bytes they are.
-    pub(super) fn append(&mut self, outcomes: &[Outcome]) -> Result<u64, BenchError> {
-        for outcome in outcomes {
-            for number in [outcome.value, outcome.sigma] {
-                self.file.write_all(&number.to_le_bytes()).map_err(|error| failed(&self.path, &error))?;
-            }
-        }
-        Ok((outcomes.len() * RECORD) as u64)
-    }
-
-    /// Hands everything to the system: what the state counts must be in the file before the state is.
-    pub(super) fn flush(&mut self) -> Result<(), BenchError> {
-        self.file.flush().map_err(|error| failed(&self.path, &error))
-    }
-}
-
-/// The spool in a folder.
-pub(super) fn spool_in(folder: &Path) -> PathBuf {
-    folder.join(SPOOL_FILE)
-}
 
 /// Writes `trials.parquet` into `out` from spools that follow each other.
 pub(super) fn write_rows(

@@ -6,13 +6,11 @@ use std::path::{Path, PathBuf};
 use super::merge::Merged;
 use super::plan::SweepPlan;
 use super::result::{EstimatorResult, PointResult, SweepResult};
-use super::rows::{spool_in, write_rows};
+#[cfg(feature = "parquet")]
+use super::rows::write_rows;
+use super::spool::{failed, spool_in};
 use super::state::STATE_FILE;
 use crate::error::BenchError;
-
-fn failed(path: &Path, why: &impl ToString) -> BenchError {
-    BenchError::Write { path: path.display().to_string(), why: why.to_string() }
-}
 
 /// Writes the results of a whole campaign into its folder, each file in one piece, and takes its state away
 /// once they stand.
@@ -57,11 +55,20 @@ fn write_all(plan: &SweepPlan, result: &SweepResult, spools: &[PathBuf], dir: &P
     Ok(())
 }
 
+#[cfg(not(feature = "parquet"))]
+const fn write_rows(_: &SweepPlan, _: &SweepResult, _: &[PathBuf], _: &Path) -> Result<(), BenchError> {
+    Err(BenchError::NoParquet)
+}
+
 /// Fails before any trial is run, not after, when results could not be written. Makes the folder.
 ///
 /// # Errors
+/// [`BenchError::NoParquet`] when rows are asked of a build without the feature `parquet`;
 /// [`BenchError::Write`] with the folder and the reason.
-pub fn can_be_written(dir: &Path) -> Result<(), BenchError> {
+pub fn can_be_written(dir: &Path, rows: bool) -> Result<(), BenchError> {
+    if rows && cfg!(not(feature = "parquet")) {
+        return Err(BenchError::NoParquet);
+    }
     let probe = || {
         std::fs::create_dir_all(dir)?;
         atomic_file::stage(&dir.join("sweep.json"), b"").map(drop)
