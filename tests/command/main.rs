@@ -8,8 +8,10 @@ mod compare;
 mod contract;
 mod correct;
 mod export;
+mod good_log;
 mod import_csv;
 mod import_ros2;
+mod spoiled_files;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;
