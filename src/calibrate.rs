@@ -68,10 +68,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let datasets =
         if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
-    if arguments.force {
-        check::before(&datasets, terminal);
-    } else {
-        check::refuse(&datasets, terminal)?;
+    match (datasets.is_empty(), arguments.force) {
+        (true, true) => check::before_reading(&datasets_at(&arguments.datasets)?, terminal),
+        (true, false) => check::refuse_before_reading(&datasets_at(&arguments.datasets)?, terminal)?,
+        (false, true) => check::before(&datasets, terminal),
+        (false, false) => check::refuse(&datasets, terminal)?,
     }
     refuse_wrapped_counters(&sessions)?;
     if arguments.online {

@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use calib::Names;
 use clap::Args;
-use dataset::Dataset;
+use dataset::{Blocks, Dataset};
 use preflight::{Preflight, Problem, Severity};
 use serde::Serialize;
 
-use crate::terminal::{Failure, Terminal, read_datasets, table};
+use crate::terminal::{Failure, Terminal, folder_name, read_datasets, table};
 
 /// What is wrong with a log, or would make a calibration wrong, before anything is fitted.
 ///
@@ -80,13 +80,67 @@ const fn word(problem: &Problem) -> &'static str {
     }
 }
 
-/// Checks datasets before another subcommand and passes on what is no hint; gives what was found.
-pub(crate) fn before(datasets: &[Dataset], terminal: &Terminal) -> Preflight {
+/// Checks datasets before another subcommand and passes on what is no hint.
+pub(crate) fn before(datasets: &[Dataset], terminal: &Terminal) {
     let found = preflight::check(datasets);
     for problem in found.problems.iter().filter(|problem| problem.severity != Severity::Hint) {
         terminal.remark(&line(problem));
     }
-    found
+}
+
+/// Rows of odometry that are checked of datasets which are read piece by piece: a million takes a second and
+/// 100 MB.
+const MAX_CHECKED_ROWS: usize = 1 << 20;
+
+/// The datasets as far as [`MAX_CHECKED_ROWS`] go, each run from its start, and whether that is all of them;
+/// `None` where they cannot be read, which whoever works with them tells.
+fn beginnings(paths: &[PathBuf]) -> Option<(Vec<Dataset>, bool)> {
+    let (mut left, mut all) = (MAX_CHECKED_ROWS, true);
+    let mut datasets = Vec::with_capacity(paths.len());
+    for path in paths {
+        let Some(mut blocks) = Blocks::open(path).ok()? else {
+            // The rows of its runs are mixed: it is held as a whole in any case.
+            datasets.push(dataset::read(path).ok()?.dataset);
+            continue;
+        };
+        let mut dataset = blocks.header().clone();
+        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+        for run in 0..blocks.infos().len() {
+            let whole = blocks.rows(run) <= left;
+            let count = if whole { blocks.blocks(run) } else { left / Blocks::ROWS };
+            if count > 0 {
+                dataset.runs.append(&mut blocks.read(run, 0..count).ok()?.dataset.runs);
+            }
+            left -= if whole { blocks.rows(run) } else { left };
+            all &= whole;
+        }
+        datasets.push(dataset);
+    }
+    Some((datasets, all))
+}
+
+/// As [`before`], for datasets that may be larger than the memory.
+pub(crate) fn before_reading(paths: &[PathBuf], terminal: &Terminal) {
+    if let Some((datasets, all)) = beginnings(paths) {
+        before(&datasets, terminal);
+        say_how_far(all, terminal);
+    }
+}
+
+/// As [`refuse`], for datasets that may be larger than the memory.
+pub(crate) fn refuse_before_reading(paths: &[PathBuf], terminal: &Terminal) -> Result<(), Failure> {
+    if let Some((datasets, all)) = beginnings(paths) {
+        refuse(&datasets, terminal)?;
+        say_how_far(all, terminal);
+    }
+    Ok(())
+}
+
+fn say_how_far(all: bool, terminal: &Terminal) {
+    if !all {
+        let what = "checked for problems as far as the first million rows go; yair check reads all";
+        terminal.remark(&format!("the datasets are large: they were {what}"));
+    }
 }
 
 /// A problem in one line.
@@ -96,7 +150,7 @@ fn line(problem: &Problem) -> String {
 }
 
 /// Refuses datasets with an error, in the words of the worst.
-pub(crate) fn refuse(datasets: &[Dataset], terminal: &Terminal) -> Result<Preflight, Failure> {
+pub(crate) fn refuse(datasets: &[Dataset], terminal: &Terminal) -> Result<(), Failure> {
     let found = preflight::check(datasets);
     let mut errors = found.problems.iter().filter(|problem| problem.severity == Severity::Error);
     if let Some(first) = errors.next() {
@@ -113,5 +167,5 @@ pub(crate) fn refuse(datasets: &[Dataset], terminal: &Terminal) -> Result<Prefli
     for problem in found.problems.iter().filter(|problem| problem.severity == Severity::Warning) {
         terminal.remark(&line(problem));
     }
-    Ok(found)
+    Ok(())
 }

@@ -11,6 +11,7 @@ use kinematics::Pose;
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
+use crate::check;
 use crate::simulate::refuse_filled;
 use crate::terminal::{Failure, Terminal, datasets_at, folder_name};
 
@@ -62,6 +63,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let paths = datasets_at(&arguments.datasets)?;
     let out = &arguments.out;
     refuse_filled(out, arguments.force)?;
+    check::before_reading(&paths, terminal);
     // All files are written beside the folder before the first is put into it.
     let beside = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let unwritable = |error: std::io::Error| format!("{}: {}", out.display(), error.kind());

@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     for path in &arguments.calibrations {
         found.extend(GivenCalibration::read(path)?.into_iter().map(Some));
     }
-    check_small(&paths, terminal);
+    check::before_reading(&paths, terminal);
     let (names, calibrations) = evaluate(&paths, &found, terminal)?;
     found.iter().flatten().for_each(|given| given.remark(terminal));
     show(&calibrations, terminal)?;
@@ -140,29 +140,6 @@ fn evaluate(
         CalibrationDrift::of_runs(given.as_ref().map(|given| &given.calibration().calibration), runs)
     };
     Ok((names, calibrations.iter().zip(runs).map(of_runs).collect()))
-}
-
-/// Datasets of at most so many bytes are read twice: once to be checked.
-const MAX_CHECKED_BYTES: u64 = 64 << 20;
-
-/// Passes on what is wrong with datasets that are not large; what cannot be read is told by whoever
-/// evaluates it.
-fn check_small(paths: &[PathBuf], terminal: &Terminal) {
-    let size = |path: &PathBuf| {
-        let of = |file| std::fs::metadata(path.join(file)).map_or(0, |metadata| metadata.len());
-        of("odometry.csv") + of("truth.csv")
-    };
-    if paths.iter().map(size).sum::<u64>() > MAX_CHECKED_BYTES {
-        return;
-    }
-    let read = |path: &PathBuf| {
-        let mut dataset = dataset::read(path).ok()?.dataset;
-        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
-        Some(dataset)
-    };
-    if let Some(datasets) = paths.iter().map(read).collect::<Option<Vec<_>>>() {
-        check::before(&datasets, terminal);
-    }
 }
 
 /// A calibration that leaves more drift than the nominal values is of another robot, or of other runs.

@@ -200,6 +200,24 @@ fn what_the_runs_do_not_determine_has_no_value() {
     assert_eq!(run_in(at, &["calibrate", "spins", "--force"]).code, Some(0));
 }
 
+/// What is too large to be held is checked as it is read.
+#[test]
+fn large_logs_are_checked_before_they_are_fitted_evaluated_and_corrected() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    let log = good(35);
+    log.write(&at.join("small"), "");
+    assert_eq!(run_in(at, &["calibrate", "small", "--out", "c.toml"]).code, Some(0));
+    let many = 500_000_usize.div_ceil(log.odometry.len());
+    log.rows(|_, wheels| wheels.swap(0, 1)).repeated(many).write(&at.join("set"), "");
+    let (values, message) = calibrated(at, "set");
+    assert!(values.is_none() && message.contains("error: wheels_exchanged: "), "{values:?} {message}");
+    for arguments in [&["evaluate", "set"][..], &["correct", "set", "--calibration", "c.toml", "--out", "poses"]] {
+        let ended = run_in(at, arguments);
+        assert!(ended.stderr.contains("error: wheels_exchanged: "), "{arguments:?}: {}", ended.stderr);
+    }
+}
+
 #[test]
 fn sessions_of_two_robots_are_refused_and_those_that_state_it_alone_are_not() {
     let temp = tempfile::tempdir().expect("a temporary folder");

@@ -132,6 +132,17 @@ impl Log {
         fs::write(dir.join("truth.csv"), truth).expect("written");
     }
 
+    /// The log driven so many times over, as runs of their own.
+    pub(crate) fn repeated(&self, times: usize) -> Self {
+        let (mut all, runs) = (self.clone(), self.runs.len());
+        for copy in 1..times {
+            all.runs.extend(self.runs.iter().map(|(id, protocol)| (format!("{id}_{copy}"), *protocol)));
+            all.odometry.extend(self.odometry.iter().map(|&(run, t_s, wheels)| (copy * runs + run, t_s, wheels)));
+            all.truth.extend(self.truth.iter().map(|&(run, t_s, seen)| (copy * runs + run, t_s, seen)));
+        }
+        all
+    }
+
     /// As [`Self::write`], with twists of the rows' instants instead of ticks.
     pub(crate) fn write_instant_rates(&self, dir: &Path, more: &str) {
         self.write(dir, more);
