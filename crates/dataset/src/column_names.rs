@@ -1,6 +1,7 @@
 //! What usual names of columns mean: for the importer of CSV files, and for what the reader says of a table
 //! whose columns are named otherwise.
 
+use crate::name_units::{take_unit, tokens_of, without_bracketed_unit};
 use crate::unit::Unit;
 
 /// What a column of a log can be.
@@ -331,83 +332,6 @@ pub(crate) fn likely_mapping(names: &[String]) -> Vec<(Quantity, String)> {
     Quantity::ALL.into_iter().filter_map(|quantity| Some((quantity, best(quantity)?))).collect()
 }
 
-/// Takes the unit out of `time [ms]`, `x (mm)`, `x_[m]`.
-fn without_bracketed_unit(name: &str) -> (String, Option<Unit>) {
-    for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some((before, rest)) = name.split_once(open)
-            && let Some((inside, after)) = rest.split_once(close)
-            && let Some(unit) = Unit::named(&inside.trim().to_lowercase())
-        {
-            return (format!("{before}{after}"), Some(unit));
-        }
-    }
-    (name.to_owned(), None)
-}
-
-/// Words of a name: cut at whatever is no letter or digit and where capitals begin, in lower case.
-fn tokens_of(name: &str) -> Vec<String> {
-    let mut tokens: Vec<String> = Vec::new();
-    let (mut current, mut was_lower) = (String::new(), false);
-    for letter in name.chars() {
-        let ends = !letter.is_alphanumeric() || (letter.is_uppercase() && was_lower);
-        if ends && !current.is_empty() {
-            tokens.push(std::mem::take(&mut current));
-        }
-        if letter.is_alphanumeric() || letter == '°' {
-            current.extend(letter.to_lowercase());
-        }
-        was_lower = letter.is_lowercase() || letter.is_ascii_digit();
-    }
-    if !current.is_empty() {
-        tokens.push(current);
-    }
-    tokens
-}
-
-/// Takes the unit off the end of a name: `_ms`, `_rad_s`, `_m_per_s`.
-fn take_unit(tokens: &mut Vec<String>) -> Option<Unit> {
-    let of = |parts: &[String]| match parts {
-        [one] => Unit::named(one),
-        [of, per] => Unit::named(&format!("{of}/{per}")).filter(|unit| unit.is_rate()),
-        [of, by, per] if by == "per" => Unit::named(&format!("{of}/{per}")).filter(|unit| unit.is_rate()),
-        _ => None,
-    };
-    for count in [3, 2, 1] {
-        if let Some(start) = tokens.len().checked_sub(count)
-            && let Some(unit) = of(&tokens[start..])
-        {
-            tokens.truncate(start);
-            return Some(unit);
-        }
-    }
-    None
-}
-
-/// The wheel that a name speaks of, and its other words.
-fn side(tokens: &[String]) -> Option<(Quantity, Vec<String>)> {
-    if tokens.iter().any(|token| ["x", "y", "z"].contains(&token.as_str())) {
-        return None;
-    }
-    for (quantity, words, letter) in [(Quantity::Left, LEFT, "l"), (Quantity::Right, RIGHT, "r")] {
-        if let Some(at) = tokens.iter().position(|token| words.contains(&token.as_str())) {
-            let others = tokens.iter().enumerate().filter(|(index, _)| *index != at);
-            return Some((quantity, others.map(|(_, token)| token.clone()).collect()));
-        }
-        let known = |word: &str| COUNTED.contains(&word) || RATE.contains(&word) || OF_WHEEL.contains(&word);
-        for token in tokens {
-            let full = if quantity == Quantity::Left { "left" } else { "right" };
-            let rest = [full, letter].into_iter().find_map(|affix| {
-                let rest = token.strip_prefix(affix).filter(|rest| known(rest));
-                rest.or_else(|| token.strip_suffix(affix).filter(|rest| known(rest)))
-            });
-            if let Some(rest) = rest {
-                return Some((quantity, vec![rest.to_owned()]));
-            }
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -432,6 +356,8 @@ mod tests {
         ] {
             assert_eq!(read(name), Some((Time, Some(unit))), "{name}");
         }
+        assert_eq!(read("v [cm/s]"), Some((Speed, Some(Unit::CmPerS))));
+        assert_eq!(read("speed_kmh"), Some((Speed, Some(Unit::KmPerH))));
         for name in ["enc_l", "left_encoder", "ticksLeft", "lw", "encL", "leftWheel", "links", "wl", "l"] {
             assert_eq!(read(name), Some((Left, None)), "{name}");
         }

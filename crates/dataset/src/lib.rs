@@ -12,6 +12,7 @@ mod error;
 mod fingerprint;
 pub mod import;
 mod imported;
+mod name_units;
 mod prefetch;
 mod read;
 mod record;

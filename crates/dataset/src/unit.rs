@@ -36,8 +36,14 @@ pub enum Unit {
     Rpm,
     /// Metres a second.
     MPerS,
+    /// Centimetres a second.
+    CmPerS,
     /// Millimetres a second.
     MmPerS,
+    /// Inches a second.
+    InchPerS,
+    /// Kilometres an hour.
+    KmPerH,
     /// None: a name.
     Text,
     /// None: a component of a unit quaternion.
@@ -52,8 +58,19 @@ impl Unit {
     /// Units of angle.
     pub const ANGLES: [Self; 2] = [Self::Rad, Self::Deg];
     /// Units in which a wheel is logged.
-    pub const WHEELS: [Self; 8] =
-        [Self::Ticks, Self::Rad, Self::Deg, Self::RadPerS, Self::DegPerS, Self::Rpm, Self::MPerS, Self::MmPerS];
+    pub const WHEELS: [Self; 11] = [
+        Self::Ticks,
+        Self::Rad,
+        Self::Deg,
+        Self::RadPerS,
+        Self::DegPerS,
+        Self::Rpm,
+        Self::MPerS,
+        Self::CmPerS,
+        Self::MmPerS,
+        Self::InchPerS,
+        Self::KmPerH,
+    ];
 
     /// The name that flags and output use.
     #[must_use]
@@ -74,7 +91,10 @@ impl Unit {
             Self::DegPerS => "deg/s",
             Self::Rpm => "rpm",
             Self::MPerS => "m/s",
+            Self::CmPerS => "cm/s",
             Self::MmPerS => "mm/s",
+            Self::InchPerS => "in/s",
+            Self::KmPerH => "km/h",
             Self::Text => "a name",
             Self::One => "1",
         }
@@ -95,11 +115,14 @@ impl Unit {
             "rad" | "rads" | "radian" | "radians" => Self::Rad,
             "deg" | "degs" | "degree" | "degrees" | "grad" | "°" => Self::Deg,
             "tick" | "ticks" | "count" | "counts" | "cnt" | "pulse" | "pulses" | "impulse" | "inc" => Self::Ticks,
-            "rad/s" | "radps" | "rad/sec" | "rps" | "1/s" => Self::RadPerS,
+            "rad/s" | "radps" | "rad/sec" | "1/s" => Self::RadPerS,
             "deg/s" | "degps" | "deg/sec" | "dps" | "°/s" => Self::DegPerS,
             "rpm" | "1/min" | "u/min" => Self::Rpm,
             "m/s" | "mps" | "m/sec" => Self::MPerS,
+            "cm/s" | "cmps" | "cm/sec" => Self::CmPerS,
             "mm/s" | "mmps" | "mm/sec" => Self::MmPerS,
+            "in/s" | "inch/s" | "ips" | "in/sec" => Self::InchPerS,
+            "km/h" | "kmh" | "kph" => Self::KmPerH,
             _ => return None,
         };
         Some(unit)
@@ -113,8 +136,9 @@ impl Unit {
             Self::Ms | Self::Mm | Self::MmPerS => value / 1e3,
             Self::Us => value / 1e6,
             Self::Ns => value / 1e9,
-            Self::Cm => value / 1e2,
-            Self::Inch => value * 0.0254,
+            Self::Cm | Self::CmPerS => value / 1e2,
+            Self::Inch | Self::InchPerS => value * 0.0254,
+            Self::KmPerH => value / 3.6,
             Self::Deg | Self::DegPerS => value * (PI / 180.0),
             Self::Rpm => value * (TAU / 60.0),
             _ => value,
@@ -124,13 +148,13 @@ impl Unit {
     /// Whether a wheel so logged is a rate and no cumulative quantity.
     #[must_use]
     pub const fn is_rate(self) -> bool {
-        matches!(self, Self::RadPerS | Self::DegPerS | Self::Rpm | Self::MPerS | Self::MmPerS)
+        matches!(self, Self::RadPerS | Self::DegPerS | Self::Rpm) || self.is_of_contact()
     }
 
     /// Whether it says how fast or far the wheel's contact goes, whatever the wheel.
     #[must_use]
     pub const fn is_of_contact(self) -> bool {
-        matches!(self, Self::MPerS | Self::MmPerS)
+        matches!(self, Self::MPerS | Self::CmPerS | Self::MmPerS | Self::InchPerS | Self::KmPerH)
     }
 }
 

@@ -7,6 +7,7 @@ use super::sheet::Sheet;
 use super::took::{Basis, Confidence};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
+use crate::name_units::unreadable_unit;
 use crate::unit::Unit;
 
 /// The column that was taken for a quantity.
@@ -191,6 +192,23 @@ fn settle(sheet: &Sheet, mut roles: Roles) -> Result<Roles, DatasetError> {
     }
     if !roles.has(Time) {
         return Err(lacking(sheet, "t", "every row needs its time"));
+    }
+    // Of a given column nothing but the unit that is given with it is looked at.
+    let by_name = roles.of.iter().filter(|(_, chosen)| chosen.basis.confidence != Confidence::Given);
+    for (quantity, chosen) in by_name.filter(|_| sheet.header_line.is_some()) {
+        let name = &sheet.names[chosen.index];
+        if let Some(unit) = unreadable_unit(name, |unit| quantity.accepts(unit)) {
+            let key = quantity.key();
+            return Err(DatasetError::Foreign {
+                file: sheet.file.clone(),
+                line: sheet.header_line.unwrap_or(1),
+                message: format!(
+                    "column \"{}\" is taken as {key}, which is never read in \"{}\"; say in which unit it is with --map {key}=COLUMN[UNIT]",
+                    shown(name.as_bytes()),
+                    shown(unit.as_bytes()),
+                ),
+            });
+        }
     }
     Ok(roles)
 }
