@@ -71,31 +71,6 @@ pub(crate) fn take_unit(tokens: &mut Vec<String>) -> Option<Unit> {
     None
 }
 
-/// The wheel that a name speaks of, and its other words.
-fn side(tokens: &[String]) -> Option<(Quantity, Vec<String>)> {
-    if tokens.iter().any(|token| ["x", "y", "z"].contains(&token.as_str())) {
-        return None;
-    }
-    for (quantity, words, letter) in [(Quantity::Left, LEFT, "l"), (Quantity::Right, RIGHT, "r")] {
-        if let Some(at) = tokens.iter().position(|token| words.contains(&token.as_str())) {
-            let others = tokens.iter().enumerate().filter(|(index, _)| *index != at);
-            return Some((quantity, others.map(|(_, token)| token.clone()).collect()));
-        }
-        let known = |word: &str| COUNTED.contains(&word) || RATE.contains(&word) || OF_WHEEL.contains(&word);
-        for token in tokens {
-            let full = if quantity == Quantity::Left { "left" } else { "right" };
-            let rest = [full, letter].into_iter().find_map(|affix| {
-                let rest = token.strip_prefix(affix).filter(|rest| known(rest));
-                rest.or_else(|| token.strip_suffix(affix).filter(|rest| known(rest)))
-            });
-            if let Some(rest) = rest {
-                return Some((quantity, vec![rest.to_owned()]));
-            }
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
