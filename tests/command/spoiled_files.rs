@@ -109,7 +109,7 @@ const TABLE: &[(&str, Spoil, Wanted)] = &[
         |at| {
             edit(&at.join("odometry.csv"), |t| {
                 column(&column(&t, 2, |cell| format!("{cell}.0")), 3, |cell| format!("{cell}.0"))
-            })
+            });
         },
         Right,
     ),
@@ -169,7 +169,9 @@ const TABLE: &[(&str, Spoil, Wanted)] = &[
     (
         "radii",
         |at| {
-            edit(&at.join("dataset.toml"), |t| t.replace("left_wheel_diameter_m = 0.15", "left_wheel_radius_m = 0.075"))
+            edit(&at.join("dataset.toml"), |t| {
+                t.replace("left_wheel_diameter_m = 0.15", "left_wheel_radius_m = 0.075")
+            });
         },
         Refused(&["dataset.toml", "a diameter is twice the radius"]),
     ),
@@ -181,7 +183,9 @@ const TABLE: &[(&str, Spoil, Wanted)] = &[
     (
         "a wheel of nothing",
         |at| {
-            edit(&at.join("dataset.toml"), |t| t.replace("left_wheel_diameter_m = 0.15", "left_wheel_diameter_m = 0.0"))
+            edit(&at.join("dataset.toml"), |t| {
+                t.replace("left_wheel_diameter_m = 0.15", "left_wheel_diameter_m = 0.0")
+            });
         },
         Refused(&["dataset.toml", "left_wheel_diameter_m"]),
     ),
@@ -195,7 +199,7 @@ const TABLE: &[(&str, Spoil, Wanted)] = &[
         |at| {
             edit(&at.join("truth.csv"), |t| {
                 t.lines().map(|line| format!("{}\n", line.rsplit_once(',').expect("cells").0)).collect()
-            })
+            });
         },
         Refused(&["truth.csv", "theta_rad", "empty"]),
     ),

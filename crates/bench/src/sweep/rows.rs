@@ -1,9 +1,9 @@
 //! Every trial's estimates as a Parquet file, for who wants distributions instead of moments.
 //!
 //! A Parquet file is readable only when it is whole, so trials are first appended to a spool (`spool.rs`). At
-//! the end it becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the number of
-//! its point, counted from 1, and its levels. The `parquet` crate (Apache Arrow's own) writes it, without its
-//! compressors: estimates are noise, and noise does not compress.
+//! the end it becomes `trials.parquet`: a row a trial, method and parameter, in that order, with the number
+//! of its point, counted from 1, and its levels. The `parquet` crate (Apache Arrow's own) writes it, without
+//! its compressors: estimates are noise, and noise does not compress.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
