@@ -10,14 +10,17 @@ mod diagnose;
 mod diagnosis_page;
 mod evaluate;
 mod export;
+mod help;
 mod import;
 mod import_csv;
 mod import_robot;
 mod import_ros2;
+mod manual;
 mod merge;
 mod plan;
 mod reproduce;
 mod simulate;
+mod sparse_lines;
 mod sweep;
 mod sweep_summary;
 mod sweep_table;
@@ -25,7 +28,7 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::terminal::Terminal;
 
@@ -34,7 +37,7 @@ use crate::terminal::Terminal;
 #[command(name = "yair", version, about, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
     /// Print one JSON document on standard output and nothing else there.
     #[arg(long, global = true)]
     json: bool,
@@ -59,12 +62,22 @@ enum Command {
     Merge(merge::Arguments),
     Plan(plan::Arguments),
     Reproduce(reproduce::Arguments),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
+/// Exit code of bad usage, as of `clap`.
+const USAGE: u8 = 2;
+
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let grammar = help::with_groups_and_examples(Cli::command());
+    let cli = Cli::from_arg_matches(&grammar.clone().get_matches()).unwrap_or_else(|error| error.exit());
     let terminal = Terminal::new(cli.json, cli.quiet);
-    let outcome = match &cli.command {
+    let Some(command) = &cli.command else {
+        terminal.remark(help::first_steps());
+        return ExitCode::from(USAGE);
+    };
+    let outcome = match command {
         Command::Simulate(arguments) => simulate::run(arguments, &terminal),
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Check(arguments) => check::run(arguments, &terminal),
@@ -79,6 +92,8 @@ fn main() -> ExitCode {
         Command::Merge(arguments) => merge::run(arguments, &terminal),
         Command::Plan(arguments) => plan::run(arguments, &terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, &terminal),
+        Command::Completions(arguments) => manual::completions(arguments, grammar),
+        Command::Man(arguments) => manual::man(arguments, grammar, &terminal),
     };
     outcome.unwrap_or_else(|failure| {
         terminal.failure(&failure.to_string());

@@ -5,10 +5,13 @@ use std::error::Error;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use anstyle::{AnsiColor, Effects, Style};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use dataset::Dataset;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+
+use crate::sparse_lines::SparseLines;
 
 /// Why a subcommand failed: one line for the user.
 pub(crate) type Failure = Box<dyn Error>;
@@ -49,30 +52,48 @@ impl Terminal {
         Ok(())
     }
 
-    /// A remark on standard error.
+    /// A remark on standard error; where somebody watches, the word that says how grave it is has a colour.
     pub(crate) fn remark(&self, text: &str) {
         if !self.quiet {
-            let _ = writeln!(std::io::stderr(), "{text}");
+            let text = match text.split_once(": ") {
+                Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
+                Some(("warning", rest)) => format!("{WARNING}warning{WARNING:#}: {rest}"),
+                _ => text.to_owned(),
+            };
+            let _ = writeln!(anstream::stderr(), "{text}");
         }
     }
 
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
-        let _ = writeln!(std::io::stderr(), "error: {}", in_plain_words(&message.replace('\n', "; ")));
+        let message = in_plain_words(&message.replace('\n', "; "));
+        let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
     }
 
-    /// A progress bar over `total` steps with the time left; hidden when quiet or when nobody watches.
+    /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and then;
+    /// nothing when quiet.
     pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
-        if self.quiet || !std::io::stderr().is_terminal() {
+        if self.quiet {
             return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
         }
-        let bar = ProgressBar::new(total).with_message(what.to_owned());
-        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {human_pos}/{human_len}, {eta} left") {
+        let watched = std::io::stderr().is_terminal();
+        let (target, template) = if watched {
+            (ProgressDrawTarget::stderr(), "{msg} {wide_bar} {human_pos}/{human_len}, {eta} left")
+        } else {
+            let lines = ProgressDrawTarget::term_like_with_hz(Box::new(SparseLines::new()), 1);
+            (lines, "{msg}: {human_pos} of {human_len}, {eta} left")
+        };
+        let bar = ProgressBar::with_draw_target(Some(total), target).with_message(what.to_owned());
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar
     }
 }
+
+/// Colours of what stands before a message; `anstream` drops them where nobody watches or NO_COLOR is set.
+const ERROR: Style = AnsiColor::Red.on_default().effects(Effects::BOLD);
+const WARNING: Style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
 
 /// What the system says of a mistaken path, as a person would: every reader of files ends here.
 fn in_plain_words(message: &str) -> String {

@@ -375,3 +375,30 @@ fn reproduce_writes_the_page_and_its_pictures() {
     assert_eq!(names.len(), if cfg!(feature = "png") { 7 } else { 4 });
     assert!(refusal(at, &["reproduce", "--trials", "1"]).contains("at least 2"));
 }
+
+#[test]
+fn the_command_alone_says_what_to_do_first_and_help_groups_what_there_is() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    let alone = run_in(at, &[]);
+    assert_eq!((alone.code, &alone.stdout[..]), (Some(2), ""));
+    assert!(alone.stderr.contains("yair import csv") && alone.stderr.contains("--help"), "{}", alone.stderr);
+    let help = succeed(at, &["--help"]).stdout;
+    for title in ["Your robot:", "Simulate and bench:", "The paper:", "Options:"] {
+        assert!(help.contains(&format!("\n\n{title}\n")), "{title}: {help}");
+    }
+    assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
+}
+
+#[test]
+fn shells_and_man_know_the_command() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(succeed(at, &["completions", shell]).stdout.contains("diagnose"), "{shell}");
+    }
+    assert!(succeed(at, &["man"]).stdout.starts_with(".ie"));
+    succeed(at, &["man", "--out", "man"]);
+    let page = std::fs::read_to_string(at.join("man/yair-import-csv.1")).expect("a page of an inner subcommand");
+    assert!(page.contains("delimiter"), "{page}");
+}
