@@ -10,6 +10,7 @@ mod correct;
 mod export;
 mod import_csv;
 mod import_ros2;
+mod pose_errors;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;

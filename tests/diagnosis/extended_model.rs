@@ -68,8 +68,10 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
         let (model, fresh) = (model(&found), simulated(&hidden, 72));
         let extended_percent = drift_percent(runs(&fresh, &model));
         let geometry = AugmentedCalibration::from(model.calibration.calibration.clone());
-        let geometry_percent = drift_percent(evaluate_runs(&fresh.session(), Some(&geometry), &EvaluationOptions::default(), &mut 0.0));
-        let nominal_percent = drift_percent(evaluate_runs(&fresh.session(), None, &EvaluationOptions::default(), &mut 0.0));
+        let geometry_percent =
+            drift_percent(evaluate_runs(&fresh.session(), Some(&geometry), &EvaluationOptions::default(), &mut 0.0));
+        let nominal_percent =
+            drift_percent(evaluate_runs(&fresh.session(), None, &EvaluationOptions::default(), &mut 0.0));
         let shown = format!(
             "{id}: {nominal_percent} nominal, {geometry_percent} geometry, {extended_percent} extended, {noise_percent} noise"
         );

@@ -69,6 +69,9 @@ impl Serialize for Delta {
 }
 
 impl Delta {
+    /// Relative tolerance of all pairs where none is given, as evo has it.
+    pub const DEFAULT_TOLERANCE: f64 = DELTA_TOLERANCE;
+
     /// A step; `relative_tolerance` counts for all pairs by metres or angle alone.
     ///
     /// # Errors
