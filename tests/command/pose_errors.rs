@@ -130,14 +130,14 @@ fn errors_of_all_runs_are_pooled_and_what_is_missing_has_its_reason() {
     let mean = (weighted(0) + weighted(1)) / number(&all["ape"], "count");
     assert!((mean - number(&all["ape"]["translation_m"], "mean")).abs() < 1e-15);
     // One of two runs is long enough for the step.
-    let flags = ["--delta", "3.61", "--delta-unit", "m"];
+    let flags = ["--delta", "2.01", "--delta-unit", "m"];
     let found = document(at, &[&["evaluate", &set], &flags[..]].concat());
     let runs = &found["calibrations"][0]["runs"];
     let reasons: Vec<bool> = [0, 1].map(|run: usize| runs[run]["rpe"]["why_null"].is_string()).to_vec();
     assert_eq!(reasons.iter().filter(|is_missing| **is_missing).count(), 1, "{runs}");
     let said = succeed(at, &[&["evaluate", &set], &flags[..]].concat()).stdout;
     assert!(said.contains("nominal: RPE (--delta) is without 1 of 2 runs;"), "{said}");
-    assert!(said.contains("APE not aligned (--align); RPE over 3.61 m, consecutive pairs (--delta)"), "{said}");
+    assert!(said.contains("APE not aligned (--align); RPE over 2.01 m, consecutive pairs (--delta)"), "{said}");
     let far = succeed(at, &["evaluate", &set, "--delta", "900", "--delta-unit", "m"]).stdout;
     assert!(far.contains("nominal: no RPE: no two poses are a step apart; take a smaller --delta"), "{far}");
 }

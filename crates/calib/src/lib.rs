@@ -11,6 +11,7 @@ mod dead_reckoning_jacobian;
 mod drift;
 mod drive;
 mod estimate;
+mod path_covariance;
 mod pose_error;
 mod pose_measurements;
 mod pose_pairs;
@@ -35,6 +36,7 @@ pub use estimate::{
     Parameter, Rejected,
 };
 pub use methods::{METHODS, method};
+pub use path_covariance::path_covariances;
 pub use pose_error::{
     ErrorStatistics, PoseErrorOptions, PoseErrorStatistics, PoseErrors, absolute_pose_errors, relative_pose_errors,
 };

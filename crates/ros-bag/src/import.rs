@@ -16,9 +16,10 @@ use crate::bag::Bag;
 use crate::choice;
 use crate::clock::{self, Clock, Ordered, seconds};
 use crate::error::RosBagError;
-use crate::rows::{self, BothRows, Rows, WheelRows};
-use crate::topics::Survey;
+use crate::rows::{self, BothRows, Rows, WheelRows, WheelSource};
+use crate::topics::{Survey, Topic};
 use crate::truth::{TruthReader, TruthReading};
+use crate::wheel_pair::{Resampling, WheelPair};
 use crate::wheels::{WheelFields, WheelQuantity, WheelReader};
 
 /// Largest tilt of the instrument's poses that the plane bears, radians: at 10° a length in the plane is
@@ -39,7 +40,7 @@ const MAX_GAP_OF_RATES_S: f64 = 1.0;
 /// All that a user may say.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Topic of the wheels.
+    /// Topic of the wheels, or `LEFT_TOPIC[.field],RIGHT_TOPIC[.field]`.
     pub wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     pub truth: Option<String>,
@@ -100,27 +101,40 @@ pub struct FromBag {
 pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let bag = Bag::open(path)?;
     let survey = Survey::of(&bag)?;
-    let wheels = match &options.wheels {
-        Some(topic) => survey.named("--wheels", topic)?,
-        None => choice::wheels(&survey, path)?,
+    let pair = match &options.wheels {
+        Some(topics) => WheelPair::parse(&survey, topics, options.fields.quantity)?,
+        None => None,
     };
     let truth = match &options.truth {
         Some(topic) => survey.named("--truth", topic)?,
         None => choice::truth(&survey, path)?,
     };
-    if wheels.name == truth.name {
-        let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
-        let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
-        return Err(RosBagError::Unusable { topic, type_name, why });
-    }
-    let (wheel_reader, counter_bits) = WheelReader::new(wheels, &options.fields)?;
     let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
-    let both = rows::read(&bag, (&wheels.name, &wheel_reader), (&truth.name, &truth_reader))?;
+    let (both, wheels_what, counter_bits) = match &pair {
+        Some(pair) => {
+            refuse_own_poses(truth, &[&pair.left.topic, &pair.right.topic])?;
+            let rates = options.rates.unwrap_or(Rates::IntervalEnd);
+            let counter_bits = options.robot.counter_bits;
+            let resampling = Resampling { quantity: pair.quantity, rates, counter_bits };
+            let source = WheelSource::Two(pair, resampling);
+            (rows::read(&bag, &source, (&truth.name, &truth_reader))?, pair.describe(), None)
+        }
+        None => {
+            let wheels = match &options.wheels {
+                Some(topic) => survey.named("--wheels", topic)?,
+                None => choice::wheels(&survey, path)?,
+            };
+            refuse_own_poses(truth, &[&wheels.name])?;
+            let (reader, counter_bits) = WheelReader::new(wheels, &options.fields)?;
+            let source = WheelSource::One(&wheels.name, &reader);
+            (rows::read(&bag, &source, (&truth.name, &truth_reader))?, reader.describe(), counter_bits)
+        }
+    };
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
     let is_counted = both.quantity == WheelQuantity::Ticks;
     let (robot, geometry) =
-        given.nominal(is_counted, path, || format!("wheels are {} of {}", wheel_reader.describe(), wheels.name))?;
+        given.nominal(is_counted, path, || format!("wheels are {wheels_what} of {}", both.wheels.topic))?;
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
     warnings.extend(both.truth.warnings());
@@ -131,10 +145,20 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         ));
     }
     let clocks = clocks(&both, &mut warnings)?;
-    let took = took(&both, [wheel_reader.describe(), truth_reader.describe()], clocks);
+    let took = took(&both, [wheels_what, truth_reader.describe()], clocks);
     let dataset = assemble(&both, clocks, (robot, geometry), path, options, &mut warnings)?;
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
+}
+
+/// Poses of the topic of the wheels are computed from them.
+fn refuse_own_poses(truth: &Topic, wheels: &[&String]) -> Result<(), RosBagError> {
+    if !wheels.contains(&&truth.name) {
+        return Ok(());
+    }
+    let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
+    let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
+    Err(RosBagError::Unusable { topic, type_name, why })
 }
 
 fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2]) -> Took {

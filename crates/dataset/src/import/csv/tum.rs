@@ -69,7 +69,7 @@ pub fn read_tum(truths: &[PathBuf], motion: TumMotion<'_>, options: &Options) ->
         }
     };
     for file in truths {
-        all.push(truth(file, &mut remarks)?);
+        all.push(read_poses(file, &mut remarks)?);
     }
     let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = truths.first().map(stem).unwrap_or_default();
@@ -192,10 +192,6 @@ fn is_heading_constant(pose: &PoseColumns) -> bool {
         && reach(&pose.y) > MIN_REACH_M
 }
 
-fn truth(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError> {
-    read_poses(file, remarks)
-}
-
 /// Twists over the intervals between the poses of the robot's own dead reckoning.
 fn odometry(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError> {
     let Part { sheet, mut roles, mut log } = read_poses(file, remarks)?;
@@ -233,7 +229,7 @@ fn odometry(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError
     }
     log.wheels = Some([speeds, yaw_rates]);
     roles.of.retain(|quantity, _| *quantity == Quantity::Time);
-    let why = "between poses";
+    let why = "of the motion from pose to pose";
     roles.of.insert(Quantity::Speed, fixed(1, Some(Unit::MPerS), why));
     roles.of.insert(Quantity::YawRate, fixed(6, Some(Unit::RadPerS), why));
     Ok(Part { sheet, roles, log })
