@@ -44,6 +44,6 @@ challenge:
 fresh-seeds:
     .ci/run fresh-seeds
 
-# Make the bags of tests/ros2 anew by the writers of others; needs Python and PyPI
+# Make the bags of tests/ros2 and evo's numbers of tests/evo anew, and read an exported bag, by the programs of others; needs Python and PyPI
 interop:
     .ci/run interop

@@ -8,8 +8,10 @@ mod compare;
 mod contract;
 mod correct;
 mod export;
+mod export_mcap;
 mod import_csv;
 mod import_ros2;
+mod import_tum;
 mod pose_errors;
 #[path = "../support/mod.rs"]
 mod support;

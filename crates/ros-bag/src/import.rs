@@ -101,40 +101,45 @@ pub struct FromBag {
 pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let bag = Bag::open(path)?;
     let survey = Survey::of(&bag)?;
-    let pair = match &options.wheels {
-        Some(topics) => WheelPair::parse(&survey, topics, options.fields.quantity)?,
-        None => None,
+    let wheels = match &options.wheels {
+        Some(topics) => match WheelPair::parse(&survey, topics, options.fields.quantity)? {
+            Some(pair) => WheelTopics::Two(pair),
+            None => WheelTopics::One(survey.named("--wheels", topics)?),
+        },
+        None => WheelTopics::One(choice::wheels(&survey, path)?),
     };
     let truth = match &options.truth {
         Some(topic) => survey.named("--truth", topic)?,
         None => choice::truth(&survey, path)?,
     };
-    let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
-    let (both, wheels_what, counter_bits) = match &pair {
-        Some(pair) => {
-            refuse_own_poses(truth, &[&pair.left.topic, &pair.right.topic])?;
-            let rates = options.rates.unwrap_or(Rates::IntervalEnd);
-            let counter_bits = options.robot.counter_bits;
-            let resampling = Resampling { quantity: pair.quantity, rates, counter_bits };
-            let source = WheelSource::Two(pair, resampling);
-            (rows::read(&bag, &source, (&truth.name, &truth_reader))?, pair.describe(), None)
+    if wheels.has(&truth.name) {
+        let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
+        let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
+        return Err(RosBagError::Unusable { topic, type_name, why });
+    }
+    let (source, wheels_what, counter_bits) = match wheels {
+        WheelTopics::One(topic) => {
+            let (reader, counter_bits) = WheelReader::new(topic, &options.fields)?;
+            let what = reader.describe();
+            (WheelSource::One(topic.name.clone(), reader), what, counter_bits)
         }
-        None => {
-            let wheels = match &options.wheels {
-                Some(topic) => survey.named("--wheels", topic)?,
-                None => choice::wheels(&survey, path)?,
-            };
-            refuse_own_poses(truth, &[&wheels.name])?;
-            let (reader, counter_bits) = WheelReader::new(wheels, &options.fields)?;
-            let source = WheelSource::One(&wheels.name, &reader);
-            (rows::read(&bag, &source, (&truth.name, &truth_reader))?, reader.describe(), counter_bits)
+        WheelTopics::Two(pair) => {
+            let rates = options.rates.unwrap_or(Rates::IntervalEnd);
+            let resampling = Resampling { quantity: pair.quantity, rates, counter_bits: options.robot.counter_bits };
+            let what = pair.describe();
+            (WheelSource::Two(pair, resampling), what, None)
         }
     };
+    let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
+    let both = rows::read(&bag, &source, (&truth.name, &truth_reader))?;
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
     let is_counted = both.quantity == WheelQuantity::Ticks;
-    let (robot, geometry) =
-        given.nominal(is_counted, path, || format!("wheels are {wheels_what} of {}", both.wheels.topic))?;
+    let what = || match &source {
+        WheelSource::One(topic, _) => format!("wheels are {wheels_what} of {topic}"),
+        WheelSource::Two(..) => format!("wheels are {wheels_what}"),
+    };
+    let (robot, geometry) = given.nominal(is_counted, path, what)?;
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
     warnings.extend(both.truth.warnings());
@@ -151,14 +156,19 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     Ok(FromBag { dataset, took, warnings })
 }
 
-/// Poses of the topic of the wheels are computed from them.
-fn refuse_own_poses(truth: &Topic, wheels: &[&String]) -> Result<(), RosBagError> {
-    if !wheels.contains(&&truth.name) {
-        return Ok(());
+/// The topics of the wheels.
+enum WheelTopics<'a> {
+    One(&'a Topic),
+    Two(WheelPair),
+}
+
+impl WheelTopics<'_> {
+    fn has(&self, topic: &str) -> bool {
+        match self {
+            Self::One(wheels) => wheels.name == topic,
+            Self::Two(pair) => [&pair.left, &pair.right].iter().any(|side| side.topic == topic),
+        }
     }
-    let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
-    let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
-    Err(RosBagError::Unusable { topic, type_name, why })
 }
 
 fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2]) -> Took {

@@ -112,17 +112,17 @@ pub(crate) struct BothRows {
 }
 
 /// Where the wheels are.
-pub(crate) enum WheelSource<'a> {
+pub(crate) enum WheelSource {
     /// Both in the messages of one topic.
-    One(&'a str, &'a WheelReader),
+    One(String, WheelReader),
     /// Each on its own.
-    Two(&'a WheelPair, Resampling),
+    Two(WheelPair, Resampling),
 }
 
 /// Reads wheels and poses.
 pub(crate) fn read(
     bag: &Bag,
-    wheels: &WheelSource<'_>,
+    wheels: &WheelSource,
     (truth_topic, truth_reader): (&str, &TruthReader),
 ) -> Result<BothRows, RosBagError> {
     match wheels {

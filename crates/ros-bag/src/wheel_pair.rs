@@ -17,7 +17,7 @@ use crate::wheels::WheelQuantity;
 const MAX_RATE_RATIO: f64 = 4.0;
 
 /// Integers of `std_msgs`, which are counts where nobody says what they are.
-const COUNT_TYPES: [&str; 8] = [
+pub(crate) const COUNT_TYPES: [&str; 8] = [
     "std_msgs/msg/Int8",
     "std_msgs/msg/Int16",
     "std_msgs/msg/Int32",
