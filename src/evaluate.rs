@@ -16,9 +16,9 @@ use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 /// Drift and pose errors of dead reckoning against the truth, under the nominal values and under each
 /// calibration
 ///
-/// APE and RPE are those of evo (evo_ape, evo_rpe) on the same poses: absolute errors at the truth's instants,
-/// and errors of the motion between poses that are a step apart. RPE counts every pair of poses of a run once,
-/// of all runs together.
+/// APE and RPE are those of evo (evo_ape, evo_rpe) on the same poses: absolute errors at the truth's
+/// instants, and errors of the motion between poses that are a step apart. RPE counts every pair of poses
+/// of a run once, of all runs together.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Datasets with absolute truth; a folder of datasets stands for all of them.

@@ -9,7 +9,7 @@ use ::export::{CalibratedRobot, Lengths, Options, tum, tum_of_truth};
 use calib::{CalibrationReport, MethodReport, corrected_run};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::{Loaded, NominalRobot, Warning};
+use dataset::{Loaded, NominalRobot};
 use scenario::Scenario;
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ use crate::calibration_file::{GivenCalibration, is_scenario};
 use crate::correct::{file_of, only};
 use crate::export_mcap;
 use crate::simulate::{refuse_filled, write_whole};
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::{Failure, Terminal, listed_ids, warn};
 
 /// Calibrated parameters for a robot's own program, or a dataset's truth for other tools.
 #[derive(Args)]
@@ -72,8 +72,6 @@ pub(crate) struct Arguments {
 /// The formats of datasets; all others are of calibrations.
 const TUM: &str = "tum";
 const MCAP: &str = "mcap";
-/// Ids of runs in a message.
-const SHOWN_RUNS: usize = 6;
 /// Flags of calibrations alone, and of datasets alone.
 const OF_CALIBRATIONS: [&str; 2] = ["dataset", "method"];
 const OF_DATASETS: [&str; 2] = ["calibration", "run"];
@@ -253,12 +251,6 @@ fn stated(path: &Path, terminal: &Terminal) -> Result<NominalRobot, Failure> {
     Ok(opened.header().robot)
 }
 
-pub(crate) fn warn(path: &Path, warnings: &[Warning], terminal: &Terminal) {
-    for warning in warnings {
-        terminal.remark(&format!("warning: {}: {warning}", path.display()));
-    }
-}
-
 /// The method of a file that is asked for, or its only one.
 fn chosen<'r>(report: &'r CalibrationReport, name: Option<&str>, place: &str) -> Result<&'r MethodReport, Failure> {
     let of = |method: &&MethodReport| name.is_none_or(|name| method.method == name);
@@ -275,13 +267,6 @@ fn chosen<'r>(report: &'r CalibrationReport, name: Option<&str>, place: &str) ->
         )
         .into()),
     }
-}
-
-/// Ids of runs as messages show them.
-pub(crate) fn listed_ids<'a>(ids: impl Iterator<Item = &'a str>) -> String {
-    let all: Vec<&str> = ids.collect();
-    let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
-    all[..all.len().min(SHOWN_RUNS)].join(", ") + more
 }
 
 /// Poses of a dataset's runs.

@@ -16,9 +16,8 @@ use ros_bag::{
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
-use crate::export::{listed_ids, warn};
 use crate::simulate::write_whole;
-use crate::terminal::{Failure, Terminal, table};
+use crate::terminal::{Failure, Terminal, listed_ids, table, warn};
 
 /// The path by the values that the dataset states.
 const NOMINAL: &str = "nominal";

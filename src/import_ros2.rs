@@ -61,8 +61,8 @@ pub(crate) struct Arguments {
     /// Number of the right wheel; the yaw rate of a twist.
     #[arg(long, value_name = "PATH", requires_all = ["left_field", "quantity"], help_heading = "Wheels")]
     right_field: Option<String>,
-    /// What the wheels' numbers are, where --left-field or two topics name them: counts, angles, angular speeds,
-    /// contact speeds in m/s, or speed and yaw rate.
+    /// What the wheels' numbers are, where --left-field or two topics name them: counts, angles, angular
+    /// speeds, contact speeds in m/s, or speed and yaw rate.
     #[arg(
         id = "quantity",
         long = "as",

@@ -14,9 +14,9 @@ use crate::terminal::{Failure, Terminal};
 /// A trajectory has no wheels: --wheels names files that hold them, in any columns that `yair import csv`
 /// finds, or --odometry trajectories of the robot's own dead reckoning, whose twists from pose to pose are
 /// taken. Several files are a run each; as many trajectories of either kind belong together in the order in
-/// which they are given. Poses that are tilted by more than 10 degrees are remarked, from 45 degrees on they are
-/// refused. All flags of columns, units and writing are for the files of --wheels; --length-unit and
-/// --time-unit are for the trajectories too.
+/// which they are given. Poses that are tilted by more than 10 degrees are remarked, from 45 degrees on
+/// they are refused. All flags of columns, units and writing are for the files of --wheels; --length-unit
+/// and --time-unit are for the trajectories too.
 #[derive(Args)]
 #[group(id = "motion", required = true, multiple = false, args = ["wheels", "odometry"])]
 pub(crate) struct Arguments {

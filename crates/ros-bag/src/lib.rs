@@ -2,8 +2,9 @@
 //!
 //! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
 //! `resync`) → `definition` and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two
-//! topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic) and `truth` → `clock` their times → `import` the dataset. `listing`
-//! shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
+//! topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic) and `truth` → `clock` their
+//! times → `import` the dataset. `listing` shows the topics. `recorder` writes a dataset's runs as a bag,
+//! of `messages` by `cdr_writer`.
 
 mod bag;
 mod cdr;

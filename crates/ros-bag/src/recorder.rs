@@ -1,9 +1,9 @@
 //! Runs as a bag: one MCAP file with truth, paths by dead reckoning, wheels and transforms.
 //!
-//! Runs are laid one after the other, since a run's times count from its own start: the first row of the first
-//! run is at [`FIRST_STAMP_S`], and each later run begins [`RUN_GAP_S`] after the one before has ended. Every
-//! message is stamped in its header, and received when it is stamped. All poses are in one frame, the
-//! instrument's: dead reckoning starts where the instrument first saw the robot.
+//! Runs are laid one after the other, since a run's times count from its own start: the first row of the
+//! first run is at [`FIRST_STAMP_S`], and each later run begins [`RUN_GAP_S`] after the one before has
+//! ended. Every message is stamped in its header, and received when it is stamped. All poses are in one
+//! frame, the instrument's: dead reckoning starts where the instrument first saw the robot.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};

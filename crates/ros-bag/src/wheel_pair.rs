@@ -1,9 +1,9 @@
 //! Two wheels on two topics: the right wheel's numbers at the left wheel's instants.
 //!
-//! Counts and angles are interpolated linearly between the two messages around an instant, counts rounded to
-//! whole ones. A speed holds over the interval that ends at its message, so the right wheel's is the mean over
-//! the left wheel's interval; speeds of the instant are interpolated. Left messages without a right one on
-//! both sides near by are left out.
+//! Counts and angles are interpolated linearly between the two messages around an instant, counts rounded
+//! to whole ones. A speed holds over the interval that ends at its message, so the right wheel's is the
+//! mean over the left wheel's interval; speeds of the instant are interpolated. Left messages without a
+//! right one on both sides near by are left out.
 
 use dataset::import::csv::Rates;
 

@@ -1,5 +1,5 @@
-//! TUM trajectories (`t x y z qx qy qz qw`, as the TUM RGB-D benchmark and evo have them): poses of an outside
-//! instrument, and poses of the robot's own dead reckoning from which its twists are taken.
+//! TUM trajectories (`t x y z qx qy qz qw`, as the TUM RGB-D benchmark and evo have them): poses of an
+//! outside instrument, and poses of the robot's own dead reckoning from which its twists are taken.
 //!
 //! Such a file has no wheels. They come from files of any columns, or from a trajectory of the robot's own:
 //! between two poses the turn is Δθ, and the distance that part of the displacement which lies along the
