@@ -33,8 +33,8 @@ fn a_trajectory_of_the_robots_own_is_dead_reckoned_as_it_was() {
         assert_eq!(imported["format"], "tum");
         assert_eq!(imported["source"], files.join(" "));
         assert_eq!(imported["datasets"][0]["runs"], 1);
-        // Both begin at the same pose. Digits of 1e-6 m and 1e-9 rad leave motion sideways that twists do not have:
-        // 4e-7 m. Distances along arcs in the place of chords were seen to miss by 9e-5 m on the circle.
+        // Both begin at the same pose. Digits of 1e-6 m and 1e-9 rad leave motion sideways that twists do not
+        // have: 4e-7 m. Distances along arcs instead of chords were seen to miss by 9e-5 m, on the circle.
         let found = document(at, &["evaluate", "set"]);
         let evo = golden["paths"][name]["ape"]["none"]["translation_m"]["rmse"].as_f64().expect("a number");
         assert!((ape(&found) - evo).abs() < 2e-6, "{name}: {} {evo}", ape(&found));
