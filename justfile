@@ -48,6 +48,6 @@ fresh-seeds:
 features:
     .ci/run features
 
-# Make the bags of tests/ros2 anew by the writers of others; needs Python and PyPI
+# Make the bags of tests/ros2 and evo's numbers of tests/evo anew, and read an exported bag, by the programs of others; needs Python and PyPI
 interop:
     .ci/run interop

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 use ::diagnose::ExtendedModel;
-use calib::{AugmentedCalibration, CalibrationReport, ReportError, TrainedOn};
+use calib::{AugmentedCalibration, CalibrationReport, OdometryNoise, ReportError, TrainedOn};
 use dataset::{Dataset, NominalRobot, Run};
 use scenario::{LARGEST_FILE_BYTES, Scenario};
 
@@ -16,6 +16,7 @@ use crate::terminal::{Failure, Terminal};
 pub(crate) struct GivenCalibration {
     place: String,
     given: Given,
+    noise: Option<OdometryNoise>,
     trained_on: Vec<TrainedOn>,
 }
 
@@ -28,12 +29,20 @@ impl GivenCalibration {
     /// The calibrations of a file.
     pub(crate) fn read(path: &Path) -> Result<Vec<Self>, Failure> {
         let place = path.display().to_string();
-        let of =
-            |given, trained_on: &[TrainedOn]| Self { place: place.clone(), given, trained_on: trained_on.to_vec() };
+        let of = |given, noise, trained_on: &[TrainedOn]| Self {
+            place: place.clone(),
+            given,
+            noise,
+            trained_on: trained_on.to_vec(),
+        };
         if is_scenario(path) {
             let scenario = Scenario::read(path)?;
             let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
-            return Ok(vec![of(Given::Model(model), &[])]);
+            let noise = OdometryNoise {
+                wheel_sigma_m_per_sqrt_m: scenario.noise.wheel_sigma_m_per_sqrt_m,
+                turn_sigma_rad_per_sqrt_rad: 0.0,
+            };
+            return Ok(vec![of(Given::Model(model), Some(noise), &[])]);
         }
         let report = CalibrationReport::read(path)?;
         let calibrations = report.calibrations();
@@ -41,7 +50,12 @@ impl GivenCalibration {
             let message = "it holds no values".to_owned();
             return Err(ReportError::NotACalibration { place, message }.into());
         }
-        Ok(calibrations.into_iter().map(|named| of(Given::Values(named.into()), &report.trained_on)).collect())
+        let noise = |name: &str| report.methods.iter().find(|method| method.method == name)?.noise;
+        let given = calibrations.into_iter().map(|named| {
+            let noise = noise(&named.name);
+            of(Given::Values(named.into()), noise, &report.trained_on)
+        });
+        Ok(given.collect())
     }
 
     pub(crate) const fn calibration(&self) -> &AugmentedCalibration {
@@ -49,6 +63,11 @@ impl GivenCalibration {
             Given::Values(calibration) => calibration,
             Given::Model(model) => &model.calibration,
         }
+    }
+
+    /// The noise of the wheels, where the file has it.
+    pub(crate) const fn noise(&self) -> Option<OdometryNoise> {
+        self.noise
     }
 
     /// Whether the calibration was made from a run.

@@ -3,16 +3,22 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use calib::{CalibrationDrift, Names};
+use calib::{Alignment, CalibrationDrift, Delta, DeltaUnit, EvaluationOptions, Names, PoseErrorOptions};
 use clap::Args;
 use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
 use crate::check;
+use crate::import_robot::named;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
-/// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
+/// Drift and pose errors of dead reckoning against the truth, under the nominal values and under each
+/// calibration
+///
+/// APE and RPE are those of evo (evo_ape, evo_rpe) on the same poses: absolute errors at the truth's
+/// instants, and errors of the motion between poses that are a step apart. RPE counts every pair of poses
+/// of a run once, of all runs together.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Datasets with absolute truth; a folder of datasets stands for all of them.
@@ -28,6 +34,52 @@ pub(crate) struct Arguments {
     /// Print a row for every run.
     #[arg(long)]
     runs: bool,
+    /// APE: rotate and shift each run in the plane so that its positions fit best (evo's -a), or not.
+    #[arg(
+        long,
+        value_name = "none|se2",
+        value_parser = named(&Alignment::ALL, Alignment::name),
+        default_value = Alignment::None.name(),
+        hide_possible_values = true,
+        help_heading = "Pose errors"
+    )]
+    align: Alignment,
+    /// RPE: the step between the two poses of a pair [default: 1].
+    #[arg(long, value_name = "STEP", allow_negative_numbers = true, help_heading = "Pose errors")]
+    delta: Option<f64>,
+    /// RPE: the step is one of frames (poses), degrees or radians of turns, or metres of path.
+    #[arg(
+        long,
+        value_name = "f|d|r|m",
+        value_parser = named(&DeltaUnit::ALL, DeltaUnit::name),
+        default_value = DeltaUnit::Frames.name(),
+        hide_possible_values = true,
+        requires = "delta",
+        help_heading = "Pose errors"
+    )]
+    delta_unit: DeltaUnit,
+    /// RPE: pairs begin at every pose, not where the one before ended.
+    #[arg(long, help_heading = "Pose errors")]
+    all_pairs: bool,
+    /// RPE with --all-pairs by degrees, radians or metres: by how much of the step a pair may differ from it
+    /// [default: 0.1].
+    #[arg(
+        long,
+        value_name = "RATIO",
+        allow_negative_numbers = true,
+        requires = "all_pairs",
+        help_heading = "Pose errors"
+    )]
+    delta_tol: Option<f64>,
+}
+
+impl Arguments {
+    fn pose_errors(&self) -> Result<PoseErrorOptions, String> {
+        let tolerance = self.delta_tol.unwrap_or(Delta::DEFAULT_TOLERANCE);
+        let delta = Delta::new(self.delta.unwrap_or(1.0), self.delta_unit, self.all_pairs, tolerance)
+            .map_err(|why| format!("--delta {why}"))?;
+        Ok(PoseErrorOptions { alignment: self.align, delta })
+    }
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -41,26 +93,37 @@ const DRIFTS_TOO_MUCH: u8 = 3;
 #[derive(Serialize)]
 struct Document {
     dataset: Names,
+    alignment: Alignment,
+    delta: Delta,
     calibrations: Vec<CalibrationDrift>,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let pose_errors = match arguments.pose_errors() {
+        Ok(options) => options,
+        Err(why) => {
+            terminal.failure(&why);
+            return Ok(ExitCode::from(2));
+        }
+    };
     let paths = datasets_at(&arguments.datasets)?;
     let mut found = vec![None];
     for path in &arguments.calibrations {
         found.extend(GivenCalibration::read(path)?.into_iter().map(Some));
     }
     check::before_reading(&paths, terminal);
-    let (names, calibrations) = evaluate(&paths, &found, terminal)?;
+    let (names, calibrations) = evaluate(&paths, &found, pose_errors, terminal)?;
     found.iter().flatten().for_each(|given| given.remark(terminal));
     show(&calibrations, terminal)?;
+    show_pose_errors(&calibrations, &pose_errors, terminal)?;
     if arguments.runs {
         show_runs(&calibrations, terminal)?;
     }
     warn_of_worse(&calibrations, terminal);
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
-    terminal.document(&Document { dataset: Names::of(names), calibrations })?;
+    let PoseErrorOptions { alignment, delta } = pose_errors;
+    terminal.document(&Document { dataset: Names::of(names), alignment, delta, calibrations })?;
     match (arguments.max_drift, last_percent) {
         (Some(_), None) => Err("--max-drift: the drift of these runs is not known (see why_null)".into()),
         (Some(allowed), Some(percent)) if percent > allowed => {
@@ -76,9 +139,10 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 fn evaluate(
     paths: &[PathBuf],
     calibrations: &[Option<GivenCalibration>],
+    pose_errors: PoseErrorOptions,
     terminal: &Terminal,
 ) -> Result<(Vec<String>, Vec<CalibrationDrift>), Failure> {
-    let several = paths.len() > 1;
+    let options = EvaluationOptions { name_runs: paths.len() > 1, pose_errors: Some(pose_errors) };
     let mut names = Vec::with_capacity(paths.len());
     let (mut seen, mut all) = (vec![0_usize; calibrations.len()], 0_usize);
     let mut runs = vec![Vec::new(); calibrations.len()];
@@ -113,7 +177,7 @@ fn evaluate(
             let each = calibrations.iter().zip(&mut runs).zip(&mut driven_m);
             for ((given, runs), driven_m) in each.filter(|((given, _), _)| !is_of_whole_datasets(given.as_ref())) {
                 let calibration = given.as_ref().map(GivenCalibration::calibration);
-                runs.extend(calib::evaluate_runs(&session, calibration, several, driven_m));
+                runs.extend(calib::evaluate_runs(&session, calibration, &options, driven_m));
             }
         }
         if calibrations.iter().any(|given| is_of_whole_datasets(given.as_ref())) {
@@ -123,7 +187,7 @@ fn evaluate(
                 let Some(given) = given.as_ref().filter(|given| given.changes_records()) else { continue };
                 let records = given.undone(&dataset, &place, terminal)?;
                 let calibration = Some(given.calibration());
-                runs.extend(calib::evaluate_runs(&records.session(), calibration, several, &mut 0.0));
+                runs.extend(calib::evaluate_runs(&records.session(), calibration, &options, &mut 0.0));
             }
         }
         names.push(name);
@@ -225,4 +289,64 @@ fn show(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Fa
         }
     }
     Ok(())
+}
+
+fn show_pose_errors(
+    calibrations: &[CalibrationDrift],
+    options: &PoseErrorOptions,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let degrees = 180.0 / std::f64::consts::PI;
+    let headers = [
+        "calibration",
+        "APE pos.\nRMSE mm",
+        "APE pos.\nmax mm",
+        "APE head.\nRMSE deg",
+        "RPE pos.\nRMSE mm",
+        "RPE pos.\nmax mm",
+        "RPE head.\nRMSE deg",
+    ];
+    let mut rows = table(&headers, 1);
+    for drift in calibrations {
+        let both = [&drift.ape, &drift.rpe].map(Option::as_ref);
+        let [ape_m, rpe_m] = both.map(|errors| errors.and_then(|errors| errors.translation_m));
+        let [ape_rad, rpe_rad] = both.map(|errors| errors.and_then(|errors| errors.rotation_rad));
+        rows.add_row([
+            drift.name.clone(),
+            cell(ape_m.map(|of| of.rmse), 1e3, 2),
+            cell(ape_m.map(|of| of.max), 1e3, 2),
+            cell(ape_rad.map(|of| of.rmse), degrees, 3),
+            cell(rpe_m.map(|of| of.rmse), 1e3, 2),
+            cell(rpe_m.map(|of| of.max), 1e3, 2),
+            cell(rpe_rad.map(|of| of.rmse), degrees, 3),
+        ]);
+    }
+    terminal.say(&rows.to_string())?;
+    for drift in calibrations {
+        let all = [("APE", &drift.ape, "--align"), ("RPE", &drift.rpe, "--delta")];
+        for (what, errors, flag) in all {
+            if let Some(why) = errors.as_ref().and_then(|errors| errors.why_null) {
+                terminal.say(&format!("{}: no {what}: {why}", drift.name))?;
+            } else if let Some((run, why, without)) = left_out(drift, what) {
+                let (name, all) = (&drift.name, drift.runs.len());
+                terminal.say(&format!("{name}: {what} ({flag}) is without {without} of {all} runs; {run}: {why}"))?;
+            }
+        }
+    }
+    let aligned = match options.alignment {
+        Alignment::None => "not aligned",
+        Alignment::Se2 => "aligned run by run in the plane",
+    };
+    terminal.say(&format!("APE {aligned} (--align); RPE over {} (--delta)", options.delta.describe()))
+}
+
+/// The first run without absolute or relative errors, why, and how many there are.
+fn left_out<'a>(drift: &'a CalibrationDrift, what: &str) -> Option<(&'a str, &'static str, usize)> {
+    let of = |run: &'a calib::RunDrift| {
+        let errors = if what == "APE" { &run.ape } else { &run.rpe };
+        Some((&run.run[..], errors.as_ref()?.why_null?))
+    };
+    let mut without = drift.runs.iter().filter_map(of);
+    let (run, why) = without.next()?;
+    Some((run, why, 1 + without.count()))
 }

@@ -9,24 +9,25 @@ use ::export::{CalibratedRobot, Lengths, Options, tum, tum_of_truth};
 use calib::{CalibrationReport, MethodReport, corrected_run};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::{Loaded, NominalRobot, Warning};
+use dataset::{Loaded, NominalRobot};
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::calibration_file::{GivenCalibration, is_scenario};
 use crate::correct::{file_of, only};
+use crate::export_mcap;
 use crate::simulate::{refuse_filled, write_whole};
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::{Failure, Terminal, listed_ids, warn};
 
 /// Calibrated parameters for a robot's own program, or a dataset's truth for other tools.
 #[derive(Args)]
 #[command(after_help = formats())]
 pub(crate) struct Arguments {
     /// What to write.
-    #[arg(value_name = "FORMAT", hide_possible_values = true, value_parser = PossibleValuesParser::new(EXPORTERS.iter().map(|format| format.name).chain([TUM])))]
+    #[arg(value_name = "FORMAT", hide_possible_values = true, value_parser = PossibleValuesParser::new(EXPORTERS.iter().map(|format| format.name).chain([TUM, MCAP])))]
     format: String,
     /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; for `tum`
-    /// a dataset.
+    /// and `mcap` a dataset.
     #[arg(value_name = "CALIBRATION|MODEL|DATASET")]
     source: PathBuf,
     /// File to write; standard output when left out. For `tum` a folder, with RUN.tum of every run.
@@ -59,25 +60,28 @@ pub(crate) struct Arguments {
     /// c: width of the wheels' counters, 8 to 64 bits [default: the dataset's, or 32].
     #[arg(long, value_name = "BITS")]
     counter_bits: Option<u8>,
-    /// tum: dead reckoning under this calibration instead of the truth.
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
-    /// tum: this run alone.
+    /// tum: dead reckoning under this calibration instead of the truth. mcap: its path too; may be given
+    /// several times.
+    #[arg(long = "calibration", value_name = "FILE")]
+    calibrations: Vec<PathBuf>,
+    /// tum, mcap: this run alone.
     #[arg(long, value_name = "ID")]
     run: Option<String>,
 }
 
-/// The format of datasets; all others are of calibrations.
+/// The formats of datasets; all others are of calibrations.
 const TUM: &str = "tum";
-/// Ids of runs in a message.
-const SHOWN_RUNS: usize = 6;
+const MCAP: &str = "mcap";
 /// Flags of calibrations alone, and of datasets alone.
 const OF_CALIBRATIONS: [&str; 2] = ["dataset", "method"];
 const OF_DATASETS: [&str; 2] = ["calibration", "run"];
 
 fn formats() -> String {
-    let of_dataset = (TUM, "a dataset's truth, for evo and its like: t x y z qx qy qz qw");
-    let all = EXPORTERS.iter().map(|format| (format.name, format.about)).chain([of_dataset]);
+    let of_datasets = [
+        (TUM, "a dataset's truth, for evo and its like: t x y z qx qy qz qw"),
+        (MCAP, "a dataset's truth, paths and wheels as a bag of ROS 2, for Foxglove, PlotJuggler and evo"),
+    ];
+    let all = EXPORTERS.iter().map(|format| (format.name, format.about)).chain(of_datasets);
     let lines: Vec<String> = all.map(|(name, about)| format!("  {name:12} {about}")).collect();
     format!("Formats:\n{}", lines.join("\n"))
 }
@@ -118,8 +122,21 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     match format {
         Some(format) => export_calibration(format, arguments, terminal),
+        None if arguments.format == MCAP => export_bag(arguments, terminal),
         None => export_dataset(arguments, terminal),
     }
+}
+
+fn export_bag(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let Some(out) = &arguments.out else {
+        terminal.failure("mcap: a bag is no text for standard output; give --out FILE.mcap");
+        return Ok(ExitCode::from(2));
+    };
+    refuse_taken(out, arguments.force)?;
+    let calibrations: Vec<Vec<GivenCalibration>> =
+        arguments.calibrations.iter().map(|file| GivenCalibration::read(file)).collect::<Result<_, _>>()?;
+    let calibrations: Vec<GivenCalibration> = calibrations.into_iter().flatten().collect();
+    export_mcap::run(&arguments.source, out, &calibrations, arguments.run.as_deref(), terminal)
 }
 
 impl Arguments {
@@ -134,7 +151,7 @@ impl Arguments {
             ("speed", self.speed.is_some()),
             ("rate", self.rate.is_some()),
             ("counter-bits", self.counter_bits.is_some()),
-            ("calibration", self.calibration.is_some()),
+            ("calibration", !self.calibrations.is_empty()),
             ("run", self.run.is_some()),
         ];
         given.into_iter().filter_map(|(flag, is_given)| is_given.then_some(flag)).collect()
@@ -234,12 +251,6 @@ fn stated(path: &Path, terminal: &Terminal) -> Result<NominalRobot, Failure> {
     Ok(opened.header().robot)
 }
 
-fn warn(path: &Path, warnings: &[Warning], terminal: &Terminal) {
-    for warning in warnings {
-        terminal.remark(&format!("warning: {}: {warning}", path.display()));
-    }
-}
-
 /// The method of a file that is asked for, or its only one.
 fn chosen<'r>(report: &'r CalibrationReport, name: Option<&str>, place: &str) -> Result<&'r MethodReport, Failure> {
     let of = |method: &&MethodReport| name.is_none_or(|name| method.method == name);
@@ -265,7 +276,11 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         refuse_filled(out, arguments.force)?;
     }
-    let calibration = arguments.calibration.as_ref().map(|file| only(GivenCalibration::read(file)?)).transpose()?;
+    let calibration = match &arguments.calibrations[..] {
+        [] => None,
+        [file] => Some(only(GivenCalibration::read(file)?)?),
+        several => return Err(format!("tum: one --calibration at a time, {} are given", several.len()).into()),
+    };
     let Loaded { dataset, warnings } = dataset::read(path)?;
     warn(path, &warnings, terminal);
     let records = match &calibration {
@@ -277,11 +292,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     };
     let session = records.session();
     let is_chosen = |id: &str| arguments.run.as_deref().is_none_or(|only| only == id);
-    let ids = || {
-        let all: Vec<&str> = session.runs.iter().map(|run| &run.info().id[..]).collect();
-        let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
-        all[..all.len().min(SHOWN_RUNS)].join(", ") + more
-    };
+    let ids = || listed_ids(session.runs.iter().map(|run| &run.info().id[..]));
     match (&arguments.run, session.runs.iter().filter(|run| is_chosen(&run.info().id)).count()) {
         (Some(id), 0) => return Err(format!("{place}: it has no run \"{id}\"; it has {}", ids()).into()),
         (None, several) if several > 1 && arguments.out.is_none() => {

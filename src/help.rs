@@ -16,6 +16,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
                     "yair import csv log.csv --out mine --wheel 0.15 --base 0.3 --ticks-per-rev 4096",
                     "yair import ros2 bag.mcap --list",
                     "yair import ros2 bag.mcap --out mine --wheel 0.15 --base 0.3",
+                    "yair import tum truth.tum --odometry odometry.tum --out mine --wheel 0.15 --base 0.3",
                 ],
             ),
             ("check", &["yair check mine"]),
@@ -31,7 +32,14 @@ const GROUPS: &[(&str, &[Entry])] = &[
             ("plan", &["yair plan mine --room 4,3", "yair plan scenarios/motion-capture.toml --minutes 10"]),
             ("correct", &["yair correct mine --calibration diagnosis/extended.toml --out poses"]),
             ("compare", &["yair compare monday tuesday wednesday"]),
-            ("export", &["yair export ros2-yaml mine.toml", "yair export c diagnosis/extended.toml --out odometry.h"]),
+            (
+                "export",
+                &[
+                    "yair export ros2-yaml mine.toml",
+                    "yair export c diagnosis/extended.toml --out odometry.h",
+                    "yair export mcap mine --calibration mine.toml --out paths.mcap",
+                ],
+            ),
         ],
     ),
     (

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
-use crate::{import_csv, import_ros2};
+use crate::{import_csv, import_ros2, import_tum};
 
 /// Other people's logs, or your own, into datasets.
 #[derive(Args)]
@@ -24,6 +24,7 @@ enum Format {
     Known(&'static Importer, Plain),
     Csv(Box<import_csv::Arguments>),
     Ros2(Box<import_ros2::Arguments>),
+    Tum(Box<import_tum::Arguments>),
 }
 
 /// What every format of the table takes.
@@ -43,6 +44,8 @@ struct Plain {
 const CSV: &str = "csv";
 /// Bags.
 const ROS2: &str = "ros2";
+/// Trajectories, with wheels from another file.
+const TUM: &str = "tum";
 
 impl FromArgMatches for Format {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
@@ -51,6 +54,7 @@ impl FromArgMatches for Format {
         match importer(name) {
             Some(importer) => Ok(Self::Known(importer, Plain::from_arg_matches(matches)?)),
             None if name == ROS2 => Ok(Self::Ros2(Box::new(import_ros2::Arguments::from_arg_matches(matches)?))),
+            None if name == TUM => Ok(Self::Tum(Box::new(import_tum::Arguments::from_arg_matches(matches)?))),
             None => Ok(Self::Csv(Box::new(import_csv::Arguments::from_arg_matches(matches)?))),
         }
     }
@@ -65,11 +69,13 @@ impl Subcommand for Format {
     fn augment_subcommands(command: Command) -> Command {
         let csv = import_csv::Arguments::augment_args(Command::new(CSV));
         let ros2 = import_ros2::Arguments::augment_args(Command::new(ROS2));
+        let tum = import_tum::Arguments::augment_args(Command::new(TUM));
         let known =
             IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name)).about(importer.about));
         command
             .subcommand(csv)
             .subcommand(ros2)
+            .subcommand(tum)
             .subcommands(known)
             .subcommand_required(true)
             .subcommand_value_name("FORMAT")
@@ -80,7 +86,7 @@ impl Subcommand for Format {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        name == CSV || name == ROS2 || importer(name).is_some()
+        [CSV, ROS2, TUM].contains(&name) || importer(name).is_some()
     }
 }
 
@@ -103,6 +109,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Format::Known(importer, arguments) => run_known(importer, arguments, terminal),
         Format::Csv(arguments) => import_csv::run(arguments, terminal),
         Format::Ros2(arguments) => import_ros2::run(arguments, terminal),
+        Format::Tum(arguments) => import_tum::run(arguments, terminal),
     }
 }
 

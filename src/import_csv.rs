@@ -1,14 +1,14 @@
 //! `yair import csv FILE... --out DIR`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::TypedValueParser;
-use dataset::Unit;
 use dataset::import::csv::{
     self, Confidence, Decimal, Delimiter, FromCsv, MapEntry, Options, Rates, Took, TookFile, Writing,
 };
+use dataset::{DatasetError, Unit};
 use serde::Serialize;
 
 use crate::import_robot::{RobotArguments, named, positive, rates, with_command_line};
@@ -34,6 +34,13 @@ pub(crate) struct Arguments {
     #[arg(long)]
     force: bool,
 
+    #[command(flatten)]
+    reading: ReadingArguments,
+}
+
+/// How files of no format are read.
+#[derive(Args)]
+pub(crate) struct ReadingArguments {
     /// Which column is what: t, left, right, v, omega, x, y, theta, qx, qy, qz, qw or run; a column by its
     /// name or its number from 1, its unit in brackets if need be.
     #[arg(long, value_name = "t=stamp,left=enc_l[deg],…", value_delimiter = ',', help_heading = "Columns")]
@@ -107,8 +114,21 @@ struct Written {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let FromCsv { imported, took } = csv::read(&arguments.files, &arguments.options()?)
-        .map_err(|error| with_command_line(&error).unwrap_or_else(|| error.into()))?;
+    let found = csv::read(&arguments.files, &arguments.reading.options()?);
+    write("csv", &arguments.files, found, &arguments.out, arguments.force, terminal)
+}
+
+/// Shows what was taken for what, and writes the dataset.
+pub(crate) fn write(
+    format: &'static str,
+    sources: &[PathBuf],
+    found: Result<FromCsv, DatasetError>,
+    out: &Path,
+    force: bool,
+    terminal: &Terminal,
+) -> Result<ExitCode, Failure> {
+    let FromCsv { imported, took } =
+        found.map_err(|error| with_command_line(&error).unwrap_or_else(|| error.into()))?;
     show(&took, terminal)?;
     for warning in &imported.warnings {
         terminal.remark(&format!("warning: {warning}"));
@@ -117,21 +137,21 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         terminal.remark(&format!("warning: {remark}"));
     }
     let dataset = &imported.dataset;
-    write_dataset(dataset, &arguments.out, arguments.force)?;
+    write_dataset(dataset, out, force)?;
     let written = Written {
-        dataset: arguments.out.display().to_string(),
+        dataset: out.display().to_string(),
         runs: dataset.runs.len(),
         odometry_rows: dataset.runs.iter().map(|run| run.odometry.t_s.len()).sum(),
     };
     let Written { dataset: out, runs, odometry_rows } = &written;
     terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows in {out}"))?;
-    let sources: Vec<String> = arguments.files.iter().map(|file| file.display().to_string()).collect();
-    terminal.document(&Document { format: "csv", source: sources.join(" "), datasets: [written], took: &took })?;
+    let sources: Vec<String> = sources.iter().map(|file| file.display().to_string()).collect();
+    terminal.document(&Document { format, source: sources.join(" "), datasets: [written], took: &took })?;
     Ok(ExitCode::SUCCESS)
 }
 
-impl Arguments {
-    fn options(&self) -> Result<Options, Failure> {
+impl ReadingArguments {
+    pub(crate) fn options(&self) -> Result<Options, Failure> {
         Ok(Options {
             writing: Writing { delimiter: self.delimiter, decimal: self.decimal, header: self.header },
             map: self.map.clone(),
@@ -172,5 +192,9 @@ fn show(took: &Took, terminal: &Terminal) -> Result<(), Failure> {
         terminal.say(&format!("a row's speed: {}, {} (--rates)", rates.why, rates.confidence.name()))?;
     }
     terminal.say(&format!("runs: {} (--runs-by, --cut)", took.runs_by))?;
-    terminal.say("a column is changed by --map, with its unit if need be: --map t=stamp,left=enc_l[deg]")
+    // Columns that a format fixes are changed by nothing.
+    if took.files.iter().flat_map(|file| &file.columns).any(|column| column.chosen.confidence != Confidence::Certain) {
+        terminal.say("a column is changed by --map, with its unit if need be: --map t=stamp,left=enc_l[deg]")?;
+    }
+    Ok(())
 }

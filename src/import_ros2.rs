@@ -34,8 +34,9 @@ pub(crate) struct Arguments {
     #[arg(long)]
     list: bool,
 
-    /// Topic of the wheels.
-    #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
+    /// Topic of the wheels; or, where each wheel has its own, both as LEFT_TOPIC[.field],RIGHT_TOPIC[.field]:
+    /// the right wheel is then taken at the left wheel's instants.
+    #[arg(long, value_name = "TOPIC[,TOPIC]", help_heading = "Topics")]
     wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
@@ -60,13 +61,13 @@ pub(crate) struct Arguments {
     /// Number of the right wheel; the yaw rate of a twist.
     #[arg(long, value_name = "PATH", requires_all = ["left_field", "quantity"], help_heading = "Wheels")]
     right_field: Option<String>,
-    /// What these numbers are: counts, angles, angular speeds, contact speeds in m/s, or speed and yaw rate.
+    /// What the wheels' numbers are, where --left-field or two topics name them: counts, angles, angular
+    /// speeds, contact speeds in m/s, or speed and yaw rate.
     #[arg(
         id = "quantity",
         long = "as",
         value_name = "WHICH",
         value_parser = named(&WheelQuantity::ALL, WheelQuantity::name),
-        requires_all = ["left_field", "right_field"],
         help_heading = "Wheels"
     )]
     quantity: Option<WheelQuantity>,

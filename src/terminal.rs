@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anstyle::{AnsiColor, Effects, Style};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
-use dataset::Dataset;
+use dataset::{Dataset, Warning};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
@@ -192,4 +192,21 @@ pub(crate) fn folder_name(path: &Path) -> String {
 /// A value in its table cell; a dash when there is none.
 pub(crate) fn cell(value: Option<f64>, scale: f64, decimals: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{:.decimals$}", value * scale))
+}
+
+/// Passes on what is no error but should be known of a dataset.
+pub(crate) fn warn(path: &Path, warnings: &[Warning], terminal: &Terminal) {
+    for warning in warnings {
+        terminal.remark(&format!("warning: {}: {warning}", path.display()));
+    }
+}
+
+/// Ids of runs in a message.
+const SHOWN_RUNS: usize = 6;
+
+/// Ids of runs as messages show them.
+pub(crate) fn listed_ids<'a>(ids: impl Iterator<Item = &'a str>) -> String {
+    let all: Vec<&str> = ids.collect();
+    let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
+    all[..all.len().min(SHOWN_RUNS)].join(", ") + more
 }

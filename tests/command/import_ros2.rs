@@ -103,6 +103,35 @@ fn bags_of_another_writer_with_counts_and_transforms_calibrate_too() {
 }
 
 #[test]
+fn wheels_on_two_topics_are_brought_to_the_left_ones_instants_and_calibrate() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    let two = bag("two_topics.mcap");
+    let listed = document(at, &["import", "ros2", &two, "--list"]);
+    assert_eq!((&listed["wheels"], &listed["is_counted"]), (&"/left/encoder,/right/encoder".into(), &true.into()));
+    let (tables, warnings) =
+        imported(at, &two, &["--wheels", "/left/encoder,/right/encoder.data", "--ticks-per-rev", "4096"]);
+    // The first of the left wheel's is 20 ms before the right one's first.
+    assert!(
+        warnings.contains("topic /left/encoder: 1 of 441 messages are without one of /right/encoder"),
+        "{warnings}"
+    );
+    assert!(warnings.contains("no header stamps; the times of receipt are used"), "{warnings}");
+    assert_eq!(tables[0].lines().count(), 1 + 440);
+    calibrates(at);
+    let refused = |wheels: &str, more: &[&str], why: &str| {
+        let arguments = [&["import", "ros2", &two, "--out", "other", "--wheels", wheels], &ROBOT[..], more].concat();
+        let message = refusal(at, &arguments);
+        assert!(message.contains(why), "{message}");
+    };
+    refused("/left/encoder,/left/encoder", &[], "it is named for both wheels");
+    refused("/left/encoder,/nope", &[], "--wheels /nope: the bag has no such topic; it has /left/encoder");
+    refused("/left/encoder,/robot/pose", &[], "which number is the wheel's is not plain; say /robot/pose.PATH");
+    refused("/left/encoder,/right/encoder", &["--as", "twist"], "a twist is of the robot, not of a wheel");
+    refused("/left/encoder,/right/encoder", &[], "give --ticks-per-rev COUNTS");
+}
+
+#[test]
 fn of_a_bag_that_is_cut_off_everything_before_the_cut_is_read() {
     let temp = tempfile::tempdir().expect("a folder");
     let at = temp.path();

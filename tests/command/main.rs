@@ -8,9 +8,12 @@ mod compare;
 mod contract;
 mod correct;
 mod export;
+mod export_mcap;
 mod good_log;
 mod import_csv;
 mod import_ros2;
+mod import_tum;
+mod pose_errors;
 mod spoiled_files;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,6 +1,6 @@
 //! Extended models in dead reckoning: what a diagnosis found makes logs drift less that it has not seen.
 
-use calib::{AugmentedCalibration, CalibrationDrift, RunDrift, evaluate_runs};
+use calib::{AugmentedCalibration, CalibrationDrift, EvaluationOptions, RunDrift, evaluate_runs};
 use dataset::Dataset;
 use diagnose::{ExtendedModel, ExtendedModelError, Options, diagnose};
 use estimation::FitSettings;
@@ -37,7 +37,7 @@ fn extended(dataset: &Dataset) -> Scenario {
 
 fn runs(dataset: &Dataset, model: &ExtendedModel) -> Vec<RunDrift> {
     let (records, _) = model.undone(dataset).expect("undone");
-    evaluate_runs(&records.session(), Some(&model.calibration), false, &mut 0.0)
+    evaluate_runs(&records.session(), Some(&model.calibration), &EvaluationOptions::default(), &mut 0.0)
 }
 
 fn drift_percent(runs: Vec<RunDrift>) -> f64 {
@@ -68,8 +68,10 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
         let (model, fresh) = (model(&found), simulated(&hidden, 72));
         let extended_percent = drift_percent(runs(&fresh, &model));
         let geometry = AugmentedCalibration::from(model.calibration.calibration.clone());
-        let geometry_percent = drift_percent(evaluate_runs(&fresh.session(), Some(&geometry), false, &mut 0.0));
-        let nominal_percent = drift_percent(evaluate_runs(&fresh.session(), None, false, &mut 0.0));
+        let geometry_percent =
+            drift_percent(evaluate_runs(&fresh.session(), Some(&geometry), &EvaluationOptions::default(), &mut 0.0));
+        let nominal_percent =
+            drift_percent(evaluate_runs(&fresh.session(), None, &EvaluationOptions::default(), &mut 0.0));
         let shown = format!(
             "{id}: {nominal_percent} nominal, {geometry_percent} geometry, {extended_percent} extended, {noise_percent} noise"
         );

@@ -92,6 +92,25 @@ def mcap_file(path, unindexed=False, **options):
         writer.finish()
 
 
+def two_topics(path):
+    """Each wheel's counts on a topic of its own, without a header, the right one's 20 ms after the left one's."""
+    with open(path, "wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        counts = writer.register_msgdef("std_msgs/msg/Int32", "int32 data\n")
+        poses = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
+        rows = drive()
+        messages = []
+        for number, (t_ns, left, right, x, y, theta) in enumerate(rows):
+            later = rows[min(number + 1, len(rows) - 1)][2]
+            for topic, at_ns, angle in [("/left/encoder", t_ns, left), ("/right/encoder", t_ns + 20_000_000, right + 0.4 * (later - right))]:
+                messages.append((at_ns, topic, counts, {"data": math.floor(angle / math.tau * 4096)}))
+            if number % 2 == 0:
+                messages.append((t_ns, "/robot/pose", poses, pose_stamped(t_ns, x, y, theta)))
+        for t_ns, topic, schema, message in sorted(messages, key=lambda message: message[0]):
+            writer.write_message(topic, schema, message, log_time=START_NS + t_ns, publish_time=START_NS + t_ns)
+        writer.finish()
+
+
 def compressed(path, **options):
     """A file that is compressed as a whole, as rosbag2 does it: the smallest way to keep one that is not compressed inside."""
     mcap_file(path, **options)
@@ -141,3 +160,4 @@ mcap_file(HERE / "lz4.mcap", compression=CompressionType.LZ4, chunk_size=16384)
 mcap_file(HERE / "zstd.mcap", compression=CompressionType.ZSTD, chunk_size=16384)
 rosbag2(HERE / "by_file", CompressionMode.FILE)
 rosbag2(HERE / "by_message", CompressionMode.MESSAGE, every=3)
+two_topics(HERE / "two_topics.mcap")

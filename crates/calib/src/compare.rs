@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use dataset::{Protocol, Session};
 use serde::Serialize;
 
-use crate::drift::{CalibrationDrift, evaluate_runs};
+use crate::drift::{CalibrationDrift, EvaluationOptions, evaluate_runs};
 use crate::estimate::{CalibError, Method};
 use crate::report::{CalibrationReport, MethodReport, Names};
 use crate::trajectory::AugmentedCalibration;
@@ -197,7 +197,7 @@ fn calibrated(method: &dyn Method, session: &Session<'_>) -> Result<AugmentedCal
 }
 
 fn evaluated(trained: Option<&Session<'_>>, calibration: Option<&AugmentedCalibration>, on: &Session<'_>) -> Pair {
-    let runs = evaluate_runs(on, calibration, false, &mut 0.0);
+    let runs = evaluate_runs(on, calibration, &EvaluationOptions::default(), &mut 0.0);
     let drift = CalibrationDrift::of_runs(calibration.map(|of| &of.calibration), runs);
     Pair {
         trained_on: trained.map(|session| session.name.to_owned()),

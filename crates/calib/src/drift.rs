@@ -8,6 +8,7 @@ use dataset::{RunView, Session};
 use kinematics::{Pose, wrap_to_pi};
 use serde::Serialize;
 
+use crate::pose_error::{PathErrors, PoseErrorOptions, PoseErrorStatistics, PoseErrors};
 use crate::report::NamedCalibration;
 use crate::trajectory::{AugmentedCalibration, Trajectory, at};
 
@@ -32,6 +33,10 @@ pub struct CalibrationDrift {
     pub mean_final_heading_rad: Option<f64>,
     /// 100 · sum of final position errors / sum of lengths.
     pub drift_percent: Option<f64>,
+    /// Absolute pose errors of all poses of all runs, each run aligned by itself.
+    pub ape: Option<PoseErrorStatistics>,
+    /// Relative pose errors of all pairs of all runs.
+    pub rpe: Option<PoseErrorStatistics>,
     /// Why something is null.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why_null: Option<String>,
@@ -55,9 +60,25 @@ pub struct RunDrift {
     pub final_position_m: Option<f64>,
     /// Heading error at the last truth instant, radians.
     pub final_heading_rad: Option<f64>,
+    /// Absolute pose errors.
+    pub ape: Option<PoseErrorStatistics>,
+    /// Relative pose errors.
+    pub rpe: Option<PoseErrorStatistics>,
+    /// The errors themselves, for the statistics over all runs.
+    #[serde(skip)]
+    path_errors: Option<PathErrors>,
     /// Why something is null.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why_null: Option<&'static str>,
+}
+
+/// What of runs is told besides their drift.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EvaluationOptions {
+    /// Each run carries its session's name.
+    pub name_runs: bool,
+    /// How pose errors are taken, where they are wanted.
+    pub pose_errors: Option<PoseErrorOptions>,
 }
 
 /// Evaluates dead reckoning of all sessions under one calibration, or under each session's own nominal values
@@ -67,7 +88,8 @@ pub struct RunDrift {
 #[must_use]
 pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>, name_runs: bool) -> CalibrationDrift {
     let augmented = calibration.cloned().map(AugmentedCalibration::from);
-    let runs = sessions.iter().flat_map(|session| evaluate_runs(session, augmented.as_ref(), name_runs, &mut 0.0));
+    let options = EvaluationOptions { name_runs, pose_errors: None };
+    let runs = sessions.iter().flat_map(|session| evaluate_runs(session, augmented.as_ref(), &options, &mut 0.0));
     CalibrationDrift::of_runs(calibration, runs.collect())
 }
 
@@ -79,15 +101,15 @@ pub fn evaluate(sessions: &[Session<'_>], calibration: Option<&NamedCalibration>
 pub fn evaluate_runs(
     session: &Session<'_>,
     calibration: Option<&AugmentedCalibration>,
-    name_runs: bool,
+    options: &EvaluationOptions,
     driven_m: &mut f64,
 ) -> Vec<RunDrift> {
     let of = |run| {
         let mut drift = match Trajectory::under(session, run, calibration, driven_m) {
-            Some(trajectory) => run_drift(run, trajectory),
+            Some(trajectory) => run_drift(run, trajectory, options.pose_errors.as_ref()),
             None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
         };
-        drift.dataset = name_runs.then(|| session.name.to_owned());
+        drift.dataset = options.name_runs.then(|| session.name.to_owned());
         drift
     };
     session.runs.iter().map(of).collect()
@@ -111,11 +133,14 @@ fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {
         max_heading_rad: None,
         final_position_m: None,
         final_heading_rad: None,
+        ape: None,
+        rpe: None,
+        path_errors: None,
         why_null: Some(why),
     }
 }
 
-fn run_drift(run: &RunView<'_>, trajectory: Trajectory) -> RunDrift {
+fn run_drift(run: &RunView<'_>, trajectory: Trajectory, pose_errors: Option<&PoseErrorOptions>) -> RunDrift {
     let Trajectory { log, length_m, measured, moved } = trajectory;
     let moved = match moved {
         Ok(moved) => moved,
@@ -123,6 +148,7 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory) -> RunDrift {
     };
     let identity = moved == Pose::IDENTITY;
     let (mut row, mut largest, mut last) = (0, None::<(f64, f64)>, None);
+    let (mut reference, mut estimate) = (Vec::new(), Vec::new());
     for (t_s, measured) in &measured {
         let Some(dead_reckoned) = at(&log, *t_s, &mut row) else { continue };
         let dead_reckoned = if identity { dead_reckoned } else { moved * dead_reckoned };
@@ -131,10 +157,18 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory) -> RunDrift {
         let (max_position_m, max_heading_rad) = largest.unwrap_or((0.0, 0.0));
         largest = Some((position_m.max(max_position_m), heading_rad.max(max_heading_rad)));
         last = Some((position_m, heading_rad));
+        if pose_errors.is_some() {
+            reference.push(*measured);
+            estimate.push(dead_reckoned);
+        }
     }
     if largest.is_none() {
         return unknown(run, length_m, "the truth does not overlap the odometry in time");
     }
+    let path_errors = pose_errors.map(|options| PathErrors::of(&reference, &estimate, options));
+    let statistics = |of: fn(&PathErrors) -> &Result<PoseErrors, &'static str>| {
+        path_errors.as_ref().map(|errors| PoseErrorStatistics::of(of(errors).as_ref().map_err(|why| *why)))
+    };
     RunDrift {
         dataset: None,
         run: run.info().id.clone(),
@@ -143,6 +177,9 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory) -> RunDrift {
         max_heading_rad: largest.map(|largest| largest.1),
         final_position_m: last.map(|last| last.0),
         final_heading_rad: last.map(|last| last.1),
+        ape: statistics(|errors| &errors.absolute),
+        rpe: statistics(|errors| &errors.relative),
+        path_errors,
         why_null: None,
     }
 }
@@ -165,8 +202,23 @@ fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {
     } else {
         None
     };
+    let pooled = |of: fn(&PathErrors) -> &Result<PoseErrors, &'static str>| {
+        let mut each = runs.iter().filter_map(|run| run.path_errors.as_ref()).map(of).peekable();
+        each.peek()?;
+        let (mut all, mut why) = (PoseErrors::default(), None);
+        for errors in each {
+            match errors {
+                Ok(errors) => all.extend(errors),
+                Err(first) => why = why.or(Some(*first)),
+            }
+        }
+        let known = if all.translation_m.is_empty() { why.map_or(Ok(&all), Err) } else { Ok(&all) };
+        Some(PoseErrorStatistics::of(known))
+    };
     CalibrationDrift {
         name,
+        ape: pooled(|errors| &errors.absolute),
+        rpe: pooled(|errors| &errors.relative),
         max_position_m: largest(|run| run.max_position_m),
         max_heading_rad: largest(|run| run.max_heading_rad),
         max_final_position_m: largest(|run| run.final_position_m),

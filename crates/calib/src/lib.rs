@@ -5,12 +5,16 @@
 //! what is not observable. The crate links neither the simulator nor the effects: what a method is not given,
 //! it cannot read. Adding a method is one new file and its line in [`methods::METHODS`].
 
+mod alignment;
 mod compare;
 mod dead_reckoning_jacobian;
 mod drift;
 mod drive;
 mod estimate;
+mod path_covariance;
+mod pose_error;
 mod pose_measurements;
+mod pose_pairs;
 mod report;
 mod robust;
 mod settings;
@@ -21,16 +25,22 @@ mod withheld;
 
 pub mod methods;
 
+pub use alignment::Alignment;
 pub use compare::{
     ComparedMethod, ComparedSession, Comparison, KindMean, Pair, Refusal, TooFewSessions, compare, path_kind,
 };
-pub use drift::{CalibrationDrift, RunDrift, evaluate, evaluate_runs};
+pub use drift::{CalibrationDrift, EvaluationOptions, RunDrift, evaluate, evaluate_runs};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
     Parameter, Rejected,
 };
 pub use methods::{METHODS, method};
+pub use path_covariance::path_covariances;
+pub use pose_error::{
+    ErrorStatistics, PoseErrorOptions, PoseErrorStatistics, PoseErrors, absolute_pose_errors, relative_pose_errors,
+};
+pub use pose_pairs::{Delta, DeltaUnit};
 pub use report::{
     CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,
     ReportedValue,

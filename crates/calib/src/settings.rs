@@ -238,3 +238,15 @@ pub(crate) const SETTLED_FACTOR_SIGMA: f64 = 2e-3;
 /// settled.
 /// Derived: one of 5000 constant robots exceeds it by chance.
 pub(crate) const SETTLED_MOVE_SIGMA: f64 = 4.0;
+
+/// Square metres. Smallest singular value of the positions' covariance from which on there is an alignment.
+/// Published: evo 1.38, evo/core/geometry.py: the machine epsilon of a double.
+pub(crate) const MIN_SINGULAR_VALUE_M2: f64 = f64::EPSILON;
+
+/// Ratio. Difference from the step, over the step, up to which a pair of all pairs counts.
+/// Published: evo 1.38, `rel_delta_tol` of evo/core/metrics.py.
+pub(crate) const DELTA_TOLERANCE: f64 = 0.1;
+
+/// Most pairs of one run.
+/// Budgeted: 160 MB.
+pub(crate) const MAX_PAIRS: usize = 10_000_000;

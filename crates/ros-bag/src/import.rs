@@ -16,9 +16,10 @@ use crate::bag::Bag;
 use crate::choice;
 use crate::clock::{self, Clock, Ordered, seconds};
 use crate::error::RosBagError;
-use crate::rows::{self, BothRows, Rows, WheelRows};
-use crate::topics::Survey;
+use crate::rows::{self, BothRows, Rows, WheelRows, WheelSource};
+use crate::topics::{Survey, Topic};
 use crate::truth::{TruthReader, TruthReading};
+use crate::wheel_pair::{Resampling, WheelPair};
 use crate::wheels::{WheelFields, WheelQuantity, WheelReader};
 
 /// Largest tilt of the instrument's poses that the plane bears, radians: at 10° a length in the plane is
@@ -39,7 +40,7 @@ const MAX_GAP_OF_RATES_S: f64 = 1.0;
 /// All that a user may say.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Topic of the wheels.
+    /// Topic of the wheels, or `LEFT_TOPIC[.field],RIGHT_TOPIC[.field]`.
     pub wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     pub truth: Option<String>,
@@ -101,26 +102,44 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let bag = Bag::open(path)?;
     let survey = Survey::of(&bag)?;
     let wheels = match &options.wheels {
-        Some(topic) => survey.named("--wheels", topic)?,
-        None => choice::wheels(&survey, path)?,
+        Some(topics) => match WheelPair::parse(&survey, topics, options.fields.quantity)? {
+            Some(pair) => WheelTopics::Two(pair),
+            None => WheelTopics::One(survey.named("--wheels", topics)?),
+        },
+        None => WheelTopics::One(choice::wheels(&survey, path)?),
     };
     let truth = match &options.truth {
         Some(topic) => survey.named("--truth", topic)?,
         None => choice::truth(&survey, path)?,
     };
-    if wheels.name == truth.name {
+    if wheels.has(&truth.name) {
         let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
         let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
         return Err(RosBagError::Unusable { topic, type_name, why });
     }
-    let (wheel_reader, counter_bits) = WheelReader::new(wheels, &options.fields)?;
+    let (source, wheels_what, counter_bits) = match wheels {
+        WheelTopics::One(topic) => {
+            let (reader, counter_bits) = WheelReader::new(topic, &options.fields)?;
+            let what = reader.describe();
+            (WheelSource::One(topic.name.clone(), reader), what, counter_bits)
+        }
+        WheelTopics::Two(pair) => {
+            let rates = options.rates.unwrap_or(Rates::IntervalEnd);
+            let resampling = Resampling { quantity: pair.quantity, rates, counter_bits: options.robot.counter_bits };
+            let what = pair.describe();
+            (WheelSource::Two(pair, resampling), what, None)
+        }
+    };
     let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
-    let both = rows::read(&bag, (&wheels.name, &wheel_reader), (&truth.name, &truth_reader))?;
+    let both = rows::read(&bag, &source, (&truth.name, &truth_reader))?;
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
     let is_counted = both.quantity == WheelQuantity::Ticks;
-    let (robot, geometry) =
-        given.nominal(is_counted, path, || format!("wheels are {} of {}", wheel_reader.describe(), wheels.name))?;
+    let what = || match &source {
+        WheelSource::One(topic, _) => format!("wheels are {wheels_what} of {topic}"),
+        WheelSource::Two(..) => format!("wheels are {wheels_what}"),
+    };
+    let (robot, geometry) = given.nominal(is_counted, path, what)?;
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
     warnings.extend(both.truth.warnings());
@@ -131,10 +150,25 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         ));
     }
     let clocks = clocks(&both, &mut warnings)?;
-    let took = took(&both, [wheel_reader.describe(), truth_reader.describe()], clocks);
+    let took = took(&both, [wheels_what, truth_reader.describe()], clocks);
     let dataset = assemble(&both, clocks, (robot, geometry), path, options, &mut warnings)?;
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
+}
+
+/// The topics of the wheels.
+enum WheelTopics<'a> {
+    One(&'a Topic),
+    Two(WheelPair),
+}
+
+impl WheelTopics<'_> {
+    fn has(&self, topic: &str) -> bool {
+        match self {
+            Self::One(wheels) => wheels.name == topic,
+            Self::Two(pair) => [&pair.left, &pair.right].iter().any(|side| side.topic == topic),
+        }
+    }
 }
 
 fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2]) -> Took {

@@ -2,11 +2,13 @@
 //!
 //! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
 //! `resync`) → `definition` and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two
-//! topics → `rows` of them by `wheels` and `truth` → `clock` their times → `import` the dataset. `listing`
-//! shows the topics.
+//! topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic) and `truth` → `clock` their
+//! times → `import` the dataset. `listing` shows the topics. `recorder` writes a dataset's runs as a bag,
+//! of `messages` by `cdr_writer`.
 
 mod bag;
 mod cdr;
+mod cdr_writer;
 mod choice;
 mod clock;
 mod decompress;
@@ -15,14 +17,21 @@ mod error;
 mod import;
 mod listing;
 mod mcap_file;
+mod messages;
+mod recorder;
 mod resync;
 mod rows;
 mod topics;
 mod truth;
 mod value;
+mod wheel_pair;
 mod wheels;
 
 pub use error::RosBagError;
 pub use import::{FromBag, Options, Took, TookTopic, import};
 pub use listing::{ListedTopic, Listing, list};
+pub use recorder::{
+    BODY_FRAME, FIRST_STAMP_S, RUN_GAP_S, RecordedPath, RecordedRun, RecordedTopic, RecordedWheels, Recorder,
+    TRUTH_FRAME, WORLD_FRAME,
+};
 pub use wheels::{WheelFields, WheelQuantity};

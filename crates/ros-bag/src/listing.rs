@@ -8,6 +8,7 @@ use crate::bag::Bag;
 use crate::choice::{suggested, truth_rank, wheels_rank};
 use crate::error::RosBagError;
 use crate::topics::{Survey, Topic};
+use crate::wheel_pair::COUNT_TYPES;
 use crate::wheels::{WHEEL_TYPES, WheelQuantity, has_joints};
 
 /// One topic.
@@ -39,7 +40,7 @@ pub struct ListedTopic {
 pub struct Listing {
     /// Topics by name.
     pub topics: Vec<ListedTopic>,
-    /// The most plausible topic of wheels.
+    /// The most plausible topic of wheels; two with a comma where each wheel has its own.
     pub wheels: Option<String>,
     /// The most plausible topic of poses.
     pub truth: Option<String>,
@@ -74,9 +75,16 @@ pub fn list(path: &Path) -> Result<Listing, RosBagError> {
     let counts = |topic: &Topic| {
         WHEEL_TYPES.iter().any(|(of, _, _, quantity, _)| *of == topic.type_name && *quantity == WheelQuantity::Ticks)
     };
+    let pair = if wheels.is_none() { pair_of_wheels(&survey) } else { None };
+    let is_pair_counted = pair.is_some_and(|(left, _)| COUNT_TYPES.contains(&&left.type_name[..]));
+    if pair.is_some() && !is_pair_counted {
+        flags.push("--as WHICH".to_owned());
+    }
     Ok(Listing {
-        is_counted: wheels.is_some_and(counts),
-        wheels: wheels.map(|topic| topic.name.clone()),
+        is_counted: wheels.is_some_and(counts) || is_pair_counted,
+        wheels: wheels
+            .map(|topic| topic.name.clone())
+            .or_else(|| pair.map(|(left, right)| format!("{},{}", left.name, right.name))),
         truth: truth.map(|topic| topic.name.clone()),
         flags,
         topics: survey.topics.values().map(listed).collect(),
@@ -92,6 +100,19 @@ fn numbers_of_wheels(topic: &Topic) -> Option<(&Topic, &str, &str)> {
     };
     let is_read = topic.count > 1 && !has_joints(&topic.type_name) && !topic.name.contains("cmd");
     Some((topic, named("left")?, named("right")?)).filter(|_| is_read)
+}
+
+/// Two topics of one number each, whose names differ by the side alone.
+fn pair_of_wheels(survey: &Survey) -> Option<(&Topic, &Topic)> {
+    let is_side = |topic: &&Topic| topic.count > 1 && topic.numbers.len() == 1 && !topic.name.contains("cmd");
+    let mut pairs = survey.topics.values().filter(is_side).filter_map(|left| {
+        let right = survey.topics.get(&left.name.replace("left", "right")).filter(is_side)?;
+        (left.name != right.name && left.type_name == right.type_name).then_some((left, right))
+    });
+    match (pairs.next(), pairs.next()) {
+        (Some(pair), None) => Some(pair),
+        _ => None,
+    }
 }
 
 /// The one transform to the robot's base that is neither odometry's nor a map's, which localisation

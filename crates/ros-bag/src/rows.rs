@@ -9,6 +9,7 @@ use crate::mcap_file::Channel;
 use crate::topics::definitions;
 use crate::truth::{TruthReader, TruthReading};
 use crate::value::Value;
+use crate::wheel_pair::{self, Resampling, WheelPair};
 use crate::wheels::{WheelQuantity, WheelReader};
 
 /// Rows of one topic.
@@ -110,18 +111,34 @@ pub(crate) struct BothRows {
     pub(crate) losses: Vec<String>,
 }
 
+/// Where the wheels are.
+pub(crate) enum WheelSource {
+    /// Both in the messages of one topic.
+    One(String, WheelReader),
+    /// Each on its own.
+    Two(WheelPair, Resampling),
+}
+
 /// Reads wheels and poses.
 pub(crate) fn read(
     bag: &Bag,
-    wheels: (&str, &WheelReader),
+    wheels: &WheelSource,
+    (truth_topic, truth_reader): (&str, &TruthReader),
+) -> Result<BothRows, RosBagError> {
+    match wheels {
+        WheelSource::One(topic, reader) => read_one(bag, (topic, reader), (truth_topic, truth_reader)),
+        WheelSource::Two(pair, resampling) => read_two(bag, pair, *resampling, (truth_topic, truth_reader)),
+    }
+}
+
+fn read_one(
+    bag: &Bag,
+    (wheel_topic, wheel_reader): (&str, &WheelReader),
     truth: (&str, &TruthReader),
 ) -> Result<BothRows, RosBagError> {
-    let (wheel_topic, wheel_reader) = wheels;
-    let (truth_topic, truth_reader) = truth;
     let mut wheels: WheelRows = Rows::new(wheel_topic, "");
-    let mut truth: Rows<TruthReading> = Rows::new(truth_topic, "");
     let mut quantity = None;
-    let losses = bag.visit(|channel, received_ns, message| {
+    let (truth, losses) = visit(bag, truth, |channel, received_ns, message| {
         if channel.topic == wheel_topic {
             wheels.type_name.clone_from(&channel.type_name);
             if let Some(value) = wheels.decode(channel, message)? {
@@ -135,6 +152,69 @@ pub(crate) fn read(
                 }
             }
         }
+        Ok(())
+    })?;
+    wheels.refuse_none("both wheels")?;
+    truth.refuse_none("a pose")?;
+    let quantity = quantity.unwrap_or(WheelQuantity::Angles);
+    Ok(BothRows { wheels, quantity, truth, losses })
+}
+
+fn read_two(
+    bag: &Bag,
+    pair: &WheelPair,
+    resampling: Resampling,
+    truth: (&str, &TruthReader),
+) -> Result<BothRows, RosBagError> {
+    let sides = [&pair.left, &pair.right];
+    let mut rows: [Rows<f64>; 2] = sides.map(|side| Rows::new(&side.topic, &side.type_name));
+    let (truth, mut losses) = visit(bag, truth, |channel, received_ns, message| {
+        for (side, rows) in sides.iter().zip(&mut rows) {
+            if channel.topic != side.topic {
+                continue;
+            }
+            if let Some(value) = rows.decode(channel, message)? {
+                match value.number(&side.path) {
+                    Some(number) => rows.push(Times::of(&value, received_ns), number, number.is_finite()),
+                    None => {
+                        let numbers = value.paths_of_numbers().join(", ");
+                        rows.note_fault(format!("no number at {:?}; there are {numbers}", side.path));
+                    }
+                }
+            }
+        }
+        Ok(())
+    })?;
+    for rows in &rows {
+        rows.refuse_none("the wheel's number")?;
+        losses.extend(rows.warnings());
+    }
+    truth.refuse_none("a pose")?;
+    let [left, right] = &rows;
+    let paired = wheel_pair::pair(pair, (&left.times, &left.values), (&right.times, &right.values), resampling)?;
+    if paired.left_out > 0 {
+        losses.push(format!(
+            "topic {}: {} of {} messages are without one of {} around them and were left out",
+            left.topic,
+            paired.left_out,
+            left.values.len(),
+            right.topic
+        ));
+    }
+    let mut wheels: WheelRows = Rows::new(&pair.topics(), &left.type_name);
+    (wheels.times, wheels.values) = (paired.times, paired.values);
+    Ok(BothRows { wheels, quantity: pair.quantity, truth, losses })
+}
+
+/// One pass over the bag: the poses, every message to `wheels` too, and what was lost.
+fn visit(
+    bag: &Bag,
+    (truth_topic, truth_reader): (&str, &TruthReader),
+    mut wheels: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
+) -> Result<(Rows<TruthReading>, Vec<String>), RosBagError> {
+    let mut truth: Rows<TruthReading> = Rows::new(truth_topic, "");
+    let losses = bag.visit(|channel, received_ns, message| {
+        wheels(channel, received_ns, message)?;
         if channel.topic == truth_topic {
             truth.type_name.clone_from(&channel.type_name);
             if let Some(value) = truth.decode(channel, message)? {
@@ -151,8 +231,5 @@ pub(crate) fn read(
         }
         Ok(())
     })?;
-    wheels.refuse_none("both wheels")?;
-    truth.refuse_none("a pose")?;
-    let quantity = quantity.unwrap_or(WheelQuantity::Angles);
-    Ok(BothRows { wheels, quantity, truth, losses: losses.lines() })
+    Ok((truth, losses.lines()))
 }

@@ -12,6 +12,7 @@ mod sheet;
 mod text;
 mod times;
 mod took;
+mod tum;
 mod units;
 
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub use options::{MapEntry, Options, Rates, RobotGiven};
 pub use sheet::Writing;
 pub use text::{Decimal, Delimiter};
 pub use took::{Basis, Confidence, Took, TookColumn, TookFile};
+pub use tum::{TumMotion, read_tum};
 
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
@@ -47,6 +49,12 @@ pub struct FromCsv {
 /// [`DatasetError`] of the first fault; [`DatasetError::Undecided`] where two readings are nearly as likely,
 /// [`DatasetError::RobotNotGiven`] where the robot's own numbers are missing.
 pub fn read(files: &[PathBuf], options: &Options) -> Result<FromCsv, DatasetError> {
+    let name = files[0].file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    dataset(parts(files, options)?, name, Vec::new(), options)
+}
+
+/// The files, their columns known.
+fn parts(files: &[PathBuf], options: &Options) -> Result<Vec<Part>, DatasetError> {
     let sheets = files.iter().map(|file| Sheet::open(file, options.writing)).collect::<Result<Vec<_>, _>>()?;
     columns::refuse_unknown_columns(&sheets, options)?;
     let mut parts = Vec::with_capacity(sheets.len());
@@ -55,6 +63,16 @@ pub fn read(files: &[PathBuf], options: &Options) -> Result<FromCsv, DatasetErro
         let log = Log::read(&sheet, &roles)?;
         parts.push(Part { sheet, roles, log });
     }
+    Ok(parts)
+}
+
+/// The dataset of files whose columns are known; `remarks` are told besides those that are made here.
+fn dataset(
+    mut parts: Vec<Part>,
+    name: String,
+    remarks: Vec<String>,
+    options: &Options,
+) -> Result<FromCsv, DatasetError> {
     refuse_halves(&parts)?;
     let (robot, drive) = robot(&parts, options)?;
     let time_units = settle_times(&mut parts, options, &drive)?;
@@ -67,8 +85,8 @@ pub fn read(files: &[PathBuf], options: &Options) -> Result<FromCsv, DatasetErro
         .zip(&units)
         .map(|(raw, units)| assemble::run(&parts, raw, units, &drive, session_start))
         .collect::<Result<Vec<_>, _>>()?;
-    let took = tell(&parts, &raw, &units, &time_units, runs_by, options);
-    let name = files[0].file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut took = tell(&parts, &raw, &units, &time_units, runs_by, options);
+    took.remarks.splice(0..0, remarks);
     let provenance = Provenance { name: Some(name.clone()), ..Provenance::default() };
     let dataset = Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs };
     let warnings = crate::counter::wrap_warnings(&dataset);

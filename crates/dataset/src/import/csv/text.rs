@@ -115,7 +115,7 @@ impl Decimal {
         }
     }
 
-    /// A decimal number in units of 10⁻¹², exactly where it is written without exponent: a stamp of
+    /// A decimal number in units of 10⁻¹², every digit down to there, with an exponent or without: a stamp of
     /// nanoseconds since 1970 has more digits than a double.
     pub(super) fn exact(self, field: &str) -> Option<i128> {
         let separator = if self == Self::Point { '.' } else { ',' };
@@ -123,22 +123,35 @@ impl Decimal {
             Some(rest) => (true, rest),
             None => (false, field.strip_prefix('+').unwrap_or(field)),
         };
+        let (digits, exponent) = match digits.split_once(['e', 'E']) {
+            Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
+            None => (digits, 0),
+        };
         let (whole, fraction) = digits.split_once(separator).unwrap_or((digits, ""));
         let plain = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-        if digits.is_empty() || !plain(whole) || !plain(fraction) || whole.len() > 24 {
-            let number = self.number(field).filter(|number| number.is_finite() && number.abs() < 1e24)?;
-            return Some((number * EXACT_SCALE) as i128);
+        if (whole.is_empty() && fraction.is_empty()) || !plain(whole) || !plain(fraction) {
+            return None;
+        }
+        // Where the last digit that counts stands among all, the point moved by the exponent.
+        let count = i64::from(exponent) + whole.len() as i64 + EXACT_DIGITS as i64;
+        let significant = whole.bytes().chain(fraction.bytes()).skip_while(|byte| *byte == b'0').count() as i64;
+        let leading = (whole.len() + fraction.len()) as i64 - significant;
+        if count - leading > MAX_EXACT_DIGITS && significant > 0 {
+            return None;
         }
         let mut value: i128 = 0;
-        for byte in whole.bytes().chain(fraction.bytes().chain(std::iter::repeat(b'0')).take(EXACT_DIGITS)) {
-            value = 10 * value + i128::from(byte - b'0');
-        }
-        if whole.is_empty() && fraction.is_empty() {
-            return None;
+        if significant > 0 {
+            let all = whole.bytes().chain(fraction.bytes()).chain(std::iter::repeat(b'0'));
+            for byte in all.take(usize::try_from(count).unwrap_or(0)) {
+                value = 10 * value + i128::from(byte - b'0');
+            }
         }
         Some(if negative { -value } else { value })
     }
 }
+
+/// Most digits of [`Decimal::exact`]: as many as an `i128` holds, less the three of a sum of times.
+const MAX_EXACT_DIGITS: i64 = 36;
 
 /// Digits behind the decimal point that [`Decimal::exact`] keeps.
 const EXACT_DIGITS: usize = 12;
@@ -200,7 +213,13 @@ mod tests {
         assert_eq!(Decimal::Point.exact("1700000000.123456789"), Some(1_700_000_000_123_456_789 * 1000));
         assert_eq!(Decimal::Comma.exact("-0,5"), Some(-500_000_000_000));
         assert_eq!(Decimal::Point.exact("1e3"), Some(1000 * 10_i128.pow(12)));
-        for wrong in ["", ".", "x", "1,5", "NaN", "inf", "--1"] {
+        // As numpy writes stamps; the digits behind the 12th are left out.
+        assert_eq!(Decimal::Point.exact("1.305031102175800085e+09"), Some(1_305_031_102_175_800_085_000));
+        assert_eq!(Decimal::Point.exact("5.00e-01"), Some(500_000_000_000));
+        assert_eq!(Decimal::Point.exact("0.0000000000000001e2"), Some(0));
+        assert_eq!(Decimal::Point.exact("0.000000000000000000e+00"), Some(0));
+        assert_eq!(Decimal::Point.exact("7e-400"), Some(0));
+        for wrong in ["", ".", "x", "1,5", "NaN", "inf", "--1", "e3", "1e", "1e99", "1e9999999999"] {
             assert_eq!(Decimal::Point.exact(wrong), None, "{wrong}");
         }
     }

@@ -1,0 +1,351 @@
+//! Runs as a bag: one MCAP file with truth, paths by dead reckoning, wheels and transforms.
+//!
+//! Runs are laid one after the other, since a run's times count from its own start: the first row of the
+//! first run is at [`FIRST_STAMP_S`], and each later run begins [`RUN_GAP_S`] after the one before has
+//! ended. Every message is stamped in its header, and received when it is stamped. All poses are in one
+//! frame, the instrument's: dead reckoning starts where the instrument first saw the robot.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use dataset::TruthSample;
+use kinematics::{Pose, Wheels, sin_cos, wrap_to_pi};
+use mcap::records::MessageHeader;
+use mcap::{McapError, WriteOptions, Writer};
+use serde::Serialize;
+
+use crate::messages::{self, BodyTwist, Header, JOINT_STATE, MessageType, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
+
+/// Stamp of the first row, seconds. A stamp of zero is none in ROS.
+pub const FIRST_STAMP_S: i64 = 1;
+/// From the end of a run to the start of the next, seconds: longer than a robot stands within a run, so that
+/// `yair import ros2 --cut` cuts between the runs alone.
+pub const RUN_GAP_S: i64 = 10;
+
+/// The frame of all poses.
+pub const WORLD_FRAME: &str = "map";
+/// The frame that the instrument saw.
+pub const TRUTH_FRAME: &str = "truth";
+/// Beginning of the frames that dead reckoning moves; the path's name follows.
+pub const BODY_FRAME: &str = "base_link_";
+
+/// A path by dead reckoning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedPath {
+    /// The last part of its topics: letters, digits and underscores.
+    pub name: String,
+    /// Seconds from the run's start, and pose of the drive's centre.
+    pub poses: Vec<(f64, Pose)>,
+    /// Covariance of x, y and heading at each pose, row by row, m² and rad²; none where it is not known.
+    pub covariances: Option<Vec<[f64; 9]>>,
+}
+
+/// What the wheels did, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RecordedWheels {
+    /// Cumulative angles, radians.
+    Angles(Wheels<Vec<f64>>),
+    /// Angular speeds over the interval that ends at a row, rad/s.
+    AngularSpeeds(Wheels<Vec<f64>>),
+}
+
+/// One run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedRun<'a> {
+    /// What the instrument saw.
+    pub truth: &'a [TruthSample],
+    /// Seconds from the run's start of the wheels' rows.
+    pub rows_s: &'a [f64],
+    /// The wheels, where their angles or angular speeds are known.
+    pub wheels: Option<RecordedWheels>,
+    /// Dead reckoning.
+    pub paths: Vec<RecordedPath>,
+}
+
+/// One topic of the bag.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RecordedTopic {
+    /// Its name.
+    pub topic: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub type_name: &'static str,
+    /// Its messages.
+    pub messages: u64,
+}
+
+/// A message before it is written.
+struct Waiting {
+    stamp_ns: i64,
+    channel: usize,
+    bytes: Vec<u8>,
+}
+
+/// Writes runs as a bag.
+pub struct Recorder<W: Write + Seek> {
+    writer: Writer<W>,
+    topics: Vec<(u16, RecordedTopic)>,
+    next_ns: i64,
+}
+
+impl<W: Write + Seek> Recorder<W> {
+    /// A bag without messages.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn new(writer: W) -> Result<Self, McapError> {
+        let library = concat!("yair ", env!("CARGO_PKG_VERSION"));
+        let options = WriteOptions::new().profile("ros2").library(library).compression(None);
+        Ok(Self { writer: options.create(writer)?, topics: Vec::new(), next_ns: FIRST_STAMP_S * 1_000_000_000 })
+    }
+
+    /// Adds a run.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn push(&mut self, run: &RecordedRun<'_>) -> Result<(), McapError> {
+        let instants = || {
+            let truth = run.truth.iter().map(|sample| sample.t_s);
+            truth.chain(run.rows_s.iter().copied())
+        };
+        let Some(first_s) = instants().reduce(f64::min) else { return Ok(()) };
+        let begin_ns = self.next_ns;
+        let stamp_ns = |t_s: f64| begin_ns + ((t_s - first_s) * 1e9).round() as i64;
+        let mut waiting = Vec::new();
+        self.push_truth(run.truth, stamp_ns, &mut waiting)?;
+        self.push_wheels(run, stamp_ns, &mut waiting)?;
+        for path in &run.paths {
+            self.push_path(path, stamp_ns, &mut waiting)?;
+        }
+        // In the order of time; of one instant in the order of the topics.
+        waiting.sort_by_key(|message: &Waiting| (message.stamp_ns, message.channel));
+        for Waiting { stamp_ns, channel, bytes } in &waiting {
+            let (channel_id, topic) = &mut self.topics[*channel];
+            let time = u64::try_from(*stamp_ns).unwrap_or_default();
+            let header = MessageHeader {
+                channel_id: *channel_id,
+                sequence: topic.messages as u32,
+                log_time: time,
+                publish_time: time,
+            };
+            self.writer.write_to_known_channel(&header, bytes)?;
+            topic.messages += 1;
+        }
+        let last_ns = waiting.last().map_or(begin_ns, |message| message.stamp_ns);
+        self.next_ns = last_ns + RUN_GAP_S * 1_000_000_000;
+        Ok(())
+    }
+
+    /// Ends the bag: its topics.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn finish(mut self) -> Result<Vec<RecordedTopic>, McapError> {
+        self.writer.finish()?;
+        Ok(self.topics.into_iter().map(|(_, topic)| topic).collect())
+    }
+
+    /// The place of a topic, which is made where it is new.
+    fn channel(&mut self, topic: &str, of: &MessageType) -> Result<usize, McapError> {
+        if let Some(index) = self.topics.iter().position(|(_, known)| known.topic == topic) {
+            return Ok(index);
+        }
+        let schema = self.writer.add_schema(of.name, "ros2msg", of.definition().as_bytes())?;
+        // Recorders of ROS note the quality of service; none was asked for here.
+        let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
+        let id = self.writer.add_channel(schema, topic, "cdr", &metadata)?;
+        self.topics.push((id, RecordedTopic { topic: topic.to_owned(), type_name: of.name, messages: 0 }));
+        Ok(self.topics.len() - 1)
+    }
+
+    /// Positions without a heading are left out where others have one; where none has, headings are 0.
+    fn push_truth(
+        &mut self,
+        truth: &[TruthSample],
+        stamp_ns: impl Fn(f64) -> i64,
+        waiting: &mut Vec<Waiting>,
+    ) -> Result<(), McapError> {
+        let has_heading = truth.iter().any(|sample| sample.theta_rad().is_some());
+        let pose = |sample: &TruthSample| {
+            let theta_rad = if has_heading { sample.theta_rad()? } else { 0.0 };
+            Some((stamp_ns(sample.t_s), Pose::new(sample.x_m, sample.y_m, theta_rad)))
+        };
+        let poses: Vec<(i64, Pose)> = truth.iter().filter_map(pose).collect();
+        let Some((first_ns, _)) = poses.first() else { return Ok(()) };
+        let (stamped, transforms) = (self.channel("/truth", &POSE_STAMPED)?, self.channel("/tf", &TF_MESSAGE)?);
+        let whole = self.channel("/path/truth", &PATH)?;
+        for (stamp_ns, pose) in &poses {
+            let (stamp_ns, header) = (*stamp_ns, Header { stamp_ns: *stamp_ns, frame: WORLD_FRAME });
+            waiting.push(Waiting { stamp_ns, channel: stamped, bytes: messages::pose_stamped(header, *pose) });
+            let bytes = messages::transform(header, TRUTH_FRAME, *pose);
+            waiting.push(Waiting { stamp_ns, channel: transforms, bytes });
+        }
+        let header = Header { stamp_ns: *first_ns, frame: WORLD_FRAME };
+        waiting.push(Waiting { stamp_ns: *first_ns, channel: whole, bytes: messages::path(header, &poses) });
+        Ok(())
+    }
+
+    fn push_wheels(
+        &mut self,
+        run: &RecordedRun<'_>,
+        stamp_ns: impl Fn(f64) -> i64,
+        waiting: &mut Vec<Waiting>,
+    ) -> Result<(), McapError> {
+        let Some(wheels) = &run.wheels else { return Ok(()) };
+        let channel = self.channel("/joint_states", &JOINT_STATE)?;
+        let at = |both: &Wheels<Vec<f64>>, row: usize| Wheels { left: both.left[row], right: both.right[row] };
+        for (row, t_s) in run.rows_s.iter().enumerate() {
+            let stamp_ns = stamp_ns(*t_s);
+            let header = Header { stamp_ns, frame: "" };
+            let bytes = match wheels {
+                RecordedWheels::Angles(angles) => messages::joint_state(header, Some(at(angles, row)), None),
+                RecordedWheels::AngularSpeeds(speeds) => messages::joint_state(header, None, Some(at(speeds, row))),
+            };
+            waiting.push(Waiting { stamp_ns, channel, bytes });
+        }
+        Ok(())
+    }
+
+    fn push_path(
+        &mut self,
+        path: &RecordedPath,
+        stamp_ns: impl Fn(f64) -> i64,
+        waiting: &mut Vec<Waiting>,
+    ) -> Result<(), McapError> {
+        let Some((first_s, _)) = path.poses.first() else { return Ok(()) };
+        let odometry = self.channel(&format!("/odom/{}", path.name), &ODOMETRY)?;
+        let transforms = self.channel("/tf", &TF_MESSAGE)?;
+        let whole = self.channel(&format!("/path/{}", path.name), &PATH)?;
+        let child = format!("{BODY_FRAME}{}", path.name);
+        let poses: Vec<(i64, Pose)> = path.poses.iter().map(|(t_s, pose)| (stamp_ns(*t_s), *pose)).collect();
+        for (row, (stamp_ns, pose)) in poses.iter().enumerate() {
+            let (stamp_ns, header) = (*stamp_ns, Header { stamp_ns: *stamp_ns, frame: WORLD_FRAME });
+            let before = row.checked_sub(1).map(|before| path.poses[before]);
+            let twist = before.map_or(BodyTwist::default(), |before| twist(before, path.poses[row]));
+            let covariance = path.covariances.as_ref().and_then(|all| all.get(row).copied());
+            let bytes = messages::odometry(header, &child, *pose, covariance, twist);
+            waiting.push(Waiting { stamp_ns, channel: odometry, bytes });
+            let bytes = messages::transform(header, &child, *pose);
+            waiting.push(Waiting { stamp_ns, channel: transforms, bytes });
+        }
+        let first_ns = stamp_ns(*first_s);
+        let header = Header { stamp_ns: first_ns, frame: WORLD_FRAME };
+        waiting.push(Waiting { stamp_ns: first_ns, channel: whole, bytes: messages::path(header, &poses) });
+        Ok(())
+    }
+}
+
+/// The mean twist between two poses, by the midpoint rule.
+fn twist((from_s, from): (f64, Pose), (to_s, to): (f64, Pose)) -> BodyTwist {
+    let (moved, dt_s) = (from.to(to), to_s - from_s);
+    let turn_rad = wrap_to_pi(moved.theta_rad);
+    let (sin, cos) = sin_cos(0.5 * turn_rad);
+    if dt_s > 0.0 {
+        BodyTwist { speed_m_s: (cos * moved.x_m + sin * moved.y_m) / dt_s, yaw_rate_rad_s: turn_rad / dt_s }
+    } else {
+        BodyTwist::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::{FromBag, Options, import};
+    use dataset::WheelLog;
+    use dataset::import::csv::RobotGiven;
+    use std::io::Cursor;
+
+    fn bag(runs: &[RecordedRun<'_>]) -> (Vec<RecordedTopic>, tempfile::TempDir) {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut recorder = Recorder::new(&mut bytes).expect("a bag");
+        for run in runs {
+            recorder.push(run).expect("written");
+        }
+        let topics = recorder.finish().expect("written");
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("a.mcap"), bytes.into_inner()).expect("written");
+        (topics, folder)
+    }
+
+    fn options(wheels: Option<&str>) -> Options {
+        Options {
+            wheels: wheels.map(str::to_owned),
+            cut_s: Some(5.0),
+            robot: RobotGiven {
+                wheel_diameter_m: Some(Wheels::both(0.15)),
+                wheel_separation_m: Some(0.3),
+                ..RobotGiven::default()
+            },
+            ..Options::default()
+        }
+    }
+
+    #[test]
+    fn a_bag_reads_back_as_the_runs_that_it_was_written_of() {
+        let rows_s: Vec<f64> = (0..20).map(|row| 0.1 * f64::from(row)).collect();
+        let angles: Vec<f64> = rows_s.iter().map(|t_s| 3.0 * t_s).collect();
+        let truth: Vec<TruthSample> =
+            rows_s.iter().step_by(2).map(|t_s| TruthSample::new(*t_s, 0.25 * t_s, 1.0, Some(0.125 * t_s))).collect();
+        let poses: Vec<(f64, Pose)> =
+            rows_s.iter().map(|t_s| (*t_s, Pose::new(0.25 * t_s, 1.0, 0.125 * t_s))).collect();
+        let path = RecordedPath { name: "nominal".to_owned(), poses, covariances: None };
+        let wheels = Wheels { left: angles.clone(), right: angles.iter().map(|angle| -angle).collect() };
+        let run = RecordedRun {
+            truth: &truth,
+            rows_s: &rows_s,
+            wheels: Some(RecordedWheels::Angles(wheels.clone())),
+            paths: vec![path],
+        };
+        let (topics, folder) = bag(&[run.clone(), run]);
+        let counts: Vec<(&str, u64)> = topics.iter().map(|of| (&of.topic[..], of.messages)).collect();
+        let all = [
+            ("/truth", 20),
+            ("/tf", 60),
+            ("/path/truth", 2),
+            ("/joint_states", 40),
+            ("/odom/nominal", 40),
+            ("/path/nominal", 2),
+        ];
+        assert_eq!(counts, all);
+        let FromBag { dataset, warnings, .. } = import(folder.path(), &options(None)).expect("a dataset");
+        assert_eq!((dataset.runs.len(), warnings), (2, Vec::new()));
+        for run in &dataset.runs {
+            assert_eq!(run.odometry.wheels, WheelLog::Angles(wheels.clone()));
+            // Stamps are whole nanoseconds.
+            let close = run.odometry.t_s.iter().zip(&rows_s).all(|(found_s, t_s)| (found_s - t_s).abs() < 1e-9);
+            assert!(close && run.truth.len() == truth.len(), "{:?}", run.odometry.t_s);
+            for (found, written) in run.truth.iter().zip(&truth) {
+                assert_eq!((found.x_m, found.y_m), (written.x_m, written.y_m));
+                // A heading goes through the half-angle and back.
+                let theta_rad = |of: &TruthSample| of.theta_rad().expect("a heading");
+                assert!((theta_rad(found) - theta_rad(written)).abs() < 1e-15);
+            }
+        }
+        // 0.25 m/s ahead at 0.125 rad/s, as the poses say.
+        let by_twist = import(folder.path(), &options(Some("/odom/nominal"))).expect("a dataset").dataset;
+        let WheelLog::Twist { omega_radps, .. } = &by_twist.runs[1].odometry.wheels else { panic!("twists") };
+        assert!(omega_radps[1..].iter().all(|rate| (rate - 0.125).abs() < 1e-12), "{omega_radps:?}");
+    }
+
+    #[test]
+    fn positions_without_headings_stay_positions() {
+        let truth = [(0.0, 0.0, 0.0), (1.0, 1.0, 0.5), (2.0, 2.0, 1.0)];
+        let without = truth.map(|(t_s, x_m, y_m)| TruthSample::new(t_s, x_m, y_m, None));
+        let rows_s = [0.0, 1.0, 2.0];
+        let speeds = Wheels::both(vec![0.0, 13.0, 13.0]);
+        let run = |truth| RecordedRun {
+            truth,
+            rows_s: &rows_s,
+            wheels: Some(RecordedWheels::AngularSpeeds(speeds.clone())),
+            paths: Vec::new(),
+        };
+        let (_, folder) = bag(&[run(&without)]);
+        let dataset = import(folder.path(), &options(None)).expect("a dataset").dataset;
+        assert!(dataset.runs[0].truth.iter().all(|sample| sample.theta_rad().is_none()));
+        assert!(matches!(dataset.runs[0].odometry.wheels, WheelLog::Speeds(_)));
+        let mut mixed = without;
+        mixed[1] = TruthSample::new(1.0, 1.0, 0.5, Some(0.3));
+        let (topics, _folder) = bag(&[run(&mixed)]);
+        assert_eq!(topics[0].messages, 1, "those without a heading are left out beside one that has it");
+    }
+}
