@@ -44,7 +44,7 @@ challenge:
 fresh-seeds:
     .ci/run fresh-seeds
 
-# Test what the optional features write: Parquet files, PNG pictures
+# Test the optional features: Parquet files, PNG pictures, bags in SQLite; needs a C compiler
 features:
     .ci/run features
 

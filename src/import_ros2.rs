@@ -44,6 +44,10 @@ pub(crate) struct Arguments {
     /// Which transform is the robot's pose, where --truth is a topic of transforms.
     #[arg(long, value_name = "PARENT,CHILD", value_parser = frames, help_heading = "Topics")]
     truth_frames: Option<(String, String)>,
+    /// Definition of a message type that the bag itself does not define, as PACKAGE/msg/TYPE.msg or
+    /// PACKAGE/TYPE=FILE; may be given several times. Usual types are known.
+    #[arg(long = "msg", value_name = "FILE", help_heading = "Topics")]
+    definitions: Vec<PathBuf>,
     /// Cut runs where the robot stands still, or the log has a gap, for longer than that.
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Topics")]
     cut: Option<f64>,
@@ -156,6 +160,7 @@ impl Arguments {
         Ok(Options {
             wheels: self.wheels.clone(),
             truth: self.truth.clone(),
+            definitions: self.definitions.clone(),
             fields: WheelFields {
                 left_joint: self.left_joint.clone(),
                 right_joint: self.right_joint.clone(),
@@ -172,7 +177,7 @@ impl Arguments {
 }
 
 fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
-    let listing = ros_bag::list(&arguments.bag)?;
+    let listing = ros_bag::list(&arguments.bag, &arguments.definitions)?;
     for warning in &listing.warnings {
         terminal.remark(&format!("warning: {warning}"));
     }

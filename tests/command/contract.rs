@@ -399,6 +399,6 @@ fn shells_and_man_know_the_command() {
     }
     assert!(succeed(at, &["man"]).stdout.starts_with(".ie"));
     succeed(at, &["man", "--out", "man"]);
-    let page = std::fs::read_to_string(at.join("man/yair-import-csv.1")).expect("a page of an inner subcommand");
+    let page = fs::read_to_string(at.join("man/yair-import-csv.1")).expect("a page of an inner subcommand");
     assert!(page.contains("delimiter"), "{page}");
 }

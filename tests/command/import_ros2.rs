@@ -169,7 +169,7 @@ fn time_that_restarts_is_refused_or_cut_there() {
     let message = refusal(at, &[&["import", "ros2", "twice", "--out", "other"], &ROBOT[..]].concat());
     assert!(message.contains("message 442: time runs backwards by 22.000 s"), "{message}");
     let (found, warnings) = imported(at, "twice", &["--cut", "2"]);
-    assert!(warnings.contains("its 2 .mcap files were read as one bag"), "{warnings}");
+    assert!(warnings.contains("its 2 files were read as one bag"), "{warnings}");
     for (found, whole) in found.iter().zip(&whole) {
         let rows: Vec<&str> = whole.lines().skip(1).collect();
         let second = rows.join("\n").replace("run-01", "run-02");
@@ -275,22 +275,48 @@ fn what_cannot_be_told_is_asked_for() {
     assert!(wrong.contains("--right-field"), "{wrong}");
 }
 
+/// A bag as ROS 2 Humble records it: in SQLite, without definitions of its messages.
+#[cfg(feature = "db3")]
+#[test]
+fn a_bag_in_sqlite_gives_the_rows_that_are_in_it() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    let whole = decompressed("humble.db3.zstd");
+    fs::write(at.join("humble.db3"), &whole).expect("written");
+    let (found, warnings) = imported(at, "humble.db3", &[]);
+    assert_eq!((found[0].lines().count(), found[1].lines().count(), &warnings[..]), (1 + 221, 1 + 111, ""));
+    calibrates(at);
+    // Every second row of the other bags, to the last digit.
+    let (every, _) = imported(at, &bag("zstd.mcap"), &[]);
+    let odometry: Vec<&str> = every[0].lines().skip(1).step_by(2).collect();
+    assert_eq!(found[0].lines().skip(1).collect::<Vec<_>>(), odometry);
+    fs::create_dir(at.join("folder")).expect("made");
+    fs::write(at.join("folder/humble_0.db3"), &whole).expect("written");
+    assert_eq!(imported(at, "folder", &[]).0, found);
+    // Pages lost: what is before them is read, and the loss is said.
+    fs::write(at.join("cut.db3"), &whole[..whole.len() / 2]).expect("written");
+    let ended = run_in(at, &["import", "ros2", "cut.db3", "--list"]);
+    assert!(ended.code == Some(1) || ended.stderr.contains("everything before was read"), "{}", ended.stderr);
+}
+
 #[test]
 fn what_is_no_bag_is_named() {
     let temp = tempfile::tempdir().expect("a folder");
     let at = temp.path();
     let write = |name: &str, bytes: &[u8]| fs::write(at.join(name), bytes).expect("written");
-    write("a.db3", b"SQLite format 3\0");
-    write("b.mcap", b"SQLite format 3\0");
+    let sqlite = [&b"SQLite format 3\0"[..], &[7; 84]].concat();
+    write("a.db3", &sqlite);
+    write("b.mcap", &sqlite);
     write("c.bag", b"#ROSBAG V2.0\n");
     write("d.mcap", b"");
     write("e.mcap", b"t,left,right\n0,1,2\n");
     write("f.mcap.zstd", b"no zstd");
     write("g.mcap", &fs::read(bag("zstd.mcap")).expect("a bag")[..40]);
     fs::create_dir(at.join("folder")).expect("made");
+    let of_sqlite = if cfg!(feature = "db3") { "file is not a database" } else { "ros2 bag convert" };
     for (name, word) in [
-        ("a.db3", "ros2 bag convert"),
-        ("b.mcap", "ros2 bag convert"),
+        ("a.db3", of_sqlite),
+        ("b.mcap", of_sqlite),
         ("c.bag", "a bag of ROS 1"),
         ("d.mcap", "an empty file"),
         ("e.mcap", "no MCAP file"),

@@ -13,6 +13,7 @@ import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import zstandard
 from mcap.writer import CompressionType, Writer as RawWriter
 from mcap_ros2.writer import Writer
@@ -154,6 +155,36 @@ def rosbag2(path, mode, every=1):
             bag.write(frames, START_NS + t_ns, store.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
 
 
+def sqlite(path, version):
+    """One file of SQLite, every second row: of version 8 as ROS 2 Humble and before record it, without definitions."""
+    folder = path.with_suffix(".folder")
+    shutil.rmtree(folder, ignore_errors=True)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+
+    def message(type_name, fields):
+        """A message of dictionaries as one of its type."""
+        kinds = dict(store.fielddefs[type_name][1])
+        def of(kind, value):
+            if isinstance(value, dict):
+                return message(kind[1], value)
+            if isinstance(value, list) and (not value or isinstance(value[0], float)):
+                return np.array(value, dtype=np.float64)
+            return value
+        return types[type_name](**{name: of(kinds[name], value) for name, value in fields.items()})
+
+    with Rosbag2(folder, version=version, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        joints = bag.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+        poses = bag.add_connection("/robot/pose", "geometry_msgs/msg/PoseStamped", typestore=store)
+        for number, (t_ns, left, right, x, y, theta) in enumerate(drive()[::2]):
+            for connection, fields in [(joints, joint_state(t_ns, left, right)), (poses, pose_stamped(t_ns, x, y, theta))][: 1 + (number % 2 == 0)]:
+                data = store.serialize_cdr(message(connection.msgtype, fields), connection.msgtype)
+                bag.write(connection, START_NS + t_ns + 3_000_000, data)
+    (whole,) = folder.glob("*.db3")
+    path.with_name(path.name + ".zstd").write_bytes(zstandard.ZstdCompressor(level=19).compress(whole.read_bytes()))
+    shutil.rmtree(folder)
+
+
 compressed(HERE / "plain.mcap", compression=CompressionType.NONE)
 compressed(HERE / "unindexed.mcap", unindexed=True)
 mcap_file(HERE / "lz4.mcap", compression=CompressionType.LZ4, chunk_size=16384)
@@ -161,3 +192,4 @@ mcap_file(HERE / "zstd.mcap", compression=CompressionType.ZSTD, chunk_size=16384
 rosbag2(HERE / "by_file", CompressionMode.FILE)
 rosbag2(HERE / "by_message", CompressionMode.MESSAGE, every=3)
 two_topics(HERE / "two_topics.mcap")
+sqlite(HERE / "humble.db3", version=8)

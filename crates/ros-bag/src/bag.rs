@@ -1,5 +1,6 @@
-//! Which files a bag is: one MCAP file, or a folder of rosbag2 with its `metadata.yaml`.
+//! Which files a bag is: one file, or a folder of rosbag2 with its `metadata.yaml`.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,7 @@ use yaml_rust2::{Yaml, YamlLoader};
 
 use crate::decompress::decompress;
 use crate::error::RosBagError;
+use crate::known_types::KnownTypes;
 use crate::mcap_file::{self, Channel, Losses};
 
 /// Longest `metadata.yaml` that is read, bytes: a kilobyte a topic and file, and some ten thousand of these.
@@ -20,20 +22,25 @@ pub(crate) struct Bag {
     has_compressed_messages: bool,
     /// What should be known of the folder.
     remarks: Vec<String>,
+    /// Types that the bag itself does not define.
+    known_types: KnownTypes,
 }
 
 impl Bag {
-    pub(crate) fn open(path: &Path) -> Result<Self, RosBagError> {
+    /// Opens a bag; `definitions` are files of types that it does not define.
+    pub(crate) fn open(path: &Path, definitions: &[PathBuf]) -> Result<Self, RosBagError> {
+        let known_types = KnownTypes::with_files(definitions)?;
         let bag = |files, has_compressed_messages, remarks| Self {
             path: path.to_owned(),
             files,
             has_compressed_messages,
             remarks,
+            known_types,
         };
         if !path.is_dir() {
             return match path.extension().and_then(|extension| extension.to_str()) {
                 _ if !path.exists() => Err(no_bag(path, "no such file or folder")),
-                Some("db3") => Err(RosBagError::Sqlite { path: path.to_owned() }),
+                Some("db3") if cfg!(not(feature = "db3")) => Err(RosBagError::Sqlite { path: path.to_owned() }),
                 _ => Ok(bag(vec![path.to_owned()], false, Vec::new())),
             };
         }
@@ -43,17 +50,17 @@ impl Bag {
             let files = files_of(path)?;
             let count = files.len();
             let remark = format!(
-                "{}: no metadata.yaml; its {count} .mcap files were read as one bag, in the order of their names",
+                "{}: no metadata.yaml; its {count} files were read as one bag, in the order of their names",
                 path.display()
             );
             return match count {
-                0 => Err(no_bag(path, "no metadata.yaml and no .mcap file in it")),
+                0 => Err(no_bag(path, "no metadata.yaml and no file of a bag in it")),
                 1 => Ok(bag(files, false, Vec::new())),
                 _ => Ok(bag(files, false, vec![remark])),
             };
         }
         let found = Metadata::read(&metadata)?;
-        if found.storage == "sqlite3" {
+        if found.storage == "sqlite3" && cfg!(not(feature = "db3")) {
             return Err(RosBagError::Sqlite { path: path.to_owned() });
         }
         let named = found.files.iter().map(|name| path.join(Path::new(name).file_name().unwrap_or_default()));
@@ -76,13 +83,21 @@ impl Bag {
         for remark in &self.remarks {
             losses.add(remark.clone());
         }
+        let mut defined: BTreeMap<String, Channel> = BTreeMap::new();
+        let mut visit = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
+            if channel.is_defined() {
+                return visit(channel, log_time_ns, message);
+            }
+            let whole = defined.entry(channel.topic.clone()).or_insert_with(|| self.defined(channel));
+            visit(whole, log_time_ns, message)
+        };
         for file in &self.files {
             if !self.has_compressed_messages {
-                mcap_file::visit(file, &mut visit, &mut losses)?;
+                visit_file(file, &mut visit, &mut losses)?;
                 continue;
             }
             let mut faulty = 0_u64;
-            let decompressed = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
+            let mut decompressed = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
                 let whole = decompress("zstd", message);
                 if whole.fault.is_some() {
                     faulty += 1;
@@ -90,30 +105,49 @@ impl Bag {
                 }
                 visit(channel, log_time_ns, &whole.bytes)
             };
-            mcap_file::visit(file, decompressed, &mut losses)?;
+            visit_file(file, &mut decompressed, &mut losses)?;
             if faulty > 0 {
                 losses.add(format!("{}: {faulty} messages could not be decompressed", file.display()));
             }
         }
         Ok(losses)
     }
+
+    /// A channel with the definition that its bag does not have, where that is known.
+    fn defined(&self, channel: &Channel) -> Channel {
+        match self.known_types.definition(&channel.type_name) {
+            Some(definition) => Channel { definition, schema_encoding: "ros2msg".to_owned(), ..channel.clone() },
+            None => channel.clone(),
+        }
+    }
+}
+
+/// What visits messages: channel, time of receipt in nanoseconds, bytes.
+type Visit<'v> = &'v mut dyn FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>;
+
+fn visit_file(file: &Path, visit: Visit<'_>, losses: &mut Losses) -> Result<(), RosBagError> {
+    #[cfg(feature = "db3")]
+    if crate::sqlite_file::is_sqlite(file) {
+        return crate::sqlite_file::visit(file, visit, losses);
+    }
+    mcap_file::visit(file, visit, losses)
 }
 
 fn no_bag(path: &Path, why: &str) -> RosBagError {
     RosBagError::NoBag { path: path.to_owned(), why: why.to_owned() }
 }
 
-/// The MCAP files of a folder, `bag_2.mcap` before `bag_10.mcap`.
+/// The files of a folder, `bag_2.mcap` before `bag_10.mcap`.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, RosBagError> {
     let io = |source| RosBagError::Io { path: folder.to_owned(), source };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.ends_with(".db3") {
+        if name.ends_with(".db3") && cfg!(not(feature = "db3")) {
             return Err(RosBagError::Sqlite { path: folder.to_owned() });
         }
-        if name.ends_with(".mcap") || name.ends_with(".mcap.zstd") {
+        if [".mcap", ".mcap.zstd", ".db3"].iter().any(|end| name.ends_with(end)) {
             files.push(path);
         }
     }
@@ -168,10 +202,10 @@ mod tests {
     #[test]
     fn a_folder_without_metadata_is_its_files_in_order() {
         let folder = folder(&[("a_10.mcap", ""), ("a_2.mcap", ""), ("notes.txt", "")]);
-        let bag = Bag::open(folder.path()).expect("a bag");
+        let bag = Bag::open(folder.path(), &[]).expect("a bag");
         let names: Vec<_> = bag.files.iter().map(|file| file.file_name().unwrap_or_default().to_owned()).collect();
         assert_eq!(names, ["a_2.mcap", "a_10.mcap"]);
-        assert!(bag.remarks[0].contains("its 2 .mcap files were read as one bag"), "{:?}", bag.remarks);
+        assert!(bag.remarks[0].contains("its 2 files were read as one bag"), "{:?}", bag.remarks);
     }
 
     #[test]
@@ -184,11 +218,12 @@ mod tests {
         };
         let of = |text: &str| {
             let folder = folder(&[("metadata.yaml", text), ("a.mcap", "")]);
-            Bag::open(folder.path()).map(|bag| (bag.files.len(), bag.remarks.len(), bag.has_compressed_messages))
+            Bag::open(folder.path(), &[]).map(|bag| (bag.files.len(), bag.remarks.len(), bag.has_compressed_messages))
         };
         assert_eq!(of(&yaml("mcap", "MESSAGE")).expect("a bag"), (1, 1, true));
         assert_eq!(of(&yaml("mcap", "FILE")).expect("a bag"), (1, 1, false));
-        assert!(matches!(of(&yaml("sqlite3", "")), Err(RosBagError::Sqlite { .. })));
+        let of_sqlite = of(&yaml("sqlite3", ""));
+        assert_eq!(matches!(of_sqlite, Err(RosBagError::Sqlite { .. })), cfg!(not(feature = "db3")), "{of_sqlite:?}");
         for wrong in ["", "a: [", "rosbag2_bagfile_information: 3", "- 1"] {
             assert!(matches!(of(wrong), Err(RosBagError::Metadata { .. })), "{wrong}");
         }

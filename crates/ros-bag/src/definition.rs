@@ -94,10 +94,22 @@ impl Definitions {
         }
         Ok(Self { root, types })
     }
+
+    /// Full names of the types of a type's own fields; an error says what is wrong in which line.
+    pub(crate) fn fields_of(name: &str, text: &str) -> Result<Vec<String>, String> {
+        let mut names = Vec::new();
+        for (number, line) in (1..).zip(text.lines()) {
+            let found = field(line.trim(), name).map_err(|why| format!("line {number}: {why}"))?;
+            if let Some(Field { kind: Kind::Nested(inside), .. }) = found {
+                names.push(inside);
+            }
+        }
+        Ok(names)
+    }
 }
 
 /// `package/Type`, however it is written: with `msg` in between, or without the package inside of one.
-fn full_name(name: &str, inside: &str) -> String {
+pub(crate) fn full_name(name: &str, inside: &str) -> String {
     let parts: Vec<&str> = name.split('/').collect();
     match parts[..] {
         [package, _, name] => format!("{package}/{name}"),

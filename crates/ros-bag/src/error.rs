@@ -30,9 +30,17 @@ pub enum RosBagError {
         /// What is wrong.
         why: String,
     },
-    /// A bag in SQLite.
+    /// A file given for a type's definition.
+    #[error("--msg {file}: {why}")]
+    DefinitionFile {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and what to do.
+        why: String,
+    },
+    /// A bag in SQLite, in a build that reads none.
     #[error(
-        "{path}: a bag in SQLite; only MCAP is read; convert it: write \"output_bags: [{{uri: converted, storage_id: mcap, all: true}}]\" into to-mcap.yaml, then `ros2 bag convert -i {} -o to-mcap.yaml`, and import converted",
+        "{path}: a bag in SQLite, which this build does not read. Build with the feature db3 (cargo install --path . --locked --features db3; it needs a C compiler), or convert the bag: write \"output_bags: [{{uri: converted, storage_id: mcap, all: true}}]\" into to-mcap.yaml, then `ros2 bag convert -i {} -o to-mcap.yaml`, and import converted",
         path.display()
     )]
     Sqlite {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dataset::import::csv::{Rates, RobotGiven};
 use dataset::{
@@ -48,6 +48,9 @@ pub struct Options {
     pub fields: WheelFields,
     /// Parent and child frame of the poses, in a topic of transforms.
     pub truth_frames: Option<(String, String)>,
+    /// Files that define types which the bag itself does not: `…/PACKAGE/msg/TYPE.msg`, or `PACKAGE/TYPE=FILE`.
+    /// Usual types are known.
+    pub definitions: Vec<PathBuf>,
     /// What a speed holds for.
     pub rates: Option<Rates>,
     /// Runs are cut at standstills and gaps that are longer, seconds.
@@ -99,7 +102,7 @@ pub struct FromBag {
 /// # Errors
 /// [`RosBagError`] of the first fault; what could not be read of a damaged bag is a warning.
 pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
-    let bag = Bag::open(path)?;
+    let bag = Bag::open(path, &options.definitions)?;
     let survey = Survey::of(&bag)?;
     let wheels = match &options.wheels {
         Some(topics) => match WheelPair::parse(&survey, topics, options.fields.quantity)? {

@@ -1,7 +1,7 @@
 //! Bags of ROS 2 as datasets.
 //!
 //! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
-//! `resync`) → `definition` and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two
+//! `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr` messages (`value`) → `topics` what the bag holds → `choice` which two
 //! topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic) and `truth` → `clock` their
 //! times → `import` the dataset. `listing` shows the topics. `recorder` writes a dataset's runs as a bag,
 //! of `messages` by `cdr_writer`.
@@ -15,12 +15,15 @@ mod decompress;
 mod definition;
 mod error;
 mod import;
+mod known_types;
 mod listing;
 mod mcap_file;
 mod messages;
 mod recorder;
 mod resync;
 mod rows;
+#[cfg(feature = "db3")]
+mod sqlite_file;
 mod topics;
 mod truth;
 mod value;

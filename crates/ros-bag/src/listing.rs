@@ -1,6 +1,6 @@
 //! What `--list` shows.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -52,12 +52,12 @@ pub struct Listing {
     pub warnings: Vec<String>,
 }
 
-/// Lists a bag's topics.
+/// Lists a bag's topics; `definitions` are files of types that it does not define ([`crate::Options`]).
 ///
 /// # Errors
 /// [`RosBagError`] where there is no bag, or not one message in it.
-pub fn list(path: &Path) -> Result<Listing, RosBagError> {
-    let survey = Survey::of(&Bag::open(path)?)?;
+pub fn list(path: &Path, definitions: &[PathBuf]) -> Result<Listing, RosBagError> {
+    let survey = Survey::of(&Bag::open(path, definitions)?)?;
     let (mut wheels, mut truth) = (suggested(&survey, wheels_rank), suggested(&survey, truth_rank));
     let mut flags = Vec::new();
     if wheels.is_none()

@@ -29,6 +29,13 @@ pub(crate) struct Channel {
     pub(crate) definition: String,
 }
 
+impl Channel {
+    /// Whether the file says how its messages are to be read, in a language that is read here.
+    pub(crate) fn is_defined(&self) -> bool {
+        self.schema_encoding == "ros2msg" && !self.definition.trim().is_empty()
+    }
+}
+
 /// What could not be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Losses {

@@ -1,7 +1,4 @@
-//! The messages that are written: their definitions in full, and their fields in that order.
-//!
-//! Definitions are those of common_interfaces and geometry2 (ROS 2 Humble to Rolling, in which they are the
-//! same), without comments.
+//! The messages that are written: their fields in the order of their definitions (`known_types.rs`).
 
 use kinematics::{Pose, Wheels, sin_cos};
 
@@ -14,87 +11,11 @@ const UNMEASURED_VARIANCE: f64 = 1e6;
 /// Names of the wheels' joints.
 pub(crate) const JOINTS: Wheels<&str> = Wheels { left: "wheel_left_joint", right: "wheel_right_joint" };
 
-/// A type with its own fields and the types inside, in the order in which they are met.
-pub(crate) struct MessageType {
-    pub(crate) name: &'static str,
-    fields: &'static str,
-    inside: &'static [&'static str],
-}
-
-pub(crate) const POSE_STAMPED: MessageType = MessageType {
-    name: "geometry_msgs/msg/PoseStamped",
-    fields: "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
-    inside: &["geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"],
-};
-
-pub(crate) const ODOMETRY: MessageType = MessageType {
-    name: "nav_msgs/msg/Odometry",
-    fields: "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n\
-             geometry_msgs/TwistWithCovariance twist\n",
-    inside: &[
-        "geometry_msgs/PoseWithCovariance",
-        "geometry_msgs/Pose",
-        "geometry_msgs/Point",
-        "geometry_msgs/Quaternion",
-        "geometry_msgs/TwistWithCovariance",
-        "geometry_msgs/Twist",
-        "geometry_msgs/Vector3",
-    ],
-};
-
-pub(crate) const PATH: MessageType = MessageType {
-    name: "nav_msgs/msg/Path",
-    fields: "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n",
-    inside: &["geometry_msgs/PoseStamped", "geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"],
-};
-
-pub(crate) const TF_MESSAGE: MessageType = MessageType {
-    name: "tf2_msgs/msg/TFMessage",
-    fields: "geometry_msgs/TransformStamped[] transforms\n",
-    inside: &[
-        "geometry_msgs/TransformStamped",
-        "geometry_msgs/Transform",
-        "geometry_msgs/Vector3",
-        "geometry_msgs/Quaternion",
-    ],
-};
-
-pub(crate) const JOINT_STATE: MessageType = MessageType {
-    name: "sensor_msgs/msg/JointState",
-    fields: "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
-    inside: &[],
-};
-
-/// Fields of the types that stand inside of others.
-const PARTS: [(&str, &str); 12] = [
-    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
-    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
-    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
-    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
-    ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"),
-    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"),
-    ("geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n"),
-    ("geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"),
-    ("geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"),
-    ("geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"),
-    ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"),
-    (
-        "geometry_msgs/TransformStamped",
-        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
-    ),
-];
-
-impl MessageType {
-    /// The definition as a schema holds it: every type once.
-    pub(crate) fn definition(&self) -> String {
-        let mut text = self.fields.to_owned();
-        for part in self.inside.iter().chain(&["std_msgs/Header", "builtin_interfaces/Time"]) {
-            let fields = PARTS.iter().find(|(name, _)| name == part).map_or("", |(_, fields)| fields);
-            text += &format!("{}\nMSG: {part}\n{fields}", "=".repeat(80));
-        }
-        text
-    }
-}
+pub(crate) const POSE_STAMPED: &str = "geometry_msgs/msg/PoseStamped";
+pub(crate) const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+pub(crate) const PATH: &str = "nav_msgs/msg/Path";
+pub(crate) const TF_MESSAGE: &str = "tf2_msgs/msg/TFMessage";
+pub(crate) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
 
 /// When and in which frame.
 #[derive(Debug, Clone, Copy)]
@@ -216,11 +137,13 @@ mod tests {
     use super::*;
     use crate::cdr::decode;
     use crate::definition::Definitions;
+    use crate::known_types::KnownTypes;
     use crate::value::Value;
     use std::f64::consts::FRAC_PI_2;
 
-    fn read(of: &MessageType, bytes: &[u8]) -> Value {
-        let definitions = Definitions::parse(of.name, &of.definition()).expect("a definition");
+    fn read(name: &str, bytes: &[u8]) -> Value {
+        let text = KnownTypes::default().definition(name).expect("known");
+        let definitions = Definitions::parse(name, &text).expect("a definition");
         decode(&definitions, bytes).expect("a message")
     }
 
@@ -229,49 +152,33 @@ mod tests {
     #[test]
     fn every_message_is_what_its_definition_says() {
         let pose = Pose::new(1.0, -2.0, FRAC_PI_2);
-        let value = read(&POSE_STAMPED, &pose_stamped(HEADER, pose));
+        let value = read(POSE_STAMPED, &pose_stamped(HEADER, pose));
         assert_eq!((value.integer("header.stamp.sec"), value.integer("header.stamp.nanosec")), (Some(5), Some(7)));
         assert_eq!((value.text("header.frame_id"), value.number("pose.position.y")), (Some("map"), Some(-2.0)));
         // sin 45°, to a rounding.
         assert!((value.number("pose.orientation.z").expect("a part") - 0.5_f64.sqrt()).abs() < 1e-15);
 
-        let value = read(&PATH, &path(HEADER, &[(6, Pose::IDENTITY), (8, pose)]));
+        let value = read(PATH, &path(HEADER, &[(6, Pose::IDENTITY), (8, pose)]));
         assert_eq!(value.integer("poses[1].header.stamp.nanosec"), Some(8));
         assert_eq!(value.number("poses[1].pose.position.x"), Some(1.0));
 
-        let value = read(&TF_MESSAGE, &transform(HEADER, "base", pose));
+        let value = read(TF_MESSAGE, &transform(HEADER, "base", pose));
         assert_eq!(value.text("transforms[0].child_frame_id"), Some("base"));
         assert_eq!(value.number("transforms[0].transform.translation.y"), Some(-2.0));
 
         let twist = BodyTwist { speed_m_s: 0.5, yaw_rate_rad_s: -0.25 };
         let covariance = [1.0, 2.0, 3.0, 2.0, 5.0, 6.0, 3.0, 6.0, 9.0];
-        let value = read(&ODOMETRY, &odometry(HEADER, "base", pose, Some(covariance), twist));
+        let value = read(ODOMETRY, &odometry(HEADER, "base", pose, Some(covariance), twist));
         let at = |index: usize| value.number(&format!("pose.covariance[{index}]"));
         assert_eq!([0, 1, 5, 6, 7, 11, 30, 31, 35].map(at), covariance.map(Some));
         assert_eq!([14, 21, 28, 2].map(at), [Some(1e6), Some(1e6), Some(1e6), Some(0.0)]);
         assert_eq!(value.number("twist.twist.linear.x"), Some(0.5));
         assert_eq!(value.number("twist.twist.angular.z"), Some(-0.25));
-        let unknown = read(&ODOMETRY, &odometry(HEADER, "base", pose, None, twist));
+        let unknown = read(ODOMETRY, &odometry(HEADER, "base", pose, None, twist));
         assert_eq!(unknown.number("pose.covariance[35]"), Some(0.0));
 
-        let value = read(&JOINT_STATE, &joint_state(HEADER, Some(Wheels { left: 3.0, right: 4.0 }), None));
+        let value = read(JOINT_STATE, &joint_state(HEADER, Some(Wheels { left: 3.0, right: 4.0 }), None));
         assert_eq!((value.text("name[1]"), value.number("position[1]")), (Some(JOINTS.right), Some(4.0)));
         assert_eq!((value.list("velocity").len(), value.list("effort").len()), (0, 0));
-    }
-
-    #[test]
-    fn a_definition_holds_every_type_inside_once() {
-        for of in [POSE_STAMPED, ODOMETRY, PATH, TF_MESSAGE, JOINT_STATE] {
-            let text = of.definition();
-            let mut types: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("MSG: ")).collect();
-            let all = types.len();
-            types.sort_unstable();
-            types.dedup();
-            assert_eq!(types.len(), all, "{}", of.name);
-            for line in text.lines().filter(|line| line.contains('/') && !line.starts_with("MSG: ")) {
-                let (used, _) = line.split_once([' ', '[']).expect("a type and a name");
-                assert!(types.contains(&used), "{}: {used} is not defined", of.name);
-            }
-        }
     }
 }

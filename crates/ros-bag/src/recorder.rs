@@ -14,7 +14,8 @@ use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 
-use crate::messages::{self, BodyTwist, Header, JOINT_STATE, MessageType, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
+use crate::known_types::KnownTypes;
+use crate::messages::{self, BodyTwist, Header, JOINT_STATE, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
 
 /// Stamp of the first row, seconds. A stamp of zero is none in ROS.
 pub const FIRST_STAMP_S: i64 = 1;
@@ -146,15 +147,16 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// The place of a topic, which is made where it is new.
-    fn channel(&mut self, topic: &str, of: &MessageType) -> Result<usize, McapError> {
+    fn channel(&mut self, topic: &str, type_name: &'static str) -> Result<usize, McapError> {
         if let Some(index) = self.topics.iter().position(|(_, known)| known.topic == topic) {
             return Ok(index);
         }
-        let schema = self.writer.add_schema(of.name, "ros2msg", of.definition().as_bytes())?;
+        let definition = KnownTypes::default().definition(type_name).unwrap_or_default();
+        let schema = self.writer.add_schema(type_name, "ros2msg", definition.as_bytes())?;
         // Recorders of ROS note the quality of service; none was asked for here.
         let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
         let id = self.writer.add_channel(schema, topic, "cdr", &metadata)?;
-        self.topics.push((id, RecordedTopic { topic: topic.to_owned(), type_name: of.name, messages: 0 }));
+        self.topics.push((id, RecordedTopic { topic: topic.to_owned(), type_name, messages: 0 }));
         Ok(self.topics.len() - 1)
     }
 
@@ -172,8 +174,8 @@ impl<W: Write + Seek> Recorder<W> {
         };
         let poses: Vec<(i64, Pose)> = truth.iter().filter_map(pose).collect();
         let Some((first_ns, _)) = poses.first() else { return Ok(()) };
-        let (stamped, transforms) = (self.channel("/truth", &POSE_STAMPED)?, self.channel("/tf", &TF_MESSAGE)?);
-        let whole = self.channel("/path/truth", &PATH)?;
+        let (stamped, transforms) = (self.channel("/truth", POSE_STAMPED)?, self.channel("/tf", TF_MESSAGE)?);
+        let whole = self.channel("/path/truth", PATH)?;
         for (stamp_ns, pose) in &poses {
             let (stamp_ns, header) = (*stamp_ns, Header { stamp_ns: *stamp_ns, frame: WORLD_FRAME });
             waiting.push(Waiting { stamp_ns, channel: stamped, bytes: messages::pose_stamped(header, *pose) });
@@ -192,7 +194,7 @@ impl<W: Write + Seek> Recorder<W> {
         waiting: &mut Vec<Waiting>,
     ) -> Result<(), McapError> {
         let Some(wheels) = &run.wheels else { return Ok(()) };
-        let channel = self.channel("/joint_states", &JOINT_STATE)?;
+        let channel = self.channel("/joint_states", JOINT_STATE)?;
         let at = |both: &Wheels<Vec<f64>>, row: usize| Wheels { left: both.left[row], right: both.right[row] };
         for (row, t_s) in run.rows_s.iter().enumerate() {
             let stamp_ns = stamp_ns(*t_s);
@@ -213,9 +215,9 @@ impl<W: Write + Seek> Recorder<W> {
         waiting: &mut Vec<Waiting>,
     ) -> Result<(), McapError> {
         let Some((first_s, _)) = path.poses.first() else { return Ok(()) };
-        let odometry = self.channel(&format!("/odom/{}", path.name), &ODOMETRY)?;
-        let transforms = self.channel("/tf", &TF_MESSAGE)?;
-        let whole = self.channel(&format!("/path/{}", path.name), &PATH)?;
+        let odometry = self.channel(&format!("/odom/{}", path.name), ODOMETRY)?;
+        let transforms = self.channel("/tf", TF_MESSAGE)?;
+        let whole = self.channel(&format!("/path/{}", path.name), PATH)?;
         let child = format!("{BODY_FRAME}{}", path.name);
         let poses: Vec<(i64, Pose)> = path.poses.iter().map(|(t_s, pose)| (stamp_ns(*t_s), *pose)).collect();
         for (row, (stamp_ns, pose)) in poses.iter().enumerate() {

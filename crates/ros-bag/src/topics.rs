@@ -125,6 +125,10 @@ pub(crate) fn definitions(channel: &Channel) -> Result<Definitions, RosBagError>
     match (&channel.message_encoding[..], &channel.schema_encoding[..]) {
         ("cdr", "ros2msg") => Definitions::parse(&channel.type_name, &channel.definition).map_err(refuse),
         (_, "ros2idl") => Err(refuse("it is defined in IDL (ros2idl), which is not read here".to_owned())),
+        ("cdr", "") => {
+            let why = "the bag does not define it; give its definition with --msg FILE, and those of the types inside";
+            Err(refuse(why.to_owned()))
+        }
         (encoding, schema) => {
             let why = format!("messages in {encoding:?} defined in {schema:?}; expected \"cdr\" and \"ros2msg\"");
             Err(refuse(why))
