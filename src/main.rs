@@ -10,6 +10,7 @@ mod diagnose;
 mod diagnosis_page;
 mod evaluate;
 mod export;
+mod html_report;
 mod import;
 mod import_csv;
 mod import_robot;

@@ -74,7 +74,12 @@ impl Chart {
     /// What a screen reader says of the picture.
     pub(crate) fn description(&self) -> String {
         let names: Vec<&str> = self.series.iter().map(|series| series.name.as_str()).collect();
-        format!("{}: {} against {}. The numbers are in the table below.", names.join(", "), self.y.text(), self.x.text())
+        format!(
+            "{}: {} against {}. The numbers are in the table below.",
+            names.join(", "),
+            self.y.text(),
+            self.x.text()
+        )
     }
 
     pub(crate) fn json(&self) -> String {

@@ -18,6 +18,6 @@ mod sketch;
 
 pub use chart::{Axis, Chart, Mark, Series};
 pub use error::PageError;
-pub use path_picture::{MAX_DRAWN_RUNS, PathPicture, PathRun, POINT_BUDGET};
+pub use path_picture::{MAX_DRAWN_RUNS, POINT_BUDGET, PathPicture, PathRun};
 pub use report::{Block, Cell, MadeBy, Report, Role, Section, Table, Tile, Tone};
 pub use sketch::{Manoeuvre, Sketch};

@@ -54,7 +54,11 @@ impl PathPicture {
     /// What a screen reader says of the picture.
     pub(crate) fn description(&self) -> String {
         let names: Vec<&str> = self.tracks.iter().map(|(name, _)| name.as_str()).collect();
-        format!("Paths of {} runs seen from above: {}. Their ends are in the table below.", self.runs.len(), names.join(", "))
+        format!(
+            "Paths of {} runs seen from above: {}. Their ends are in the table below.",
+            self.runs.len(),
+            names.join(", ")
+        )
     }
 
     pub(crate) fn drawn(&self) -> DrawnPaths {
@@ -149,7 +153,11 @@ mod tests {
         let track = |shift: f64| {
             (0..points).map(|k| [f64::from(k as u32) * 1e-3, shift + (f64::from(k as u32) * 1e-2).sin()]).collect()
         };
-        let run = |number: usize| PathRun { name: format!("run-{number}"), tracks: vec![track(0.0), track(0.01)], marks: vec![] };
+        let run = |number: usize| PathRun {
+            name: format!("run-{number}"),
+            tracks: vec![track(0.0), track(0.01)],
+            marks: vec![],
+        };
         PathPicture {
             title: "paths".to_owned(),
             caption: String::new(),
@@ -177,7 +185,11 @@ mod tests {
     #[test]
     fn many_runs_and_points_stay_small_and_the_page_says_what_is_left_out() {
         let drawn = picture(MAX_DRAWN_RUNS + 100, 100).drawn();
-        assert!(drawn.share.contains("of 50000 instants") && drawn.share.contains("400 of 500 runs"), "{}", drawn.share);
+        assert!(
+            drawn.share.contains("of 50000 instants") && drawn.share.contains("400 of 500 runs"),
+            "{}",
+            drawn.share
+        );
         // Four numbers an instant, of at most eight characters each.
         assert!(drawn.json.len() < 4 * 8 * POINT_BUDGET + 100 * MAX_DRAWN_RUNS, "{}", drawn.json.len());
     }
