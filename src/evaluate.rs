@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
 use crate::check;
+use crate::html_report::EvaluationPage;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
@@ -28,6 +29,9 @@ pub(crate) struct Arguments {
     /// Print a row for every run.
     #[arg(long)]
     runs: bool,
+    /// Folder for report.html: the path and the drift of every run. A report.html there is replaced.
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -58,6 +62,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         show_runs(&calibrations, terminal)?;
     }
     warn_of_worse(&calibrations, terminal);
+    if let Some(out) = &arguments.out_dir {
+        let datasets = read_quietly(&paths)?;
+        EvaluationPage { calibrations: &found, datasets: &datasets }.write(out)?;
+        terminal.remark(&format!("report.html in {}", out.display()));
+    }
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
     terminal.document(&Document { dataset: Names::of(names), calibrations })?;
@@ -155,14 +164,19 @@ fn check_small(paths: &[PathBuf], terminal: &Terminal) {
     if paths.iter().map(size).sum::<u64>() > MAX_CHECKED_BYTES {
         return;
     }
-    let read = |path: &PathBuf| {
-        let mut dataset = dataset::read(path).ok()?.dataset;
-        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
-        Some(dataset)
-    };
-    if let Some(datasets) = paths.iter().map(read).collect::<Option<Vec<_>>>() {
+    if let Ok(datasets) = read_quietly(paths) {
         check::before(&datasets, terminal);
     }
+}
+
+/// Whole datasets, whose warnings were passed on before.
+fn read_quietly(paths: &[PathBuf]) -> Result<Vec<dataset::Dataset>, Failure> {
+    let read = |path: &PathBuf| {
+        let mut dataset = dataset::read(path)?.dataset;
+        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+        Ok(dataset)
+    };
+    paths.iter().map(read).collect()
 }
 
 /// A calibration that leaves more drift than the nominal values is of another robot, or of other runs.

@@ -256,7 +256,7 @@ fn gain_sentence(document: &Document) -> String {
             .to_owned()
     } else {
         format!(
-            "On runs that it has not seen, correcting it changes the drift too little to tell: between {low_percent:+.0} and {high_percent:+.0} % of the drift is removed (95 %)."
+            "On runs that it has not seen, correcting it changes the drift too little to tell: between {low_percent:+.0} % and {high_percent:+.0} % of it goes away (95 %)."
         )
     }
 }

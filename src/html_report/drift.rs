@@ -56,17 +56,16 @@ pub(super) fn blocks(drifts: &Drifts) -> Vec<Block> {
     blocks
 }
 
-/// How much the last of several leaves of the first's drift.
+/// The sums as the finding of the picture.
 fn title(drifts: &Drifts) -> String {
-    let percent =
-        |drift: Option<&(String, Role, CalibrationDrift)>| drift.and_then(|(_, _, drift)| drift.drift_percent);
-    let names = drifts.first().zip(drifts.last()).map(|(first, last)| (&first.0, &last.0));
-    match (percent(drifts.first()), percent(drifts.last()), names) {
-        (Some(first), Some(last), Some((from, to))) if drifts.len() > 1 => {
-            format!("On these runs the drift is {first:.3} % of the distance as {from} and {last:.3} % as {to}")
-        }
-        (Some(first), _, _) => format!("On these runs the drift is {first:.3} % of the distance"),
-        _ => "Where runs end against the truth".to_owned(),
+    let percent = |(name, _, drift): &(String, Role, CalibrationDrift)| {
+        drift.drift_percent.map(|percent| format!("{percent:.3} % {name}"))
+    };
+    let known: Vec<String> = drifts.iter().filter_map(percent).collect();
+    if known.is_empty() {
+        "Where runs end against the truth".to_owned()
+    } else {
+        format!("Drift on these runs, of the distance: {}", known.join(", "))
     }
 }
 

@@ -1,6 +1,7 @@
 //! report.html: what was found, as one page that loads nothing. Here results become sections; the crate
 //! `report-page` makes the page of them.
 
+mod calibration;
 mod diagnosis;
 mod diagnosis_details;
 mod drift;
@@ -9,8 +10,9 @@ mod paths;
 mod residuals;
 mod words;
 
+pub(crate) use calibration::{CalibrationPage, EvaluationPage, write_comparison};
 pub(crate) use diagnosis::DiagnosisPage;
-pub(crate) use paths::{Under, UnderCalibrations};
+use paths::{Under, UnderCalibrations};
 
 use std::path::Path;
 
@@ -23,8 +25,9 @@ use crate::terminal::Failure;
 /// The file's name in every folder.
 const FILE: &str = "report.html";
 
-/// Writes the page into a folder.
-pub(crate) fn write(report: &Report, out: &Path) -> Result<(), Failure> {
+/// Writes the page into a folder, which is made where it is not there.
+fn write(report: &Report, out: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
     write_whole(&out.join(FILE), report.render()?.as_bytes())
 }
 

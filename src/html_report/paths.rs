@@ -114,7 +114,8 @@ fn path_run(name: &str, under: &[Option<&RunPath>]) -> Option<PathRun> {
     let position = |pose: &Pose| [pose.x_m, pose.y_m];
     let dense = last.measured.len() * MAX_ROWS_PER_MEASUREMENT >= last.rows.len();
     let usable = |path: &&RunPath| path.at_measured.len() == last.measured.len();
-    let everywhere = |at: &usize| under.iter().flatten().filter(|path| usable(path)).all(|path| path.at_measured[*at].is_some());
+    let everywhere =
+        |at: &usize| under.iter().flatten().filter(|path| usable(path)).all(|path| path.at_measured[*at].is_some());
     let instants: Vec<usize> = (0..last.measured.len()).filter(everywhere).collect();
     if dense && instants.len() > 1 {
         let measured = instants.iter().map(|at| position(&last.measured[*at])).collect();

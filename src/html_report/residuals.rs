@@ -64,7 +64,7 @@ fn chart(against: &ResidualsByCovariate, component: &Component, extended: bool) 
             let explained = before.bins.iter().zip(&after.bins).map(|(b, a)| Some(1e3 * (b.mean - a.mean)));
             series.push(Series {
                 name: "what was found explains".to_owned(),
-                role: Role::Nominal,
+                role: Role::Explained,
                 mark: Mark::Line,
                 values: explained.collect(),
                 half_widths: Vec::new(),

@@ -32,8 +32,8 @@ function niceStep(span, count) {
   return [1, 2, 5, 10].map((by) => by * power).find((step) => step >= rough);
 }
 
-const DASHES = { truth: [], nominal: [9, 5], calibrated: [2, 4], extended: [] };
-const WIDTHS = { truth: 5, nominal: 2, calibrated: 2.4, extended: 2 };
+const DASHES = { truth: [], nominal: [9, 5], calibrated: [2, 4], extended: [], explained: [6, 3] };
+const WIDTHS = { truth: 5, nominal: 2, calibrated: 2.4, extended: 2, explained: 1.5 };
 /* Times the view of all paths. */
 const MOST_ZOOM = 200, LEAST_ZOOM = 0.5;
 /* So many runs are drawn at first: those at the front of the list. */

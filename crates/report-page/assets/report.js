@@ -66,10 +66,11 @@ function chartPicture(figure, data) {
   /* Bars and bands are to be seen whole, and zero with them. */
   const range = (u) => {
     let low = 0, high = 0;
+    const [from, to] = u.series[0].idxs || [0, data.at.length - 1];
     data.series.forEach((series, n) => {
       if (!u.series[n + 1].show) return;
       series.values.forEach((value, k) => {
-        if (value === null || data.at[k] < u.scales.x.min || data.at[k] > u.scales.x.max) return;
+        if (value === null || k < from || k > to) return;
         const half = series.half ? series.half[k] || 0 : 0;
         low = Math.min(low, value - half);
         high = Math.max(high, value + half);
@@ -93,6 +94,7 @@ function chartPicture(figure, data) {
         y: { range },
       },
       legend: { show: false },
+      padding: data.names ? [8, 64, 0, 0] : [8, 12, 0, 0],
       cursor: { points: { show: false }, y: false, drag: { x: true, y: false } },
       axes: [
         { ...axis, label: data.x, ...(data.names ? { values: names, rotate: -50, size: 74, space: 22 } : {}) },

@@ -224,6 +224,8 @@ pub enum Role {
     Calibrated,
     /// The calibrated geometry with what was found.
     Extended,
+    /// What a model says that measurements follow.
+    Explained,
 }
 
 impl Role {
@@ -234,6 +236,7 @@ impl Role {
             Self::Nominal => "nominal",
             Self::Calibrated => "calibrated",
             Self::Extended => "extended",
+            Self::Explained => "explained",
         }
     }
 }
