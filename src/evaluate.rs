@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     warn_of_worse(&calibrations, terminal);
     if let Some(out) = &arguments.out_dir {
-        let datasets = read_quietly(&paths)?;
+        let datasets = if bytes(&paths) > MAX_DRAWN_BYTES { Vec::new() } else { read_quietly(&paths)? };
         EvaluationPage { calibrations: &found, datasets: &datasets }.write(out)?;
         terminal.remark(&format!("report.html in {}", out.display()));
     }
@@ -154,14 +154,22 @@ fn evaluate(
 /// Datasets of at most so many bytes are read twice: once to be checked.
 const MAX_CHECKED_BYTES: u64 = 64 << 20;
 
-/// Passes on what is wrong with datasets that are not large; what cannot be read is told by whoever
-/// evaluates it.
-fn check_small(paths: &[PathBuf], terminal: &Terminal) {
+/// Datasets of at most so many bytes are held as a whole for the picture of their paths: twice as much memory.
+const MAX_DRAWN_BYTES: u64 = 512 << 20;
+
+/// Size of the datasets' tables.
+fn bytes(paths: &[PathBuf]) -> u64 {
     let size = |path: &PathBuf| {
         let of = |file| std::fs::metadata(path.join(file)).map_or(0, |metadata| metadata.len());
         of("odometry.csv") + of("truth.csv")
     };
-    if paths.iter().map(size).sum::<u64>() > MAX_CHECKED_BYTES {
+    paths.iter().map(size).sum()
+}
+
+/// Passes on what is wrong with datasets that are not large; what cannot be read is told by whoever
+/// evaluates it.
+fn check_small(paths: &[PathBuf], terminal: &Terminal) {
+    if bytes(paths) > MAX_CHECKED_BYTES {
         return;
     }
     if let Ok(datasets) = read_quietly(paths) {

@@ -102,7 +102,18 @@ impl DiagnosisPage<'_> {
                     if further > 0 { format!("; and {}", count(further, "further finding")) } else { String::new() };
                 let sure = format!("{:.0} % sure{further}", 100.0 * first.probability);
                 tiles.push(tile("Cause", cause(first), sure, "finding"));
-                tiles.push(tile("Size", size(first), "± is one standard deviation".to_owned(), "finding"));
+                let size = size(first).map_or_else(
+                    || {
+                        tile(
+                            "Size",
+                            "Has no size".to_owned(),
+                            format!("z = {:.1}: how far from an accident", first.z),
+                            "finding",
+                        )
+                    },
+                    |size| tile("Size", size, "± is one standard deviation".to_owned(), "finding"),
+                );
+                tiles.push(size);
                 let (value, note) = gain_words(document);
                 tiles.push(tile("Gain on runs it has not seen", value, note, "drift"));
             }
@@ -231,7 +242,7 @@ fn lead(document: &Document) -> String {
             "Every cause that these motions excite would have shown at a size that is large for a real robot."
                 .to_owned()
         } else {
-            format!("They could not show {} of the catalogue, listed below.", count(blind, "cause"))
+            format!("These runs could not show {} of the catalogue, listed below.", count(blind, "cause"))
         };
         return format!("The calibrated model explains what was measured. {unseen}");
     }
@@ -289,21 +300,21 @@ fn cause(finding: &Finding) -> String {
     known.unwrap_or_else(|| "Something that is in no catalogue".to_owned())
 }
 
-/// How large it is.
-fn size(finding: &Finding) -> String {
+/// How large it is; `None` where nothing has a size.
+fn size(finding: &Finding) -> Option<String> {
     let whole = meaning(finding);
     let cause = effects::description(&finding.id).map_or("", |of| of.meaning);
     let own = whole.strip_prefix(cause).map(|rest| rest.trim_start_matches([':', ',', ' ']));
     if let Some(own) = own.filter(|own| !own.is_empty() && !cause.is_empty()) {
-        return capitalised(own);
+        return Some(capitalised(own));
     }
     if let Some(term) = &finding.unlisted_term {
-        return plus_minus(term.coefficient, Some(term.sigma));
+        return Some(plus_minus(term.coefficient, Some(term.sigma)));
     }
     let values = finding.parameters.iter().map(|(name, value)| {
         let unit = if value.unit == "1" { String::new() } else { format!(" {}", value.unit) };
         format!("{name} {}{unit}", plus_minus(value.value, value.sigma))
     });
     let values: Vec<String> = values.collect();
-    if values.is_empty() { format!("z = {:.1}", finding.z) } else { values.join(", ") }
+    (!values.is_empty()).then(|| values.join(", "))
 }

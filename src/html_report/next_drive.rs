@@ -30,7 +30,11 @@ pub(super) fn tile(document: &Document) -> Tile {
     let (value, note) = match &document.next_experiment {
         Some(next) => (
             capitalised(&next.drive),
-            format!("{:.1} min on {:.1} m by {:.1} m", next.minutes, next.free_x_m, next.free_y_m),
+            if next.free_x_m.max(next.free_y_m) < 0.05 {
+                format!("{:.1} min, on the spot", next.minutes)
+            } else {
+                format!("{:.1} min on {:.1} m by {:.1} m", next.minutes, next.free_x_m, next.free_y_m)
+            },
         ),
         None => {
             let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");

@@ -25,6 +25,8 @@ pub(crate) struct Under<'c> {
 pub(crate) struct UnderCalibrations {
     pub(crate) drifts: Vec<(String, Role, CalibrationDrift)>,
     pub(crate) picture: Option<PathPicture>,
+    /// The logs were too large to be held.
+    too_large: bool,
 }
 
 impl UnderCalibrations {
@@ -49,13 +51,17 @@ impl UnderCalibrations {
             runs_under.push(paths);
         }
         let picture = picture(datasets, under, &runs_under, &drifts);
-        Self { drifts, picture }
+        Self { drifts, picture, too_large: datasets.is_empty() }
     }
 
     /// The picture of the paths.
     pub(super) fn path_block(&self) -> Block {
         match &self.picture {
             Some(picture) => Block::Path(picture.clone()),
+            None if self.too_large => Block::Text(
+                "No path is drawn: these logs are too large to be held in memory as a whole. Give a few of their runs."
+                    .to_owned(),
+            ),
             None => Block::Text("No path is drawn: no run has wheels that say a motion.".to_owned()),
         }
     }
@@ -95,7 +101,7 @@ fn picture(
     }
     let any_truth = runs.iter().any(|run| !run.tracks[0].is_empty() || !run.marks.is_empty());
     let caption = if any_truth {
-        "Every run begins where it was first measured, and is then dead-reckoned. Runs stand in the order of how far they end from the truth. Millimetres on metres are hard to see: draw the deviations larger."
+        "Every run begins where it was first measured, and is then dead-reckoned. The run that ends farthest from the truth stands first in the list. Deviations of millimetres are hard to see on metres: the menu draws them larger."
     } else {
         "No pose was measured: every run begins at the origin, and nothing says which path is right."
     };

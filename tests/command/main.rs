@@ -1,5 +1,5 @@
 //! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, files
-//! for robots, campaigns that are stopped, and the gate on accuracy.
+//! for robots, pages, campaigns that are stopped, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;
@@ -10,6 +10,7 @@ mod correct;
 mod export;
 mod import_csv;
 mod import_ros2;
+mod pages;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;

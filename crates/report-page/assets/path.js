@@ -58,6 +58,7 @@ function pathPicture(figure, data) {
   };
   const runs = data.runs.map((run, k) => ({ name: run.name, on: k < RUNS_AT_FIRST, tracks: run.tracks.map(decoded), marks: decoded(run.marks) }));
   const shown = data.tracks.map(() => true);
+  const has = (k) => runs.some((run) => run.tracks[k] && run.tracks[k].length > 0);
   const truth = data.tracks.findIndex((track) => track.role === "truth");
   let magnified = 1, view = null, home = null;
 
@@ -183,13 +184,14 @@ function pathPicture(figure, data) {
     if (act && !event.ctrlKey && !event.metaKey && !event.altKey) { event.preventDefault(); act(); }
   });
 
-  const tracks = data.tracks.map((track, k) =>
-    checkbox(track.name, true, (on) => { shown[k] = on; draw(); }, "swatch " + track.role).label);
+  const isThere = (track, k) => has(k) || (k === truth && runs.some((run) => run.marks.length > 0));
+  const tracks = data.tracks.map((track, k) => (!isThere(track, k) ? "" :
+    checkbox(track.name, true, (on) => { shown[k] = on; draw(); }, "swatch " + track.role).label));
   const larger = element("select", {});
   for (const by of [1, 10, 50, 200]) larger.append(element("option", { value: by, textContent: by === 1 ? "as they are" : by + " times larger" }));
   larger.addEventListener("change", () => { magnified = Number(larger.value); reset(); });
   const buttons = [button("+", () => zoom(1.4), "Zoom in"), button("−", () => zoom(1 / 1.4), "Zoom out"), button("Reset", reset, "Show all of the paths")];
-  const magnify = truth < 0 ? [] : [element("label", {}, "Deviations from the measured path drawn", larger)];
+  const magnify = truth < 0 || !has(truth) ? [] : [element("label", {}, "Deviations from the measured path drawn", larger)];
   plot.before(element("div", { className: "controls" }, ...tracks), element("div", { className: "controls" }, ...magnify, ...buttons));
   const boxes = runs.map((run) => checkbox(run.name, run.on, (on) => { run.on = on; draw(); }));
   const all = (on) => { runs.forEach((run, k) => { run.on = on; boxes[k].box.checked = on; }); if (on) reset(); else draw(); };
