@@ -20,8 +20,8 @@ pub(crate) struct Arguments {
     /// them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Folder for report.html, report.md with its pictures, findings.json, and extended.toml, a scenario of the
-    /// robot as found.
+    /// Folder for report.html, report.md with its pictures, findings.json, and extended.toml, a scenario of
+    /// the robot as found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take an effect out of the catalogue; may be given several times.

@@ -7,16 +7,12 @@ use dataset::{Dataset, NominalRobot};
 use report_page::{Block, Cell, Report, Role, Section, Table, Tile, Tone};
 
 use super::words::{count, of_millimetres, parameters, plus_minus, to_copy};
-use super::{Under, UnderCalibrations, contents, drift, made_by, paths::run_names};
+use super::{Under, UnderCalibrations, contents, drift, made_by, paths::run_names, subject};
 use crate::calibration_file::GivenCalibration;
 use crate::terminal::Failure;
 
 /// Roles of calibrations in the order in which they were given; there are no more colours than these.
-const ROLES: [Role; 3] = [Role::Calibrated, Role::Extended, Role::Explained];
-
-fn subject(datasets: &[Dataset]) -> String {
-    datasets.iter().filter_map(|dataset| dataset.provenance.name.clone()).collect::<Vec<_>>().join(", ")
-}
+const ROLES: [Role; 3] = [Role::Calibrated, Role::ExtendedModel, Role::Explained];
 
 fn nominal<'c>() -> Under<'c> {
     Under { name: "nominal".to_owned(), role: Role::Nominal, calibration: None, model: None }

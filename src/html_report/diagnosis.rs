@@ -8,7 +8,9 @@ use dataset::Dataset;
 use report_page::{Block, Cell, Report, Role, Section, Table, Tile, Tone};
 
 use super::words::{count, parameters, plus_minus, to_copy};
-use super::{Under, UnderCalibrations, contents, diagnosis_details as details, drift, made_by, next_drive, residuals};
+use super::{
+    Under, UnderCalibrations, contents, diagnosis_details as details, drift, made_by, next_drive, residuals, subject,
+};
 use crate::diagnosis_page::words::{capitalised, meaning, named};
 use crate::terminal::Failure;
 
@@ -34,7 +36,7 @@ impl DiagnosisPage<'_> {
         if let Some(model) = model.as_ref().filter(|_| !document.findings.is_empty()) {
             let name = "extended".to_owned();
             let calibration = Some(&model.calibration);
-            under.push(Under { name, role: Role::Extended, calibration, model: Some(model) });
+            under.push(Under { name, role: Role::ExtendedModel, calibration, model: Some(model) });
         }
         let under = UnderCalibrations::of(self.datasets, &under);
         super::write(&self.report(&under, out), out)
@@ -43,10 +45,6 @@ impl DiagnosisPage<'_> {
     fn report(&self, under: &UnderCalibrations, out: &Path) -> Report {
         let Diagnosis { document, residuals: found, alternatives, .. } = self.diagnosis;
         let extended = document.gain.is_some();
-        let subject = match &document.dataset {
-            calib::Names::One(name) => name.clone(),
-            calib::Names::Several(names) => names.join(", "),
-        };
         let drift = drift::blocks(&under.drifts);
         let drift = Section { blocks: drift, ..Section::new("drift", "How far runs drift, before and after") };
         let drift = if document.findings.is_empty() || !extended {
@@ -71,7 +69,7 @@ impl DiagnosisPage<'_> {
         sections.push(details::limits(document));
         Report {
             command: "yair diagnose".to_owned(),
-            subject,
+            subject: subject(self.datasets),
             tone: match document.verdict {
                 Verdict::Consistent => Tone::Fine,
                 Verdict::Named => Tone::Found,
@@ -238,13 +236,13 @@ fn headline(document: &Document) -> String {
 fn lead(document: &Document) -> String {
     if document.findings.is_empty() {
         let blind = document.blind_to.len();
-        let unseen = if blind == 0 {
+        let unshown = if blind == 0 {
             "Every cause that these motions excite would have shown at a size that is large for a real robot."
                 .to_owned()
         } else {
             format!("These runs could not show {} of the catalogue, listed below.", count(blind, "cause"))
         };
-        return format!("The calibrated model explains what was measured. {unseen}");
+        return format!("The calibrated model explains what was measured. {unshown}");
     }
     gain_sentence(document)
 }

@@ -103,6 +103,21 @@ fn limit(blind: &Blind) -> String {
     )
 }
 
+/// Causes that would not show, with the sizes that would.
+pub(super) fn limits_table(blind: &[Blind]) -> Table {
+    let headings = ["what it is", "cause", "smallest size that would show", "why"];
+    let mut table = Table::new("Causes that may be there all the same", &headings);
+    for of in blind {
+        table.row([
+            Cell::text(meaning(&of.id)),
+            Cell::id(of.id.clone()),
+            Cell::text(limit(of)),
+            Cell::text(of.why.clone()),
+        ]);
+    }
+    table
+}
+
 /// What these data cannot show.
 pub(super) fn limits(document: &Document) -> Section {
     let section = Section::new("limits", "What these data cannot show");
@@ -112,19 +127,7 @@ pub(super) fn limits(document: &Document) -> Section {
             "Every known cause that these motions excite would have shown at a size that is large for a real robot.",
         )
     } else {
-        let mut table = Table::new(
-            "Causes that may be there all the same",
-            &["what it is", "cause", "smallest size that would show", "why"],
-        );
-        for of in blind {
-            table.row([
-                Cell::text(meaning(&of.id)),
-                Cell::id(of.id.clone()),
-                Cell::text(limit(of)),
-                Cell::text(of.why.clone()),
-            ]);
-        }
-        section.with(Block::Table(table))
+        section.with(Block::Table(limits_table(blind)))
     };
     let shown = document.sensitivity.iter().filter(|of| of.smallest_detectable.is_some());
     let shown: Vec<&Blind> = shown.filter(|of| blind.iter().all(|blind| blind.id != of.id)).collect();

@@ -2,15 +2,18 @@
 //! `report-page` makes the page of them.
 
 mod calibration;
+mod campaign;
 mod diagnosis;
 mod diagnosis_details;
 mod drift;
+mod markdown;
 mod next_drive;
 mod paths;
 mod residuals;
 mod words;
 
 pub(crate) use calibration::{CalibrationPage, EvaluationPage, write_comparison};
+pub(crate) use campaign::{write_plan, write_reproduction, write_sweep};
 pub(crate) use diagnosis::DiagnosisPage;
 use paths::{Under, UnderCalibrations};
 
@@ -44,6 +47,15 @@ fn made_by(datasets: Vec<String>) -> MadeBy {
     let arguments = std::env::args_os().skip(1).map(|argument| quoted(argument.to_string_lossy().into_owned()));
     let command_line = std::iter::once("yair".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ");
     MadeBy { version: env!("CARGO_PKG_VERSION").to_owned(), command_line, datasets }
+}
+
+/// Names of so many sessions stand on the first screen; more would fill it.
+const MAX_NAMES: usize = 3;
+
+/// What a page is about.
+fn subject(datasets: &[Dataset]) -> String {
+    let names: Vec<&str> = datasets.iter().filter_map(|dataset| dataset.provenance.name.as_deref()).collect();
+    if names.len() > MAX_NAMES { format!("{} sessions", names.len()) } else { names.join(", ") }
 }
 
 /// What is in the datasets.

@@ -7,6 +7,8 @@ use report_page::{Block, Cell, Manoeuvre, Section, Sketch, Table, Tile};
 use super::words::count;
 use crate::diagnosis_page::words::capitalised;
 
+const TITLE: &str = "What to drive next";
+
 /// What a plan drives, drawn.
 fn sketches(next: &NextExperiment) -> Vec<Sketch> {
     let of = |speed_m_s: f64, schedule: &Schedule| {
@@ -25,32 +27,60 @@ fn sketches(next: &NextExperiment) -> Vec<Sketch> {
     sessions.flat_map(|session| session.schedules.iter().map(|schedule| of(session.speed_m_s, schedule))).collect()
 }
 
+/// A side that reads 0.0 m is no side.
+const MIN_SIDE_M: f64 = 0.05;
+
+/// The floor that is needed, in words.
+fn floor(next: &NextExperiment) -> String {
+    let (longer_m, shorter_m) = (next.free_x_m.max(next.free_y_m), next.free_x_m.min(next.free_y_m));
+    if longer_m < MIN_SIDE_M {
+        "on the spot".to_owned()
+    } else if shorter_m < MIN_SIDE_M {
+        format!("along {longer_m:.1} m")
+    } else {
+        format!("on {longer_m:.1} m by {shorter_m:.1} m")
+    }
+}
+
 /// The fact of the first screen.
 pub(super) fn tile(document: &Document) -> Tile {
-    let (value, note) = match &document.next_experiment {
-        Some(next) => (
-            capitalised(&next.drive),
-            if next.free_x_m.max(next.free_y_m) < 0.05 {
-                format!("{:.1} min, on the spot", next.minutes)
-            } else {
-                format!("{:.1} min on {:.1} m by {:.1} m", next.minutes, next.free_x_m, next.free_y_m)
-            },
-        ),
+    match &document.next_experiment {
+        Some(next) => tile_of(next),
         None => {
             let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
-            ("Nothing new".to_owned(), why.to_owned())
+            with_label("Nothing new".to_owned(), why.to_owned())
         }
-    };
+    }
+}
+
+/// The same of a plan.
+pub(super) fn tile_of(next: &NextExperiment) -> Tile {
+    with_label(capitalised(&next.drive), format!("{:.1} min {}", next.minutes, floor(next)))
+}
+
+fn with_label(value: String, note: String) -> Tile {
     Tile { label: "Drive next".to_owned(), value, note, section: "next".to_owned() }
+}
+
+/// A plan in a sentence.
+pub(super) fn headline(next: &NextExperiment) -> String {
+    format!("Drive {}.", next.drive)
 }
 
 /// The section.
 pub(super) fn section(document: &Document) -> Section {
-    let section = Section::new("next", "What to drive next");
-    let Some(next) = &document.next_experiment else {
-        let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
-        return section.text(format!("No drive is proposed: {why}."));
-    };
+    match &document.next_experiment {
+        Some(next) => section_of(next),
+        None => {
+            let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
+            Section::new("next", TITLE).text(format!("No drive is proposed: {why}."))
+        }
+    }
+}
+
+/// The section of a plan.
+pub(super) fn section_of(next: &NextExperiment) -> Section {
+    let section = Section::new("next", TITLE);
     let mut predicts = Table::new("What the drive will tell", &["cause", "what it is", "what it predicts"]);
     for (id, prediction) in &next.predicts {
         let meaning = effects::description(id).map_or("not in the catalogue", |of| of.meaning);

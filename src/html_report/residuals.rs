@@ -70,7 +70,7 @@ fn chart(against: &ResidualsByCovariate, component: &Component, extended: bool) 
                 half_widths: Vec::new(),
             });
         }
-        series.push(points("after (extended)", Role::Extended, after));
+        series.push(points("after (extended)", Role::ExtendedModel, after));
     }
     Chart {
         title: title(against, component, extended),

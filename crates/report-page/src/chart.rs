@@ -4,7 +4,8 @@ use serde_json::{Value, json};
 
 use crate::embedded_json::embedded;
 use crate::numbers::shown;
-use crate::report::{Cell, Role, Table};
+use crate::role::Role;
+use crate::table::{Cell, Table};
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]

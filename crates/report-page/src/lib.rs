@@ -14,10 +14,14 @@ mod numbers;
 mod page;
 mod path_picture;
 mod report;
+mod role;
 mod sketch;
+mod table;
 
 pub use chart::{Axis, Chart, Mark, Series};
 pub use error::PageError;
 pub use path_picture::{MAX_DRAWN_RUNS, POINT_BUDGET, PathPicture, PathRun};
-pub use report::{Block, Cell, MadeBy, Report, Role, Section, Table, Tile, Tone};
+pub use report::{Block, MadeBy, Report, Section, Tile, Tone};
+pub use role::Role;
 pub use sketch::{Manoeuvre, Sketch};
+pub use table::{Cell, Table};

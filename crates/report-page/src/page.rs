@@ -8,7 +8,8 @@ use crate::chart::Chart;
 use crate::content_policy::{SCRIPTS, STYLE, policy};
 use crate::error::PageError;
 use crate::path_picture::PathPicture;
-use crate::report::{Block, Cell, Report, Table};
+use crate::report::{Block, Report};
+use crate::table::{Cell, Table};
 
 /// The largest page: what trackers of issues take as an attachment without asking.
 const MAX_BYTES: usize = 2_000_000;

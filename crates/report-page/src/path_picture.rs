@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 use crate::decimation::{Point, kept};
 use crate::embedded_json::embedded;
 use crate::numbers::shown;
-use crate::report::{Cell, Role, Table};
+use crate::role::Role;
+use crate::table::{Cell, Table};
 
 /// Instants that are drawn, over all runs: with four tracks a page takes 0.15 MB for them, and a screen has
 /// fewer pixels along a path.

@@ -4,7 +4,8 @@ use super::*;
 use crate::chart::{Axis, Mark, Series};
 use crate::content_policy::hash;
 use crate::path_picture::PathRun;
-use crate::report::{MadeBy, Role, Section, Tile, Tone};
+use crate::report::{MadeBy, Section, Tile, Tone};
+use crate::role::Role;
 use crate::sketch::{Manoeuvre, Sketch};
 
 /// What a run may be called, and a note may say.
@@ -13,7 +14,7 @@ const HOSTILE: &str = "</script><script>alert(1)</script><!-- \" onerror='x' \u{
 fn a_chart() -> Chart {
     let series = Series {
         name: HOSTILE.to_owned(),
-        role: Role::Extended,
+        role: Role::ExtendedModel,
         mark: Mark::Points,
         values: vec![Some(1.0), Some(2.0)],
         half_widths: vec![Some(0.1), Some(0.1)],
