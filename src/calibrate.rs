@@ -16,7 +16,7 @@ use estimation::Column;
 use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
 use crate::check;
-use crate::html_report::CalibrationPage;
+use crate::html_report::{CalibrationPage, refuse_file};
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
 
@@ -64,6 +64,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         refuse_other_file(out)?;
     }
+    refuse_file(arguments.out_dir.as_deref())?;
     let joint = Joint::DEFAULT.name();
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();

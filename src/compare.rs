@@ -38,6 +38,7 @@ pub(crate) struct Arguments {
 const KINDS_A_TABLE: usize = 3;
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    html_report::refuse_file(arguments.out_dir.as_deref())?;
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     crate::check::before(&datasets, terminal);

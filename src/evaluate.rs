@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
 use crate::check;
-use crate::html_report::EvaluationPage;
+use crate::html_report::{EvaluationPage, refuse_file};
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
 /// Drift of dead reckoning against the truth, under the nominal values and under each calibration.
@@ -49,6 +49,7 @@ struct Document {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    refuse_file(arguments.out_dir.as_deref())?;
     let paths = datasets_at(&arguments.datasets)?;
     let mut found = vec![None];
     for path in &arguments.calibrations {
@@ -154,7 +155,8 @@ fn evaluate(
 /// Datasets of at most so many bytes are read twice: once to be checked.
 const MAX_CHECKED_BYTES: u64 = 64 << 20;
 
-/// Datasets of at most so many bytes are held as a whole for the picture of their paths: twice as much memory.
+/// Datasets of at most so many bytes of text are held as a whole, for the picture of their paths: a machine
+/// with 4 GB of memory holds them and their paths.
 const MAX_DRAWN_BYTES: u64 = 512 << 20;
 
 /// Size of the datasets' tables.

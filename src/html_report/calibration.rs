@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use calib::{AugmentedCalibration, CalibrationReport, Comparison, KindMean, MethodReport, nominal_value};
+use calib::methods::joint::Joint;
+use calib::{AugmentedCalibration, CalibrationReport, Comparison, KindMean, Method, MethodReport, nominal_value};
 use dataset::{Dataset, NominalRobot};
 use report_page::{Block, Cell, Report, Role, Section, Table, Tile, Tone};
 
@@ -56,8 +57,11 @@ pub(crate) struct CalibrationPage<'p> {
 impl CalibrationPage<'_> {
     /// Writes report.html.
     pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
-        let calibrations: Vec<AugmentedCalibration> =
+        let mut calibrations: Vec<AugmentedCalibration> =
             self.report.calibrations().into_iter().map(AugmentedCalibration::from).collect();
+        // Of several methods the one of the first screen is drawn first.
+        let first = self.first().map(|method| method.method.as_str());
+        calibrations.sort_by_key(|of| Some(of.calibration.name.as_str()) != first);
         let mut all = vec![nominal()];
         for (calibration, role) in calibrations.iter().zip(ROLES) {
             let name = calibration.calibration.name.clone();
@@ -65,6 +69,13 @@ impl CalibrationPage<'_> {
         }
         let under = UnderCalibrations::of(self.datasets, &all);
         super::write(&self.page(&under), out)
+    }
+
+    /// The method of the first screen: the default one, or else the first that gave something.
+    fn first(&self) -> Option<&MethodReport> {
+        let mut given = self.report.methods.iter().filter(|method| method.error.is_none());
+        let default = given.clone().find(|method| method.method == Joint::DEFAULT.name());
+        default.or_else(|| given.next())
     }
 
     fn page(&self, under: &UnderCalibrations) -> Report {
@@ -75,7 +86,7 @@ impl CalibrationPage<'_> {
         let key_of = |method: &&MethodReport, keys: &[&str]| {
             keys.iter().find_map(|key| Some(((*key).to_owned(), method.parameters.get(*key)?.clone())))
         };
-        let first = self.report.methods.iter().find(|method| method.error.is_none());
+        let first = self.first();
         let known = [
             ("Left wheel", &["left_wheel_diameter_m", "left_m_per_tick"][..]),
             ("Right wheel", &["right_wheel_diameter_m", "right_m_per_tick"]),

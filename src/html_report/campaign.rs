@@ -60,6 +60,9 @@ pub(crate) fn write_sweep(result: &SweepResult, out: &Path) -> Result<(), Failur
         result.trials, result.seed
     );
     let mut page = page("yair sweep", result.scenario.clone(), headline, &lead);
+    // The same bits whatever the jobs, shards and interruptions: no command line.
+    page.made_by.command_line =
+        format!("scenario {}, seed {}, {} trials a point", result.scenario, result.seed, result.trials);
     // A sweep without an axis has no picture.
     if let Ok(svg) = std::fs::read_to_string(out.join("sweep.svg")) {
         let picture = Block::Svg(

@@ -139,7 +139,7 @@ pub(super) fn limits(document: &Document) -> Section {
     for of in shown.into_iter().filter(|of| !found(&of.id)) {
         table.row([Cell::text(meaning(&of.id)), Cell::id(of.id.clone()), Cell::text(limit(of))]);
     }
-    section.with(Block::Table(table)).text("Limits: seen with a probability of 0.9, at one false alarm in a thousand.")
+    section.with(Block::Table(table)).text("Limits: seen with a probability of 0.9, at a false-positive rate of 1e-3.")
 }
 
 /// What is closed at first.

@@ -28,6 +28,16 @@ use crate::terminal::Failure;
 /// The file's name in every folder.
 const FILE: &str = "report.html";
 
+/// Refuses what is no folder, before anything is computed.
+pub(crate) fn refuse_file(out: Option<&Path>) -> Result<(), Failure> {
+    match out.filter(|out| out.exists() && !out.is_dir()) {
+        Some(file) => {
+            Err(format!("{}: it is a file, where a folder belongs; choose another name", file.display()).into())
+        }
+        None => Ok(()),
+    }
+}
+
 /// Writes the page into a folder, which is made where it is not there.
 fn write(report: &Report, out: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;

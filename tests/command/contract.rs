@@ -372,6 +372,6 @@ fn reproduce_writes_the_page_and_its_pictures() {
     for name in ["paper.md", "paper-figure-4.svg", "paper-figure-6.png", "paper-figure-7.svg", "paper-figure-7.png"] {
         assert!(names.contains(&name.into()), "{name} in {names:?}");
     }
-    assert_eq!(names.len(), 7);
+    assert_eq!(names.len(), 8);
     assert!(refusal(at, &["reproduce", "--trials", "1"]).contains("at least 2"));
 }

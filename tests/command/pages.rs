@@ -1,10 +1,10 @@
-//! report.html of `calibrate`, `evaluate` and `compare`: where it is written, what it shows, and that names of
-//! runs stay text.
+//! report.html of `calibrate`, `evaluate` and `compare`: where it is written, what it shows, and that names
+//! of runs stay text.
 
 use std::fs;
 use std::path::Path;
 
-use crate::support::{succeed, usage, workplace};
+use crate::support::{refusal, succeed, usage, workplace};
 
 /// A metre ahead under a run whose name would run a script.
 fn hostile(at: &Path) {
@@ -31,12 +31,14 @@ fn an_evaluation_is_drawn_and_names_of_runs_stay_text() {
     hostile(at);
     succeed(at, &["evaluate", "set", "--out-dir", "page"]);
     let page = page(&at.join("page"));
-    assert!(!page.contains("<script>alert") && page.contains("&lt;script") | page.contains("&#60;script"));
+    assert!(!page.contains("<script>alert") && page.contains("&#60;script&#62;alert"));
     // 0.02 m beside after a metre.
     assert!(page.contains("2.000 %") && page.contains("yair evaluate set --out-dir page"));
     // A second time the page is replaced.
     succeed(at, &["evaluate", "set", "--out-dir", "page"]);
     assert_eq!(fs::read_dir(at.join("page")).expect("there").count(), 1);
+    let refused = refusal(at, &["evaluate", "set", "--out-dir", "set/dataset.toml"]);
+    assert!(refused.contains("set/dataset.toml: it is a file, where a folder belongs"), "{refused}");
     assert!(usage(at, &["evaluate", "set", "--out-dir"]).contains("--out-dir"));
 }
 
