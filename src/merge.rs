@@ -15,8 +15,8 @@ pub(crate) struct Arguments {
     /// The folders of all shards, in any order.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// Write report.html, sweep.json, sweep.csv, the picture and, where the shards kept them, the trials' rows
-    /// into this folder.
+    /// Write report.html, sweep.json, sweep.csv, the picture and, where the shards kept them, the trials'
+    /// rows into this folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

@@ -369,7 +369,14 @@ fn reproduce_writes_the_page_and_its_pictures() {
     assert_eq!((&found["seed"], &found["trials"]), (&Value::from(5), &Value::from(20)));
     let names: Vec<_> =
         everything_in(&at.join("paper")).iter().map(|path| path.file_name().expect("named").to_owned()).collect();
-    for name in ["paper.md", "paper-figure-4.svg", "paper-figure-6.png", "paper-figure-7.svg", "paper-figure-7.png"] {
+    for name in [
+        "report.html",
+        "paper.md",
+        "paper-figure-4.svg",
+        "paper-figure-6.png",
+        "paper-figure-7.svg",
+        "paper-figure-7.png",
+    ] {
         assert!(names.contains(&name.into()), "{name} in {names:?}");
     }
     assert_eq!(names.len(), 8);
