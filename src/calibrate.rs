@@ -16,6 +16,7 @@ use estimation::Column;
 use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
 use crate::check;
+use crate::html_report::{CalibrationPage, refuse_file};
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
 
@@ -42,6 +43,10 @@ pub(crate) struct Arguments {
     /// calibration there is replaced, any other file is kept.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Folder for report.html: the parameters, the path and the drift of every run, before and after. A
+    /// report.html there is replaced.
+    #[arg(long, value_name = "DIR", conflicts_with = "online")]
+    out_dir: Option<PathBuf>,
     /// Calibrate although `yair check` finds an error or the result cannot be the stated robot, give values
     /// that the data do not determine.
     #[arg(long)]
@@ -59,6 +64,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         refuse_other_file(out)?;
     }
+    refuse_file(arguments.out_dir.as_deref())?;
     let joint = Joint::DEFAULT.name();
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
@@ -124,6 +130,10 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         write_whole(out, report.to_toml()?.as_bytes())?;
         terminal.remark(&format!("calibration in {}", out.display()));
+    }
+    if let Some(out) = &arguments.out_dir {
+        CalibrationPage { report: &report, robot: &robot, datasets: &datasets }.write(out)?;
+        terminal.remark(&format!("report.html in {}", out.display()));
     }
     show(&report, &robot, runs, terminal)?;
     terminal.document(&report)?;

@@ -70,6 +70,14 @@ impl GivenCalibration {
         self.noise
     }
 
+    /// The extended model, where it is one.
+    pub(crate) const fn model(&self) -> Option<&ExtendedModel> {
+        match &self.given {
+            Given::Values(_) => None,
+            Given::Model(model) => Some(model),
+        }
+    }
+
     /// Whether the calibration was made from a run.
     pub(crate) fn was_trained_on(&self, run: &Run) -> bool {
         self.trained_on.iter().any(|dataset| dataset.has(run))

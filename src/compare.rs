@@ -11,6 +11,7 @@ use dataset::Session;
 use estimation::refuse_wrapped_counters;
 
 use crate::calibration_file::GivenCalibration;
+use crate::html_report;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
 /// Which calibration holds on sessions that it has not seen?
@@ -28,12 +29,16 @@ pub(crate) struct Arguments {
     /// be given several times.
     #[arg(long = "calibration", value_name = "FILE")]
     calibrations: Vec<PathBuf>,
+    /// Folder for report.html: the table of all methods and kinds of path. A report.html there is replaced.
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
 }
 
 /// Kinds of path beside each other in 100 columns.
 const KINDS_A_TABLE: usize = 3;
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    html_report::refuse_file(arguments.out_dir.as_deref())?;
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     let sessions: Vec<Session<'_>> = datasets.iter().map(dataset::Dataset::session).collect();
     crate::check::before(&datasets, terminal);
@@ -54,6 +59,10 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             lengths_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ")
         })
         .collect();
+    if let Some(out) = &arguments.out_dir {
+        html_report::write_comparison(&comparison, &datasets, out)?;
+        terminal.remark(&format!("report.html in {}", out.display()));
+    }
     show(&comparison, given.len(), terminal)?;
     if robots.len() > 1 {
         let robots: Vec<&str> = robots.iter().map(String::as_str).collect();

@@ -8,6 +8,7 @@ use clap::Args;
 
 use crate::check;
 use crate::diagnosis_page::Page;
+use crate::html_report::DiagnosisPage;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
@@ -19,8 +20,8 @@ pub(crate) struct Arguments {
     /// them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Folder for report.md with its pictures, findings.json, and extended.toml, a scenario of the robot as
-    /// found.
+    /// Folder for report.html, report.md with its pictures, findings.json, and extended.toml, a scenario of
+    /// the robot as found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take an effect out of the catalogue; may be given several times.
@@ -37,23 +38,30 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     check::before(&datasets, terminal);
-    let Diagnosis { mut document, extended, residuals, alternatives, .. } =
+    let mut diagnosis =
         ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone(), ..Options::default() })?;
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-        if let Ok(scenario) = &extended {
+        if let Ok(scenario) = &diagnosis.extended {
             let path = out.join("extended.toml");
-            write_whole(&path, [reservations(&document), scenario.to_toml()?].concat().as_bytes())?;
-            document.extended_model = Some(path.display().to_string());
+            write_whole(&path, [reservations(&diagnosis.document), scenario.to_toml()?].concat().as_bytes())?;
+            diagnosis.document.extended_model = Some(path.display().to_string());
         }
-        write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(&document)?)?;
-        Page { document: &document, residuals: &residuals, alternatives: &alternatives }.write(out)?;
-        terminal.remark(&format!("findings in {}; report.md is to be read", out.display()));
-    } else if extended.is_ok() {
-        document.extended_model_why_null = Some("it is written where --out says".to_owned());
+        let Diagnosis { document, residuals, alternatives, .. } = &diagnosis;
+        write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;
+        Page { document, residuals, alternatives }.write(out)?;
+        let page = DiagnosisPage { diagnosis: &diagnosis, datasets: &datasets, given: &arguments.datasets };
+        page.write(out)?;
+        terminal.remark(&format!(
+            "findings in {}; report.html is to be looked at, report.md has the same text",
+            out.display()
+        ));
+    } else if diagnosis.extended.is_ok() {
+        diagnosis.document.extended_model_why_null = Some("it is written where --out says".to_owned());
     }
-    show(&document, terminal)?;
-    terminal.document(&document)?;
+    let document = &diagnosis.document;
+    show(document, terminal)?;
+    terminal.document(document)?;
     Ok(ExitCode::SUCCESS)
 }
 

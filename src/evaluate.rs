@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
 use crate::check;
+use crate::html_report::{EvaluationPage, refuse_file};
 use crate::import_robot::named;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
 
@@ -71,6 +72,9 @@ pub(crate) struct Arguments {
         help_heading = "Pose errors"
     )]
     delta_tol: Option<f64>,
+    /// Folder for report.html: the path and the drift of every run. A report.html there is replaced.
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -99,6 +103,7 @@ struct Document {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    refuse_file(arguments.out_dir.as_deref())?;
     let pose_errors = match arguments.pose_errors() {
         Ok(options) => options,
         Err(why) => {
@@ -120,6 +125,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         show_runs(&calibrations, terminal)?;
     }
     warn_of_worse(&calibrations, terminal);
+    if let Some(out) = &arguments.out_dir {
+        let datasets = if bytes(&paths) > MAX_DRAWN_BYTES { Vec::new() } else { read_quietly(&paths)? };
+        EvaluationPage { calibrations: &found, datasets: &datasets }.write(out)?;
+        terminal.remark(&format!("report.html in {}", out.display()));
+    }
     let last_percent = calibrations.last().and_then(|last| last.drift_percent);
     let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
     let PoseErrorOptions { alignment, delta } = pose_errors;
@@ -204,6 +214,29 @@ fn evaluate(
         CalibrationDrift::of_runs(given.as_ref().map(|given| &given.calibration().calibration), runs)
     };
     Ok((names, calibrations.iter().zip(runs).map(of_runs).collect()))
+}
+
+/// Datasets of at most so many bytes of text are held as a whole, for the picture of their paths: a machine
+/// with 4 GB of memory holds them and their paths.
+const MAX_DRAWN_BYTES: u64 = 512 << 20;
+
+/// Size of the datasets' tables.
+fn bytes(paths: &[PathBuf]) -> u64 {
+    let size = |path: &PathBuf| {
+        let of = |file| std::fs::metadata(path.join(file)).map_or(0, |metadata| metadata.len());
+        of("odometry.csv") + of("truth.csv")
+    };
+    paths.iter().map(size).sum()
+}
+
+/// Whole datasets, whose warnings were passed on before.
+fn read_quietly(paths: &[PathBuf]) -> Result<Vec<dataset::Dataset>, Failure> {
+    let read = |path: &PathBuf| {
+        let mut dataset = dataset::read(path)?.dataset;
+        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+        Ok(dataset)
+    };
+    paths.iter().map(read).collect()
 }
 
 /// A calibration that leaves more drift than the nominal values is of another robot, or of other runs.

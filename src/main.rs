@@ -12,6 +12,7 @@ mod evaluate;
 mod export;
 mod export_mcap;
 mod help;
+mod html_report;
 mod import;
 mod import_csv;
 mod import_robot;

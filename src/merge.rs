@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use crate::html_report::write_sweep;
 use crate::sweep_table;
 use crate::terminal::{Failure, Terminal};
 
@@ -14,8 +15,8 @@ pub(crate) struct Arguments {
     /// The folders of all shards, in any order.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// Write sweep.json, sweep.csv, the picture and, where the shards kept them, the trials' rows into this
-    /// folder.
+    /// Write report.html, sweep.json, sweep.csv, the picture and, where the shards kept them, the trials'
+    /// rows into this folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -24,6 +25,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let merged = bench::merge(&arguments.shards)?;
     bench::can_be_written(&arguments.out, false)?;
     bench::write_merged(&merged, &arguments.out)?;
+    write_sweep(&merged.result, &arguments.out)?;
     sweep_table::show(&merged.result, terminal)?;
     terminal.document(&merged.result)?;
     Ok(ExitCode::SUCCESS)

@@ -8,6 +8,7 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
+use crate::html_report::write_plan;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, read_datasets, table};
 
@@ -30,8 +31,8 @@ pub(crate) struct Arguments {
     /// Take an effect out of the catalogue; may be given several times.
     #[arg(long = "without", value_name = "ID")]
     without: Vec<String>,
-    /// Folder for plan.toml, a scenario that drives the plan with the robot as it is known; one for each
-    /// speed.
+    /// Folder for report.html, and plan.toml, a scenario that drives the plan with the robot as it is known;
+    /// one for each speed.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write into a folder that is not empty.
@@ -97,6 +98,13 @@ fn of_data(
             if let Some(out) = &arguments.out {
                 let scenario = extended.map_err(|why| format!("{}: no plan.toml: {why}", out.display()))?;
                 scenarios = write_scenarios(out, &scenario, next, terminal)?;
+                let names = datasets.iter().filter_map(|dataset| dataset.provenance.name.as_deref());
+                write_plan(
+                    &names.collect::<Vec<_>>().join(", "),
+                    next,
+                    ("What the data so far could not show", &document.blind_to),
+                    out,
+                )?;
             }
         }
         None => {
@@ -124,7 +132,16 @@ fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &T
         terminal.say(&format!("will not show, though it were large: {}", blind.join(", ")))?;
     }
     let scenarios = match &arguments.out {
-        Some(out) => write_scenarios(out, &scenario, &plan.next_experiment, terminal)?,
+        Some(out) => {
+            let scenarios = write_scenarios(out, &scenario, &plan.next_experiment, terminal)?;
+            write_plan(
+                &scenario.name,
+                &plan.next_experiment,
+                ("What it will not show, though it were large", &plan.blind_to),
+                out,
+            )?;
+            scenarios
+        }
         None => Vec::new(),
     };
     terminal.document(&OfScenario { plan, scenarios })?;

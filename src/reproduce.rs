@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use paper_reproduction as paper;
 
+use crate::html_report::write_reproduction;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal};
 
@@ -19,7 +20,7 @@ pub(crate) struct Arguments {
     /// Seed of every random draw, in place of the shipped scenario's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Write the page (paper.md) and its figures (SVG and PNG) into this folder.
+    /// Write the page (report.html, paper.md) and its figures (SVG and PNG) into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write into a folder that is not empty.
@@ -43,6 +44,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         for (stem, _, figure) in reproduction.pictures() {
             figure.write(out, stem)?;
         }
+        write_reproduction(&reproduction, &page, out)?;
     }
     terminal.say(page.trim_end())?;
     terminal.remark(&format!("{} experiments in {elapsed_s:.1} s", paper::total_trials(arguments.trials)));

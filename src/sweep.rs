@@ -12,6 +12,7 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
+use crate::html_report::write_sweep;
 use crate::terminal::{Failure, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
@@ -42,7 +43,7 @@ pub(crate) struct Arguments {
     /// parquet.
     #[arg(long, requires = "out")]
     rows: bool,
-    /// Write sweep.json, sweep.csv and a picture into this folder.
+    /// Write report.html, sweep.json, sweep.csv and a picture into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print a row a method and a column a point: RMSE and, with a validation path, drift.
@@ -145,6 +146,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Outcome::Whole(result) => {
             if let Some(out) = out {
                 bench::write_results(&plan, &result, arguments.rows, out)?;
+                write_sweep(&result, out)?;
             }
             if arguments.summary {
                 sweep_summary::show(&result, terminal)?;

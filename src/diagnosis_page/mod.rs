@@ -2,7 +2,7 @@
 //! bottom.
 
 mod pictures;
-mod words;
+pub(crate) mod words;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -11,7 +11,8 @@ use diagnose::{Alternative, Document, Residuals, Status, Verdict};
 
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
-use pictures::{Picture, pictures, that_matter};
+pub(crate) use pictures::that_matter;
+use pictures::{Picture, pictures};
 
 /// What is drawn and told.
 pub(crate) struct Page<'d> {
@@ -127,7 +128,7 @@ impl Page<'_> {
                 "| {} | {answer} | {:.2} | {} |",
                 words::question(check),
                 check.statistic,
-                p_value(check.p_value)
+                words::p_value(check.p_value)
             )?;
         }
         writeln!(page)
@@ -252,13 +253,5 @@ impl Page<'_> {
             (None, Some(why)) => writeln!(page, "\nThere is no extended scenario: {why}."),
             (None, None) => Ok(()),
         }
-    }
-}
-
-fn p_value(p: f64) -> String {
-    match p {
-        p if p >= 1e-3 => format!("{p:.3}"),
-        p if p > 0.0 => format!("{p:.0e}"),
-        _ => "< 1e-300".to_owned(),
     }
 }

@@ -29,7 +29,7 @@ fn chi_square(against: &ResidualsByCovariate) -> f64 {
 }
 
 /// Covariates with which the calibrated model's residuals go, the strongest first.
-pub(super) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
+pub(crate) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
     let tests: usize = residuals.by_covariate.iter().map(|against| against.components.len()).sum();
     let mut all: Vec<&ResidualsByCovariate> = residuals.by_covariate.iter().collect();
     // p-values of large statistics are all zero in a double: the statistic itself goes on.

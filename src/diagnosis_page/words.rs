@@ -4,7 +4,7 @@ use diagnose::{Alternative, Check, Compared, Document, Finding, Status, Value, V
 use effects::{Estimate, Estimates};
 
 /// What a finding's first name means, with its sizes; the finding's own sentence where that says more.
-pub(super) fn meaning(finding: &Finding) -> String {
+pub(crate) fn meaning(finding: &Finding) -> String {
     let estimate = |value: &Value| Estimate { value: value.value, sigma: value.sigma };
     let sizes: Estimates<'_> =
         finding.parameters.iter().map(|(name, value)| (name.as_str(), estimate(value))).collect();
@@ -13,7 +13,7 @@ pub(super) fn meaning(finding: &Finding) -> String {
 }
 
 /// The verdict in a sentence.
-pub(super) fn verdict(document: &Document) -> String {
+pub(crate) fn verdict(document: &Document) -> String {
     if document.verdict == Verdict::Consistent {
         let n = document.checks.len();
         return format!("The calibrated model explains what was measured: of {n} checks of its residuals none fails.");
@@ -32,7 +32,7 @@ pub(super) fn verdict(document: &Document) -> String {
 }
 
 /// What the extension gains, in a sentence.
-pub(super) fn gain(document: &Document) -> Option<String> {
+pub(crate) fn gain(document: &Document) -> Option<String> {
     let drift = document.gain.as_ref()?.drift_percent.filter(|drift| drift.base > 0.0)?;
     let Compared { base, extended, low, high } = drift;
     let (share, half) = (100.0 * (base - extended) / base, 50.0 * (high - low) / base);
@@ -55,19 +55,19 @@ pub(super) fn gain(document: &Document) -> Option<String> {
 }
 
 /// Further names of a finding.
-fn named(ids: &[String]) -> String {
+pub(crate) fn named(ids: &[String]) -> String {
     let name =
         |id: &String| if id == "unlisted" { "something outside of the catalogue".to_owned() } else { id.clone() };
     ids.iter().map(name).collect::<Vec<_>>().join(" or ")
 }
 
-pub(super) fn capitalised(text: &str) -> String {
+pub(crate) fn capitalised(text: &str) -> String {
     let mut characters = text.chars();
     characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// What a check asks.
-pub(super) fn question(check: &Check) -> String {
+pub(crate) fn question(check: &Check) -> String {
     let component = |name: &str| match name.rsplit('_').next() {
         Some("along") => "along the robot",
         Some("across") => "across the robot",
@@ -113,8 +113,17 @@ pub(super) fn question(check: &Check) -> String {
     }
 }
 
+/// A p-value with the digits that it is worth.
+pub(crate) fn p_value(p: f64) -> String {
+    match p {
+        p if p >= 1e-3 => format!("{p:.3}"),
+        p if p > 0.0 => format!("{p:.0e}"),
+        _ => "< 1e-300".to_owned(),
+    }
+}
+
 /// Why an alternative was not named.
-pub(super) fn status(alternative: &Alternative) -> &'static str {
+pub(crate) fn status(alternative: &Alternative) -> &'static str {
     match alternative.status {
         Status::Found => "found",
         Status::NotDiscriminated => "not discriminated from what was found",

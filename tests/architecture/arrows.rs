@@ -39,6 +39,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("report", &["atomic-file"]),
+    ("report-page", &[]),
     (
         "bench",
         &[
@@ -102,6 +103,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "calib",
             "diagnose",
             "report",
+            "report-page",
             "ros-bag",
             "bench",
             "blind-benchmark",

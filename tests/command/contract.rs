@@ -369,10 +369,10 @@ fn reproduce_writes_the_page_and_its_pictures() {
     assert_eq!((&found["seed"], &found["trials"]), (&Value::from(5), &Value::from(20)));
     let names: Vec<_> =
         everything_in(&at.join("paper")).iter().map(|path| path.file_name().expect("named").to_owned()).collect();
-    for name in ["paper.md", "paper-figure-4.svg", "paper-figure-6.svg", "paper-figure-7.svg"] {
+    for name in ["report.html", "paper.md", "paper-figure-4.svg", "paper-figure-6.svg", "paper-figure-7.svg"] {
         assert!(names.contains(&name.into()), "{name} in {names:?}");
     }
-    assert_eq!(names.len(), if cfg!(feature = "png") { 7 } else { 4 });
+    assert_eq!(names.len(), if cfg!(feature = "png") { 8 } else { 5 });
     assert!(refusal(at, &["reproduce", "--trials", "1"]).contains("at least 2"));
 }
 

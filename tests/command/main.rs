@@ -1,5 +1,5 @@
 //! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, files
-//! for robots, campaigns that are stopped, and the gate on accuracy.
+//! for robots, pages, campaigns that are stopped, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;
@@ -13,6 +13,7 @@ mod good_log;
 mod import_csv;
 mod import_ros2;
 mod import_tum;
+mod pages;
 mod pose_errors;
 mod spoiled_files;
 #[path = "../support/mod.rs"]

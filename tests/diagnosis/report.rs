@@ -34,6 +34,23 @@ fn a_report_shows_what_was_found() {
     {
         assert!(report.contains(&format!("\n## {heading}\n")), "{heading}");
     }
+    // The page for a browser says the same first, and loads nothing.
+    let page = std::fs::read_to_string(out.join("report.html")).expect("a page");
+    let (first_screen, below) = page.split_once("<nav").expect("a first screen");
+    let first_screen = first_screen.split_once("<header").expect("a header").1;
+    for part in
+        ["not round or not centred", "radius varies by 0.30", "± ", "% of the drift", "circles with a radius of"]
+    {
+        assert!(first_screen.contains(part), "no {part}: {first_screen}");
+    }
+    for part in ["id=\"path\"", "yair correct robot --calibration diagnosis", "right_wheel_diameter_m", "square_cw_000"]
+    {
+        assert!(below.contains(part), "no {part}");
+    }
+    // The bound of the project for this demonstration.
+    assert!(page.len() < 1_000_000 && !page.contains("src=\"http"), "{} bytes", page.len());
+    let folder_of_machine = dir.display().to_string();
+    assert!(!page.contains(&folder_of_machine), "it names a folder that the user did not type");
     let links = report.split("](").skip(1).map(|rest| rest.split(')').next().expect("a target"));
     for link in links {
         assert!(out.join(link).is_file(), "{link} leads nowhere");

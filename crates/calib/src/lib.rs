@@ -48,4 +48,4 @@ pub use report::{
 pub use robust::{MedianMad, Summary};
 pub use stated::nominal_value;
 pub use trained_on::TrainedOn;
-pub use trajectory::{AugmentedCalibration, CorrectedRun, corrected_run};
+pub use trajectory::{AugmentedCalibration, CorrectedRun, RunPath, corrected_run, run_path};

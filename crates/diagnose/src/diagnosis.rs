@@ -69,6 +69,8 @@ pub struct Diagnosis {
     pub residuals: Residuals,
     /// Every effect that was tested, and what became of it.
     pub alternatives: Vec<Alternative>,
+    /// The calibration without what was found; gains are over it.
+    pub base: CalibrationReport,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
 }
@@ -172,6 +174,12 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, &carried);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, &findings);
+    let calibration_of = |model: &AugmentedModel<'_>| CalibrationReport {
+        trained_on: Vec::new(),
+        dataset: Names::of(names.clone()),
+        methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
+    };
+    let base = calibration_of(&AugmentedModel::base(&structure.base));
     let document = Document {
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
@@ -181,11 +189,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         candidates: alternatives.iter().map(text::candidate).collect(),
         blind_to,
         sensitivity,
-        calibration: CalibrationReport {
-            trained_on: Vec::new(),
-            dataset: Names::of(names),
-            methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
-        },
+        calibration: calibration_of(model),
         gain,
         gain_why_null,
         next_experiment_why_null: next.as_ref().err().cloned(),
@@ -194,7 +198,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
     let found = FittedModel::of(model);
-    Ok(Diagnosis { document, extended, residuals, alternatives, found })
+    Ok(Diagnosis { document, extended, residuals, alternatives, base, found })
 }
 
 fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) -> (Option<Gain>, Option<String>) {

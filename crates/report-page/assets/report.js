@@ -1,0 +1,163 @@
+/* Charts, copying, and what print and dark mode need. Without this script every number is in a table. */
+"use strict";
+
+/** A chart: points with bars of 95 %, or a line with its band; a series each on and off. */
+function chartPicture(figure, data) {
+  const plot = figure.querySelector(".plot");
+  const readout = element("p", { className: "readout" });
+  readout.setAttribute("aria-hidden", "true");
+  const short = (value) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(3))));
+  let chart = null;
+
+  const shape = (pen, role, x, y, size) => {
+    pen.beginPath();
+    if (role === "nominal") {
+      pen.moveTo(x, y - size); pen.lineTo(x + size, y + size * 0.8); pen.lineTo(x - size, y + size * 0.8); pen.closePath();
+    } else if (role === "calibrated") pen.rect(x - size * 0.8, y - size * 0.8, 1.6 * size, 1.6 * size);
+    else if (role === "truth") {
+      pen.moveTo(x, y - size); pen.lineTo(x + size, y); pen.lineTo(x, y + size); pen.lineTo(x - size, y); pen.closePath();
+    } else pen.arc(x, y, size * 0.9, 0, 2 * Math.PI);
+    pen.fill();
+  };
+  const drawSeries = (u, index) => {
+    const series = data.series[index - 1], pen = u.ctx, ratio = window.devicePixelRatio || 1;
+    const x = (k) => u.valToPos(data.at[k], "x", true), y = (value) => u.valToPos(value, "y", true);
+    const places = data.at.map((_, k) => k).filter((k) => series.values[k] !== null);
+    pen.save();
+    pen.beginPath();
+    pen.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    pen.clip();
+    pen.strokeStyle = pen.fillStyle = colour(series.role);
+    pen.lineWidth = 2 * ratio;
+    if (series.line) {
+      if (series.half) {
+        pen.globalAlpha = 0.18;
+        pen.beginPath();
+        places.forEach((k, n) => pen[n ? "lineTo" : "moveTo"](x(k), y(series.values[k] + series.half[k])));
+        [...places].reverse().forEach((k) => pen.lineTo(x(k), y(series.values[k] - series.half[k])));
+        pen.fill();
+        pen.globalAlpha = 1;
+      }
+      pen.setLineDash((DASHES[series.role] || []).map((dash) => dash * ratio));
+      pen.beginPath();
+      places.forEach((k, n) => pen[n ? "lineTo" : "moveTo"](x(k), y(series.values[k])));
+      pen.stroke();
+    } else {
+      for (const k of places) {
+        if (series.half && series.half[k] !== null) {
+          pen.beginPath();
+          pen.moveTo(x(k), y(series.values[k] - series.half[k]));
+          pen.lineTo(x(k), y(series.values[k] + series.half[k]));
+          pen.stroke();
+        }
+        shape(pen, series.role, x(k), y(series.values[k]), 4.5 * ratio);
+      }
+    }
+    pen.restore();
+  };
+  const say = (u) => {
+    const k = u.cursor.idx;
+    if (k === null || k === undefined) { readout.textContent = ""; return; }
+    const where = data.names ? data.names[k] : data.x + " " + short(data.at[k]);
+    const parts = data.series.filter((_, n) => u.series[n + 1].show).map((series) =>
+      series.name + " " + short(series.values[k]) + (series.half && series.half[k] !== null ? " ± " + short(series.half[k]) : ""));
+    readout.textContent = where + ": " + parts.join("; ") + " (" + data.y + ")";
+  };
+  /* Bars and bands are to be seen whole, and zero with them. */
+  const range = (u) => {
+    let low = 0, high = 0;
+    const [from, to] = u.series[0].idxs || [0, data.at.length - 1];
+    data.series.forEach((series, n) => {
+      if (!u.series[n + 1].show) return;
+      series.values.forEach((value, k) => {
+        if (value === null || k < from || k > to) return;
+        const half = series.half ? series.half[k] || 0 : 0;
+        low = Math.min(low, value - half);
+        high = Math.max(high, value + half);
+      });
+    });
+    const room = 0.08 * (high - low || 1);
+    return [low < 0 ? low - room : 0, high > 0 ? high + room : room];
+  };
+  const draw = () => {
+    const width = plot.clientWidth;
+    if (!width) return;
+    const hidden = chart ? chart.series.slice(1).map((series) => !series.show) : [];
+    if (chart) chart.destroy();
+    const first = data.at[0], last = data.at[data.at.length - 1], room = 0.04 * (last - first) || 0.5;
+    const axis = { stroke: colour("quiet"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 }, font: "12px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif", labelSize: 22 };
+    const names = (u, places) => places.map((place) => (Number.isInteger(place) && data.names[place]) || "");
+    chart = new uPlot({
+      width, height: Math.max(240, Math.min(340, width * 0.5)),
+      scales: {
+        x: { time: false, range: (u, low, high) => (low === first && high === last ? [first - room, last + room] : [low, high]) },
+        y: { range },
+      },
+      legend: { show: false },
+      padding: data.names ? [8, 64, 0, 0] : [8, 12, 0, 0],
+      cursor: { points: { show: false }, y: false, drag: { x: true, y: false } },
+      axes: [
+        { ...axis, label: data.x, ...(data.names ? { values: names, rotate: -50, size: 74, space: 22 } : {}) },
+        { ...axis, label: data.y, size: 58 },
+      ],
+      series: [{}, ...data.series.map((series, n) => ({ label: series.name, show: !hidden[n], paths: () => null, points: { show: false } }))],
+      hooks: { drawSeries: [drawSeries], setCursor: [say] },
+    }, [data.at, ...data.series.map((series) => series.values)], plot);
+  };
+  const boxes = data.series.map((series, n) =>
+    checkbox(series.name, true, (on) => { if (chart) { chart.setSeries(n + 1, { show: on }); chart.redraw(false, true); } },
+      (series.line ? "swatch " : "shape ") + series.role).label);
+  plot.before(element("div", { className: "controls" }, ...boxes, button("Reset zoom", draw, "Show the whole axis")));
+  plot.after(readout);
+  draw();
+  return { draw, resize: draw };
+}
+
+(() => {
+  const pictures = new Map();
+  const make = (figure) => {
+    if (pictures.has(figure) || !figure.querySelector(".plot").clientWidth) return;
+    const data = JSON.parse(figure.querySelector("script").textContent);
+    pictures.set(figure, (figure.classList.contains("path") ? pathPicture : chartPicture)(figure, data));
+  };
+  const all = () => document.querySelectorAll("figure.picture").forEach(make);
+  all();
+  /* What is in a closed part has no width yet. */
+  document.querySelectorAll("details").forEach((part) => part.addEventListener("toggle", all));
+  let waiting = 0, lastWidth = window.innerWidth;
+  window.addEventListener("resize", () => {
+    if (window.innerWidth === lastWidth) return;
+    lastWidth = window.innerWidth;
+    cancelAnimationFrame(waiting);
+    waiting = requestAnimationFrame(() => pictures.forEach((picture) => picture.resize()));
+  });
+  const redraw = () => pictures.forEach((picture) => picture.draw());
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  window.matchMedia("print").addEventListener("change", redraw);
+  let opened = [];
+  window.addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("details.part:not([open])")];
+    opened.forEach((part) => { part.open = true; });
+    all();
+    redraw();
+  });
+  window.addEventListener("afterprint", () => opened.forEach((part) => { part.open = false; }));
+  /* A link into the appendix opens what it leads to. */
+  const open = () => {
+    const part = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (part && part.tagName === "DETAILS") part.open = true;
+  };
+  window.addEventListener("hashchange", open);
+  open();
+  document.querySelectorAll("button.copy").forEach((copy) => copy.addEventListener("click", async () => {
+    const text = copy.closest(".code").querySelector("code");
+    try {
+      await navigator.clipboard.writeText(text.textContent);
+      copy.textContent = "Copied";
+    } catch {
+      window.getSelection().selectAllChildren(text);
+      copy.textContent = "Selected: press Ctrl+C";
+    }
+    setTimeout(() => { copy.textContent = "Copy"; }, 2500);
+  }));
+})();

@@ -1,0 +1,248 @@
+//! The pages of a calibration, of an evaluation and of a comparison.
+
+use std::path::Path;
+
+use calib::methods::joint::Joint;
+use calib::{AugmentedCalibration, CalibrationReport, Comparison, KindMean, Method, MethodReport, nominal_value};
+use dataset::{Dataset, NominalRobot};
+use report_page::{Block, Cell, Report, Role, Section, Table, Tile, Tone};
+
+use super::words::{count, of_millimetres, parameters, plus_minus, to_copy};
+use super::{Under, UnderCalibrations, contents, drift, made_by, paths::run_names, subject};
+use crate::calibration_file::GivenCalibration;
+use crate::terminal::Failure;
+
+/// Roles of calibrations in the order in which they were given; there are no more colours than these.
+const ROLES: [Role; 3] = [Role::Calibrated, Role::ExtendedModel, Role::Explained];
+
+fn nominal<'c>() -> Under<'c> {
+    Under { name: "nominal".to_owned(), role: Role::Nominal, calibration: None, model: None }
+}
+
+fn tile(label: &str, value: String, note: &str, section: &str) -> Tile {
+    Tile { label: label.to_owned(), value, note: note.to_owned(), section: section.to_owned() }
+}
+
+/// Drift of the first and of the last calibration.
+fn drift_tile(under: &UnderCalibrations) -> Tile {
+    let percent =
+        |drift: Option<&(String, Role, calib::CalibrationDrift)>| drift.and_then(|(_, _, of)| of.drift_percent);
+    let value = match (percent(under.drifts.first()), percent(under.drifts.last())) {
+        (Some(first), Some(last)) if under.drifts.len() > 1 => format!("{first:.3} % → {last:.3} %"),
+        (Some(first), _) => format!("{first:.3} %"),
+        _ => "Not measured".to_owned(),
+    };
+    let last = under.drifts.last().map_or("", |(name, ..)| name.as_str());
+    let note = if under.drifts.len() > 1 {
+        format!("of the distance, nominal → {last}")
+    } else {
+        "of the distance".to_owned()
+    };
+    tile("Drift on these runs", value, &note, "drift")
+}
+
+/// The sections that all of these pages end with.
+fn path_and_drift(under: &UnderCalibrations) -> [Section; 2] {
+    let drift = Section { blocks: drift::blocks(&under.drifts), ..Section::new("drift", "How far runs drift") };
+    [Section::new("path", "The path").with(under.path_block()), drift]
+}
+
+/// The page of a calibration.
+pub(crate) struct CalibrationPage<'p> {
+    pub(crate) report: &'p CalibrationReport,
+    pub(crate) robot: &'p NominalRobot,
+    pub(crate) datasets: &'p [Dataset],
+}
+
+impl CalibrationPage<'_> {
+    /// Writes report.html.
+    pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
+        let mut calibrations: Vec<AugmentedCalibration> =
+            self.report.calibrations().into_iter().map(AugmentedCalibration::from).collect();
+        // Of several methods the one of the first screen is drawn first.
+        let first = self.first().map(|method| method.method.as_str());
+        calibrations.sort_by_key(|of| Some(of.calibration.name.as_str()) != first);
+        let mut all = vec![nominal()];
+        for (calibration, role) in calibrations.iter().zip(ROLES) {
+            let name = calibration.calibration.name.clone();
+            all.push(Under { name, role, calibration: Some(calibration), model: None });
+        }
+        let under = UnderCalibrations::of(self.datasets, &all);
+        super::write(&self.page(&under), out)
+    }
+
+    /// The method of the first screen: the default one, or else the first that gave something.
+    fn first(&self) -> Option<&MethodReport> {
+        let mut given = self.report.methods.iter().filter(|method| method.error.is_none());
+        let default = given.clone().find(|method| method.method == Joint::DEFAULT.name());
+        default.or_else(|| given.next())
+    }
+
+    fn page(&self, under: &UnderCalibrations) -> Report {
+        let mut section = Section::new("parameters", "The robot's parameters");
+        for method in &self.report.methods {
+            section = self.method(section, method);
+        }
+        let key_of = |method: &&MethodReport, keys: &[&str]| {
+            keys.iter().find_map(|key| Some(((*key).to_owned(), method.parameters.get(*key)?.clone())))
+        };
+        let first = self.first();
+        let known = [
+            ("Left wheel", &["left_wheel_diameter_m", "left_m_per_tick"][..]),
+            ("Right wheel", &["right_wheel_diameter_m", "right_m_per_tick"]),
+            ("Wheel separation", &["wheel_separation_m"]),
+        ];
+        let mut tiles: Vec<Tile> = known
+            .iter()
+            .filter_map(|(label, keys)| {
+                let (key, value) = key_of(&first?, keys)?;
+                let shown = value.value.map_or_else(
+                    || "Not determined".to_owned(),
+                    |found| format!("{} mm", plus_minus(1e3 * found, value.sigma.map(|sigma| 1e3 * sigma))),
+                );
+                let stated = nominal_value(self.robot, &key)
+                    .map_or(String::new(), |stated| format!("nominal {} mm; ", 1e3 * stated));
+                Some(tile(label, shown, &format!("{stated}± is one standard deviation"), "parameters"))
+            })
+            .collect();
+        tiles.push(drift_tile(under));
+        let used = first.map_or(0, |method| method.runs_used);
+        let fine = first.is_some_and(|method| method.converged && method.warnings.is_empty());
+        let mut sections = vec![section];
+        sections.extend(path_and_drift(under));
+        sections[2] =
+            sections[2].clone().text("These are the runs that were calibrated with: new runs drift a little more.");
+        Report {
+            command: "yair calibrate".to_owned(),
+            subject: subject(self.datasets),
+            tone: if fine { Tone::Neutral } else { Tone::Uncertain },
+            headline: format!("The robot's wheels and their separation, from {}.", count(used, "run")),
+            lead: "What the odometry is to use in place of the nominal values, and how far it drifts with both."
+                .to_owned(),
+            tiles,
+            sections,
+            appendix: Vec::new(),
+            made_by: made_by(contents(self.datasets)),
+        }
+    }
+
+    fn method(&self, section: Section, method: &MethodReport) -> Section {
+        let name = &method.method;
+        if let Some(error) = &method.error {
+            return section.with(Block::Warning(format!("{name} gives nothing: {error}")));
+        }
+        let caption = format!("By the method {name}, in SI units");
+        let mut section = section
+            .with(parameters(&caption, &method.parameters, |key| nominal_value(self.robot, key)))
+            .with(Block::Code(format!("Parameters to copy ({name})"), to_copy(&method.parameters)));
+        for warning in &method.warnings {
+            section = section.with(Block::Warning(format!("{name}: {warning}")));
+        }
+        let rejected = method.runs_rejected.iter().map(|of| format!("Left out: run {}: {}", of.run, of.why));
+        let unknown = method.not_observable.iter().map(|of| format!("Not determined: {}: {}", of.parameter, of.why));
+        let notes: Vec<String> = rejected.chain(unknown).collect();
+        if notes.is_empty() { section } else { section.with(Block::List(notes)) }
+    }
+}
+
+/// The page of an evaluation.
+pub(crate) struct EvaluationPage<'p> {
+    pub(crate) calibrations: &'p [Option<GivenCalibration>],
+    pub(crate) datasets: &'p [Dataset],
+}
+
+impl EvaluationPage<'_> {
+    /// Writes report.html.
+    pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
+        let given: Vec<&GivenCalibration> = self.calibrations.iter().flatten().collect();
+        let mut all = vec![nominal()];
+        // The last ones are what a user judges (as --max-drift does).
+        let shown = &given[given.len().saturating_sub(ROLES.len())..];
+        for (given, role) in shown.iter().zip(ROLES) {
+            let calibration = given.calibration();
+            let name = calibration.calibration.name.clone();
+            all.push(Under { name, role, calibration: Some(calibration), model: given.model() });
+        }
+        let under = UnderCalibrations::of(self.datasets, &all);
+        let runs = run_names(self.datasets).len();
+        let mut tiles = vec![drift_tile(&under)];
+        if let Some((name, _, last)) = under.drifts.last() {
+            let millimetres = |length_m| format!("{} mm", of_millimetres(length_m));
+            tiles.push(tile("Mean error at the end", millimetres(last.mean_final_position_m), name, "drift"));
+            tiles.push(tile("Largest error anywhere", millimetres(last.max_position_m), name, "path"));
+        }
+        tiles.push(tile("Runs", runs.to_string(), "dead-reckoned from where they were first measured", "path"));
+        let mut sections = path_and_drift(&under).to_vec();
+        if shown.len() < given.len() {
+            sections[0] = sections[0].clone().text(format!("Only the last {} calibrations are drawn.", shown.len()));
+        }
+        let page = Report {
+            command: "yair evaluate".to_owned(),
+            subject: subject(self.datasets),
+            tone: Tone::Neutral,
+            headline: format!("How far the odometry drifts on {}.", count(runs, "run")),
+            lead: "Drift is how far from the measured position a run ends, as a share of the distance.".to_owned(),
+            tiles,
+            sections,
+            appendix: Vec::new(),
+            made_by: made_by(contents(self.datasets)),
+        };
+        super::write(&page, out)
+    }
+}
+
+/// The page of a comparison of methods across sessions.
+pub(crate) fn write_comparison(comparison: &Comparison, datasets: &[Dataset], out: &Path) -> Result<(), Failure> {
+    let mut table = Table::new(
+        "Mean error at the ends of runs that the calibration has not seen",
+        &["trained on", "method", "evaluated on", "position, mm", "heading, °", "pairs of sessions"],
+    );
+    let mut best: Option<(f64, &str)> = None;
+    for method in &comparison.methods {
+        for KindMean { trained_on, evaluated_on, pairs, mean_final_position_m, mean_final_heading_rad, .. } in
+            &method.kinds
+        {
+            if let (Some(position_m), Some(_)) = (mean_final_position_m, trained_on)
+                && best.is_none_or(|(least_m, _)| *position_m < least_m)
+            {
+                best = Some((*position_m, &method.method));
+            }
+            table.row([
+                Cell::text(trained_on.clone().unwrap_or_else(|| "–".to_owned())),
+                Cell::id(method.method.clone()),
+                Cell::text(evaluated_on.clone()),
+                Cell::number(of_millimetres(*mean_final_position_m)),
+                Cell::number(
+                    mean_final_heading_rad.map_or_else(|| "–".to_owned(), |angle| format!("{:.3}", angle.to_degrees())),
+                ),
+                Cell::number(pairs.to_string()),
+            ]);
+        }
+    }
+    let mut tiles = vec![tile(
+        "Sessions",
+        comparison.sessions.len().to_string(),
+        "each calibrated on, and tested on by all others",
+        "table",
+    )];
+    if let Some((position_m, method)) = best {
+        tiles.push(tile(
+            "Smallest error of all pairs of kinds",
+            format!("{:.2} mm", 1e3 * position_m),
+            method,
+            "table",
+        ));
+    }
+    let page = Report {
+        command: "yair compare".to_owned(),
+        subject: subject(datasets),
+        tone: Tone::Neutral,
+        headline: "Which calibration holds on sessions that it has not seen.".to_owned(),
+        lead: "Every method calibrates on each session and is tested on every other. Lower is better.".to_owned(),
+        tiles,
+        sections: vec![Section::new("table", "Errors by method and kind of path").with(Block::Table(table))],
+        appendix: Vec::new(),
+        made_by: made_by(contents(datasets)),
+    };
+    super::write(&page, out)
+}

@@ -1,0 +1,92 @@
+//! What to drive next, with a sketch of it.
+
+use ::diagnose::{Document, NextExperiment};
+use motion_programs::Schedule;
+use report_page::{Block, Cell, Manoeuvre, Section, Sketch, Table, Tile};
+
+use super::words::count;
+use crate::diagnosis_page::words::capitalised;
+
+const TITLE: &str = "What to drive next";
+
+/// What a plan drives, drawn.
+fn sketches(next: &NextExperiment) -> Vec<Sketch> {
+    let of = |speed_m_s: f64, schedule: &Schedule| {
+        let (manoeuvre, runs, each_way) = match *schedule {
+            Schedule::Straights { length_m, runs } => (Manoeuvre::Straight { length_m }, runs, false),
+            Schedule::Spins { turn_rad, runs } => (Manoeuvre::Spin { turn_rad }, runs, false),
+            Schedule::Squares { side_m, runs_each_way } => (Manoeuvre::Square { side_m }, runs_each_way, true),
+            Schedule::Circles { radius_m, runs_each_way, .. } => (Manoeuvre::Circle { radius_m }, runs_each_way, true),
+            Schedule::ValidationPath { length_m, runs, .. } => (Manoeuvre::Polygon { length_m }, runs, false),
+        };
+        let ways = if each_way { " each way" } else { "" };
+        let caption = format!("{}{ways} at {speed_m_s:.2} m/s", count(runs as usize, "run"));
+        Sketch { manoeuvre, caption }
+    };
+    let sessions = next.sessions.iter();
+    sessions.flat_map(|session| session.schedules.iter().map(|schedule| of(session.speed_m_s, schedule))).collect()
+}
+
+/// A side that reads 0.0 m is no side.
+const MIN_SIDE_M: f64 = 0.05;
+
+/// The floor that is needed, in words.
+fn floor(next: &NextExperiment) -> String {
+    let (longer_m, shorter_m) = (next.free_x_m.max(next.free_y_m), next.free_x_m.min(next.free_y_m));
+    if longer_m < MIN_SIDE_M {
+        "on the spot".to_owned()
+    } else if shorter_m < MIN_SIDE_M {
+        format!("along {longer_m:.1} m")
+    } else {
+        format!("on {longer_m:.1} m by {shorter_m:.1} m")
+    }
+}
+
+/// The fact of the first screen.
+pub(super) fn tile(document: &Document) -> Tile {
+    match &document.next_experiment {
+        Some(next) => tile_of(next),
+        None => {
+            let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
+            with_label("Nothing new".to_owned(), why.to_owned())
+        }
+    }
+}
+
+/// The same of a plan.
+pub(super) fn tile_of(next: &NextExperiment) -> Tile {
+    with_label(capitalised(&next.drive), format!("{:.1} min {}", next.minutes, floor(next)))
+}
+
+fn with_label(value: String, note: String) -> Tile {
+    Tile { label: "Drive next".to_owned(), value, note, section: "next".to_owned() }
+}
+
+/// A plan in a sentence.
+pub(super) fn headline(next: &NextExperiment) -> String {
+    format!("Drive {}.", next.drive)
+}
+
+/// The section.
+pub(super) fn section(document: &Document) -> Section {
+    match &document.next_experiment {
+        Some(next) => section_of(next),
+        None => {
+            let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
+            Section::new("next", TITLE).text(format!("No drive is proposed: {why}."))
+        }
+    }
+}
+
+/// The section of a plan.
+pub(super) fn section_of(next: &NextExperiment) -> Section {
+    let section = Section::new("next", TITLE);
+    let mut predicts = Table::new("What the drive will tell", &["cause", "what it is", "what it predicts"]);
+    for (id, prediction) in &next.predicts {
+        let meaning = effects::description(id).map_or("not in the catalogue", |of| of.meaning);
+        predicts.row([Cell::id(id.clone()), Cell::text(meaning), Cell::text(prediction.clone())]);
+    }
+    let section = section.with(Block::Sketches(sketches(next))).text(capitalised(&next.why));
+    let section = if predicts.rows.is_empty() { section } else { section.with(Block::Table(predicts)) };
+    section.with(Block::Code("The drive as part of a scenario (TOML)".to_owned(), next.protocol.trim_end().to_owned()))
+}
