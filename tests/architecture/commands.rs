@@ -236,6 +236,11 @@ mod documents_show_what_commands_print {
     }
 
     #[test]
+    fn faq() {
+        shows_what_its_commands_print("docs/faq.md", 7);
+    }
+
+    #[test]
     fn export() {
         shows_what_its_commands_print("docs/export.md", 2);
     }

@@ -116,7 +116,12 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::TicksPerTurn { ratio, stated, simple } => {
             let found = stated.map(|stated| stated / ratio);
             let value = found.map_or_else(String::new, |found| format!(": near {found:.0}"));
-            let cause = if *simple { "ticks_per_rev is wrong by a simple factor" } else { "check ticks_per_rev and the wheel's diameter" };
+            let cause = match (*simple, stated.is_some()) {
+                (true, true) => "ticks_per_rev is wrong by a simple factor, or a radius is stated for a diameter",
+                (true, false) => "a radius is stated for a diameter, or the other way round; or the wheels turn by a gear",
+                (false, true) => "check ticks_per_rev and the wheels' diameters",
+                (false, false) => "check the wheels' diameters",
+            };
             format!("both wheels are {ratio:.3} times as large as stated; {cause}{value}")
         }
         Kind::OtherRobot { parameter, ratio } => {
