@@ -9,6 +9,7 @@ mod causal;
 mod comment;
 mod error;
 pub mod format;
+mod log_path;
 mod on_board;
 mod on_board_covariance;
 mod options;
@@ -18,6 +19,7 @@ mod tum;
 
 pub use causal::OnBoardInputs;
 pub use error::ExportError;
+pub use log_path::LogStart;
 pub use on_board::OnBoardOdometry;
 pub use options::{Lengths, Options};
 pub use robot::{CalibratedRobot, Length, RobotEffect};
