@@ -206,8 +206,13 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         Some(out) => {
             write_whole(out, text.as_bytes())?;
             terminal.say(&format!("{} in {}", format.name, out.display()))?;
+            drift.as_ref().map_or(Ok(()), |drift| terminal.say(&drift.text()))?;
         }
-        None => terminal.say(text.trim_end_matches('\n'))?,
+        None => {
+            // The text alone stands on standard output.
+            terminal.say(text.trim_end_matches('\n'))?;
+            drift.iter().for_each(|drift| terminal.remark(&drift.text()));
+        }
     }
     terminal.document(&Document {
         format: format.name.to_owned(),

@@ -1,5 +1,5 @@
-//! What a header leaves of the drift: dead reckoning of a dataset by the nominal values, by what runs on board,
-//! and by the whole model with rows on both sides.
+//! What a header leaves of the drift: dead reckoning of a dataset by the nominal values, by what runs on
+//! board, and by the whole model with rows on both sides.
 
 use std::path::Path;
 
@@ -32,11 +32,15 @@ impl Drift {
     }
 
     /// One line for people.
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
+        let why = self.why_null.as_ref().map_or_else(String::new, |why| format!(": {why}"));
+        if self.nominal.or(self.on_board).is_none() {
+            return format!("drift: not known{why}");
+        }
         let percent = |of: Option<f64>| of.map_or_else(|| "not known".to_owned(), |of| format!("{of:.3} %"));
         let untold = self.on_board_untold.map_or_else(String::new, |of| format!(" ({of:.3} % when told nothing)"));
         format!(
-            "drift: nominal {}, on board {}{untold}, offline {}",
+            "drift: nominal {}, on board {}{untold}, offline {}{why}",
             percent(self.nominal),
             percent(self.on_board),
             percent(self.offline)
@@ -44,7 +48,8 @@ impl Drift {
     }
 }
 
-/// The drift of a dataset's runs by a robot of a calibration file; without a dataset it says that it needs one.
+/// The drift of a dataset's runs by a robot of a calibration file; without a dataset it says that it needs
+/// one.
 pub(crate) fn of(
     robot: &CalibratedRobot,
     source: &Path,
@@ -52,19 +57,10 @@ pub(crate) fn of(
     options: &Options,
     terminal: &Terminal,
 ) -> Result<Drift, Failure> {
-    let drift = match dataset {
-        None => {
-            let why = "it needs a dataset with absolute truth; give --dataset DIR";
-            Drift::unknown(why.to_owned())
-        }
-        Some(path) => of_dataset(robot, source, path, options, terminal)?,
-    };
-    let why = drift.why_null.as_ref().map_or_else(String::new, |why| format!(": {why}"));
-    match drift.nominal.or(drift.on_board) {
-        None => terminal.remark(&format!("drift: not known{why}")),
-        Some(_) => terminal.remark(&format!("{}{why}", drift.text())),
+    match dataset {
+        None => Ok(Drift::unknown("it needs a dataset with absolute truth; give --dataset DIR".to_owned())),
+        Some(path) => of_dataset(robot, source, path, options, terminal),
     }
-    Ok(drift)
 }
 
 fn of_dataset(

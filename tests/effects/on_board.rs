@@ -19,8 +19,8 @@ use super::hypotheses::watched::{drive, perfect};
 struct Case {
     id: &'static str,
     values: &'static [(&'static str, f64)],
-    /// Without it the odometry errs at least so many times as much, by the root of the mean square error of the
-    /// position along the runs.
+    /// Without it the odometry errs at least so many times as much, by the root of the mean square error of
+    /// the position along the runs.
     factor: f64,
 }
 
@@ -145,9 +145,9 @@ fn offline_m(dataset: &Dataset, model: &ExtendedModel) -> f64 {
     rmse_m(evaluate_runs(&records.session(), Some(&model.calibration), &options(), &mut 0.0))
 }
 
-/// Sizes by which a model runs: the true ones. That of a slide is in multiples of a usual floor's under a usual
-/// tremble of the tread: it is what the whole model, with rows on both sides, finds on half of the runs, and the
-/// other half is left to what runs on board.
+/// Sizes by which a model runs: the true ones. That of a slide is in multiples of a usual floor's under a
+/// usual tremble of the tread: it is what the whole model, with rows on both sides, finds on half of the
+/// runs, and the other half is left to what runs on board.
 fn fitted(case: &Case, scenario: &Scenario, dataset: &mut Dataset) -> Vec<(&'static str, f64)> {
     let mut values = case.values.to_vec();
     let Some(at) = values.iter().position(|(name, _)| *name == "sliding") else { return values };

@@ -115,8 +115,8 @@ pub fn evaluate_runs(
     session.runs.iter().map(of).collect()
 }
 
-/// One run along a path that something else dead-reckoned, measured as under a calibration: `path` makes it from
-/// the pose at the log's first row and the distance driven in the session before, metres.
+/// One run along a path that something else dead-reckoned, measured as under a calibration: `path` makes it
+/// from the pose at the log's first row and the distance driven in the session before, metres.
 ///
 /// Both begin at the same pose and meet the first measurement; the length is that under the calibration.
 #[must_use]

@@ -8,9 +8,9 @@
 //! - of the interval: `left_m`, `right_m` (travel by the counts), `left_m_s`, `right_m_s` (the same over the
 //!   interval), `distance_m`, `turn_rad` (of the drive's centre), `v_m_s`, `omega_rad_s`, `dt_s`, and
 //!   `left_count_m`, `right_count_m` (travel of a count). Without a length (`dt_s` = 0) its speeds are 0;
-//! - of the past: `left_start_m_s`, `left_end_m_s`, `right_start_m_s`, `right_end_m_s` (speeds of the interval
-//!   before and of this one; those before where this one has no length), `late_start_s`, `late_end_s` (stamps
-//!   against the mean period so far);
+//! - of the past: `left_start_m_s`, `left_end_m_s`, `right_start_m_s`, `right_end_m_s` (speeds of the
+//! interval before and of this one; those before where this one has no length), `late_start_s`, `late_end_s`
+//! (stamps against the mean period so far);
 //! - of inputs: see [`Input`];
 //! - `own->NAME`: what the effect remembers; `yair_sense(x)`: −1, 0 or 1.
 //!
@@ -19,6 +19,9 @@
 
 use kinematics::Wheels;
 use model_term::Interval;
+
+/// The run's covariate that says what the robot carries; a run without it carries nothing.
+pub(crate) const PAYLOAD: &str = "payload_kg";
 
 /// A size of an effect by its name; 0 where it has none of that name.
 pub type SizeOf<'v> = &'v dyn Fn(&str) -> f64;
@@ -120,7 +123,7 @@ impl Input {
     #[must_use]
     pub const fn covariate(self) -> Option<&'static str> {
         match self {
-            Self::Payload => Some(crate::catalogue::payload_compression::PAYLOAD),
+            Self::Payload => Some(PAYLOAD),
             _ => None,
         }
     }

@@ -3,8 +3,8 @@
 //!
 //! What scatters independently from interval to interval accumulates. The separation is drawn once a motion:
 //! its error is σ² g gᵀ with the derivative g of the pose by it, which grows with the turn and is added to
-//! the rest where the motion ends. Rounding of the first reading stays in the pose, that of the present one is
-//! added for the moment.
+//! the rest where the motion ends. Rounding of the first reading stays in the pose, that of the present one
+//! is added for the moment.
 
 use calib::OdometryNoise;
 use effects::{IntervalScatter, OnBoard, ScatterModel};
@@ -89,5 +89,93 @@ impl OnBoardCovariance {
 
     pub(crate) const fn matrix(&self) -> &Matrix3<f64> {
         &self.reported
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::on_board::OnBoardOdometry;
+    use crate::robot::{RobotEffect, specimen};
+
+    /// A robot whose wheels have no noise, with an effect that scatters.
+    fn robot(id: &str, values: &[(&str, f64)]) -> CalibratedRobot {
+        let id = effects::CATALOGUE.iter().find(|of| **of == id).expect("known");
+        let effect = RobotEffect {
+            id,
+            meaning: "",
+            on_board: effects::description(id).expect("known").on_board,
+            values: values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+            terms: Vec::new(),
+            is_silent: false,
+        };
+        let noise = Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 0.0, turn_sigma_rad_per_sqrt_rad: 0.0 });
+        CalibratedRobot { noise, effects: vec![effect], ..specimen() }
+    }
+
+    /// Counts that turn the specimen on the spot by so much, 62.2 µm a count of the right wheel.
+    fn spun(odometry: &mut OnBoardOdometry, counts: &mut Wheels<i64>, steps: i64) -> f64 {
+        let from_rad = odometry.pose().theta_rad;
+        for _ in 0..steps.abs() {
+            *counts = Wheels { left: counts.left - 99 * steps.signum(), right: counts.right + 101 * steps.signum() };
+            odometry.step(*counts, 0.02);
+        }
+        odometry.pose().theta_rad - from_rad
+    }
+
+    /// Navarro et al., eq. (11): σ_θ = |Δθ| σ_b/B in a motion, independent from motion to motion. Rejects
+    /// draws that are independent from interval to interval, which are ten times less, and a motion that
+    /// turns back and keeps its error.
+    #[test]
+    fn the_separation_is_drawn_once_a_motion() {
+        let robot = robot("contact_patch_wheelbase", &[("sigma_m", 4.08e-3)]);
+        let mut counts = Wheels::both(0);
+        let mut odometry = OnBoardOdometry::new(&robot, None, counts).expect("a drive");
+        let variance = |odometry: &OnBoardOdometry| odometry.covariance().expect("noise")[(2, 2)];
+        let turned_rad = spun(&mut odometry, &mut counts, 100);
+        assert!((variance(&odometry) / (0.01 * turned_rad).powi(2) - 1.0).abs() < 1e-9);
+        assert!((spun(&mut odometry, &mut counts, -100) + turned_rad).abs() < 1e-12);
+        assert!(variance(&odometry) < 1e-20, "{}", variance(&odometry));
+        let _ = spun(&mut odometry, &mut counts, 100);
+        for _ in 0..20 {
+            odometry.step(counts, 0.02);
+        }
+        let _ = spun(&mut odometry, &mut counts, -100);
+        assert!((variance(&odometry) / (0.01 * turned_rad).powi(2) - 2.0).abs() < 1e-9);
+    }
+
+    /// Rounding of the first and of the present reading, whatever lies between: Δ²/12 each, of ticks of many
+    /// counts. Rejects a rounding that accumulates.
+    #[test]
+    fn rounding_does_not_accumulate() {
+        let robot = robot("quantization", &[("counts_per_tick", 1e6)]);
+        let m_per_count = [0.202, 0.198].map(|diameter_m: f64| std::f64::consts::PI * diameter_m / 1e4);
+        let expected = m_per_count.iter().map(|m| 2.0 * m * m / 12.0).sum::<f64>() / 0.408_f64.powi(2);
+        let mut odometry = OnBoardOdometry::new(&robot, None, Wheels::both(0)).expect("a drive");
+        for step in 1..=500 {
+            odometry.step(Wheels::both(20 * step), 0.02);
+            let heading_rad2 = odometry.covariance().expect("noise")[(2, 2)];
+            assert!((heading_rad2 / expected - 1.0).abs() < 1e-9, "{step}: {heading_rad2} {expected}");
+        }
+    }
+
+    /// A compound Poisson process: rate × loss² × travel of each wheel, however the travel is cut.
+    #[test]
+    fn bumps_scatter_in_proportion_to_the_travel() {
+        let robot = robot("bumps", &[("per_m", 0.5), ("height_m", 2e-3)]);
+        let heading_rad2 = |steps: i64| {
+            let mut odometry = OnBoardOdometry::new(&robot, None, Wheels::both(0)).expect("a drive");
+            (1..=steps).for_each(|step| odometry.step(Wheels::both(20_000 * step / steps), 0.02));
+            odometry.covariance().expect("noise")[(2, 2)]
+        };
+        // 2 (r acos(1 − h/r) − √(2rh − h²)) at radii of 101 and 99 mm, 2 · 2π r of travel each.
+        let of = |r: f64| {
+            let lost_m = 2.0 * (r * (1.0 - 2e-3 / r).acos() - (2e-3 * (2.0 * r - 2e-3)).sqrt());
+            0.5 * lost_m * lost_m * 2.0 * std::f64::consts::TAU * r
+        };
+        let expected = (of(0.101) + of(0.099)) / 0.408_f64.powi(2);
+        for steps in [1, 100] {
+            assert!((heading_rad2(steps) / expected - 1.0).abs() < 1e-6, "{steps}: {} {expected}", heading_rad2(steps));
+        }
     }
 }

@@ -49,8 +49,8 @@ impl RobotEffect {
         self.values.iter().find(|(of, _)| of == name).map_or(0.0, |(_, value)| *value)
     }
 
-    /// The sizes that its statements may read: those of its mean terms, or of its simulation model where it has
-    /// no mean.
+    /// The sizes that its statements may read: those of its mean terms, or of its simulation model where it
+    /// has no mean.
     pub(crate) fn size_names(&self) -> Vec<String> {
         let variants = effects::hypothesis(self.id).and_then(Hypothesis::into_variants).unwrap_or_default();
         let mut names: Vec<String> = Vec::new();

@@ -1,5 +1,5 @@
-//! The C header, compiled and driven over an hour of counts, against the same arithmetic in Rust: every effect
-//! that runs on board by itself, with what it must be told and without, and all together.
+//! The C header, compiled and driven over an hour of counts, against the same arithmetic in Rust: every
+//! effect that runs on board by itself, with what it must be told and without, and all together.
 //!
 //! Seen to be rejected: half of an effect's size (1e-6 m and more) and the midpoint rule for exact arcs (1e-4
 //! m).
@@ -85,8 +85,8 @@ struct Record {
     told: OnBoardInputs,
 }
 
-/// A robot that drives ahead and back, in bends and on the spot, creeps and stands at times; its counters wrap
-/// at 16 bits, rows come a little early or late, and at times it is told what it cannot count.
+/// A robot that drives ahead and back, in bends and on the spot, creeps and stands at times; its counters
+/// wrap at 16 bits, rows come a little early or late, and at times it is told what it cannot count.
 fn log() -> &'static [Record] {
     static LOG: OnceLock<Vec<Record>> = OnceLock::new();
     LOG.get_or_init(|| {

@@ -16,10 +16,7 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
-use crate::on_board::{Code, Input, OnBoard};
-
-/// The run's covariate that says what the robot carries; a run without it carries nothing.
-pub(crate) const PAYLOAD: &str = "payload_kg";
+use crate::on_board::{Code, Input, OnBoard, PAYLOAD};
 
 /// The mean term in C, for a robot's own odometry.
 const ON_BOARD: OnBoard = OnBoard::Input {

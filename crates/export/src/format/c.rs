@@ -10,6 +10,7 @@
 mod blocks;
 mod covariance;
 mod inputs;
+mod literal;
 mod past;
 
 use effects::OnBoard;
@@ -21,6 +22,7 @@ use crate::options::Options;
 use crate::robot::CalibratedRobot;
 use blocks::Blocks;
 use inputs::Inputs;
+use literal::exact;
 use past::Past;
 
 const HEADER: &str = include_str!("c/odometry.h.in");
@@ -124,11 +126,6 @@ const CANNOT: &str = "What this header cannot express: effects that show in late
 fn uses_radius(effect: &crate::RobotEffect) -> bool {
     matches!(effect.on_board, OnBoard::CovarianceOnly(_))
         && ["left_radius_m", "right_radius_m"].iter().any(|name| effect.on_board.uses(name))
-}
-
-/// A number that reads back as it is; its exponent makes it a double.
-fn exact(value: f64) -> String {
-    format!("{value:e}")
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use effects::{Code, Input, OnBoard};
 
-use super::exact;
+use super::literal::exact;
 use crate::robot::{CalibratedRobot, RobotEffect};
 
 /// Whether a C text has a name.

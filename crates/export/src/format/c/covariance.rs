@@ -2,7 +2,7 @@
 //! arithmetic as `on_board_covariance.rs`.
 
 use super::blocks::Blocks;
-use super::exact;
+use super::literal::exact;
 use crate::robot::CalibratedRobot;
 
 const COVARIANCE: &str = include_str!("covariance.h.in");

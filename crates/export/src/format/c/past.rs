@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use super::exact;
+use super::literal::exact;
 use crate::robot::CalibratedRobot;
 use crate::settings::{LATENESS_KEPT, MAX_JITTER_SHARE, PERIOD_INTERVALS};
 
