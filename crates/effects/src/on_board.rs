@@ -5,12 +5,12 @@
 //! for a header; in Rust the estimation model's own term is evaluated with what is known by then. Statements
 //! read names of this list and the effect's sizes by their names:
 //!
-//! - of the interval: `left_m`, `right_m` (travel by the counts), `left_m_s`, `right_m_s` (the same over the
-//!   interval), `distance_m`, `turn_rad` (of the drive's centre), `v_m_s`, `omega_rad_s`, `dt_s`, and
+//! - of the interval: `left_m`, `right_m` (travel by the counts), `left_m_s`, `right_m_s` (the same over
+//!   the interval), `distance_m`, `turn_rad` (of the drive's centre), `v_m_s`, `omega_rad_s`, `dt_s`, and
 //!   `left_count_m`, `right_count_m` (travel of a count). Without a length (`dt_s` = 0) its speeds are 0;
 //! - of the past: `left_start_m_s`, `left_end_m_s`, `right_start_m_s`, `right_end_m_s` (speeds of the
-//! interval before and of this one; those before where this one has no length), `late_start_s`, `late_end_s`
-//! (stamps against the mean period so far);
+//!   interval before and of this one; those before where this one has no length), `late_start_s`,
+//!   `late_end_s` (stamps against the mean period so far);
 //! - of inputs: see [`Input`];
 //! - `own->NAME`: what the effect remembers; `yair_sense(x)`: −1, 0 or 1.
 //!
