@@ -10,11 +10,13 @@ use calib::{CalibrationReport, MethodReport, corrected_run};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use dataset::{Loaded, NominalRobot};
+use effects::OnBoard;
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::calibration_file::{GivenCalibration, is_scenario};
 use crate::correct::{file_of, only};
+use crate::export_drift::{self, Drift};
 use crate::export_mcap;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, listed_ids, warn};
@@ -36,7 +38,8 @@ pub(crate) struct Arguments {
     /// Replace a file that is already there.
     #[arg(long)]
     force: bool,
-    /// A dataset of the robot, for nominal values that the calibration file does not have.
+    /// A dataset of the robot, for nominal values that the calibration file does not have; c: with absolute
+    /// truth, also for the drift that is left on board.
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
     /// Which calibration of a file with several.
@@ -97,6 +100,9 @@ struct Document {
     /// Effects of an extended model that the format cannot express.
     left_out: Vec<LeftOut>,
     cautions: Vec<String>,
+    /// Drift with and without the file, of formats that run effects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drift_percent: Option<Drift>,
     /// Runs of a dataset.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<String>,
@@ -106,6 +112,9 @@ struct Document {
 struct LeftOut {
     id: &'static str,
     meaning: &'static str,
+    /// Why it cannot run on board, where the format runs effects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<&'static str>,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
@@ -177,20 +186,33 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
     options.check()?;
     let robot = robot(arguments, terminal)?;
     let text = (format.render)(&robot, &options)?;
-    let left_out: Vec<LeftOut> =
-        robot.left_out(format.has_effects).map(|effect| LeftOut { id: effect.id, meaning: effect.meaning }).collect();
-    for LeftOut { id, meaning } in &left_out {
-        terminal.remark(&format!("{}: left out: {id} ({meaning})", arguments.source.display()));
+    let why = |of: OnBoard| format.has_effects.then(|| of.detail());
+    let left_out: Vec<LeftOut> = robot
+        .left_out(format.has_effects)
+        .map(|effect| LeftOut { id: effect.id, meaning: effect.meaning, why: why(effect.on_board) })
+        .collect();
+    for LeftOut { id, meaning, why } in &left_out {
+        let why = why.map_or_else(String::new, |why| format!(": {why}"));
+        terminal.remark(&format!("{}: left out: {id} ({meaning}){why}", arguments.source.display()));
     }
     for caution in &robot.cautions {
         terminal.remark(&format!("warning: {}: {caution}", arguments.source.display()));
     }
+    let drift = match format.has_effects {
+        true => Some(export_drift::of(&robot, &arguments.source, arguments.dataset.as_deref(), &options, terminal)?),
+        false => None,
+    };
     match &arguments.out {
         Some(out) => {
             write_whole(out, text.as_bytes())?;
             terminal.say(&format!("{} in {}", format.name, out.display()))?;
+            drift.as_ref().map_or(Ok(()), |drift| terminal.say(&drift.text()))?;
         }
-        None => terminal.say(text.trim_end_matches('\n'))?,
+        None => {
+            // The text alone stands on standard output.
+            terminal.say(text.trim_end_matches('\n'))?;
+            drift.iter().for_each(|drift| terminal.remark(&drift.text()));
+        }
     }
     terminal.document(&Document {
         format: format.name.to_owned(),
@@ -200,6 +222,7 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         text: arguments.out.is_none().then_some(text),
         left_out,
         cautions: robot.cautions,
+        drift_percent: drift,
         runs: Vec::new(),
     })?;
     Ok(ExitCode::SUCCESS)
@@ -352,6 +375,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         text,
         left_out: Vec::new(),
         cautions: Vec::new(),
+        drift_percent: None,
         runs: texts.into_iter().map(|(id, _)| id).collect(),
     })?;
     Ok(ExitCode::SUCCESS)

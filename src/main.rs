@@ -10,6 +10,7 @@ mod diagnose;
 mod diagnosis_page;
 mod evaluate;
 mod export;
+mod export_drift;
 mod export_mcap;
 mod help;
 mod html_report;

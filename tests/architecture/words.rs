@@ -200,11 +200,9 @@ fn documents_help_and_comments_are_in_the_fields_words() {
     }
     let help = |arguments: &[&str]| succeed(root(), &[arguments, &["--help"]].concat()).stdout;
     let commands = help(&[]);
-    let (_, list) = commands.split_once("Commands:").expect("the command lists its subcommands");
+    let (list, _) = commands.split_once("\nOptions:").expect("the command lists its subcommands");
     let names: Vec<&str> = list
         .lines()
-        .skip(1)
-        .take_while(|line| !line.trim().is_empty())
         // What a line goes on with stands further in.
         .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
         .filter(|name| !matches!(*name, "" | "help"))

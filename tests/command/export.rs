@@ -103,8 +103,8 @@ fn joint_writes_what_an_export_needs() {
 fn an_extended_model_says_what_a_format_leaves_out() {
     let temp = tempfile::tempdir().expect("a temporary folder");
     let at = temp.path();
-    let effects = "[[effect]]\nkind = \"slip_speed\"\nslip_s_m = 0.01\n\n[[effect]]\nkind = \"wheel_eccentricity\"\n\
-                   right_amplitude = 0.01\nright_phase_rad = 1.0\n\n[[protocol]]";
+    let effects = "[[effect]]\nkind = \"slip_speed\"\nslip_s_m = 0.01\n\n[[effect]]\nkind = \"dropped_samples\"\n\
+                   probability = 0.01\n\n[[protocol]]";
     let model = include_str!("../../scenarios/motion-capture.toml").replacen("[[protocol]]", effects, 1);
     fs::write(at.join("extended.toml"), model).expect("written");
     let ids = |format: &str| {
@@ -113,11 +113,39 @@ fn an_extended_model_says_what_a_format_leaves_out() {
         all.iter().map(|effect| effect["id"].as_str().unwrap_or_default().to_owned()).collect::<Vec<_>>()
     };
     let in_c = ids("c");
-    assert!(in_c.contains(&"wheel_eccentricity".to_owned()) && !in_c.contains(&"slip_speed".to_owned()), "{in_c:?}");
+    assert!(in_c.contains(&"dropped_samples".to_owned()) && !in_c.contains(&"slip_speed".to_owned()), "{in_c:?}");
+    let said = succeed(at, &["export", "c", "extended.toml"]).stderr;
+    assert!(said.contains("later readings") && said.contains("drift: not known: it needs a dataset"), "{said}");
     assert!(ids("ros2-yaml").contains(&"slip_speed".to_owned()));
     let said = succeed(at, &["export", "ros2-yaml", "extended.toml"]);
     assert!(said.stderr.contains("extended.toml: left out: slip_speed ("), "{}", said.stderr);
     assert!(said.stdout.contains("# Left out: slip_speed ("), "{}", said.stdout);
+}
+
+/// The drift by the header is that of `yair evaluate` where nothing needs rows on both sides; what cannot be
+/// known says why.
+#[test]
+fn a_header_says_the_drift_that_is_left_on_board() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    dataset(at, "set", 0.4);
+    fs::write(at.join("c.toml"), CALIBRATION).expect("written");
+    let found = document(at, &["export", "c", "c.toml", "--dataset", "set"]);
+    let percent = |of: &str| found["drift_percent"][of].as_f64().unwrap_or_else(|| panic!("{of}: {found}"));
+    let evaluated = document(at, &["evaluate", "set", "--calibration", "c.toml"]);
+    let of = |number: usize| evaluated["calibrations"][number]["drift_percent"].as_f64().expect("a drift");
+    assert_eq!((percent("nominal"), percent("offline")), (of(0), of(1)));
+    // Headings are summed on board, and functions of the counts there.
+    assert!((percent("on_board") - of(1)).abs() < 1e-9, "{found}");
+    assert!(found["drift_percent"]["on_board_untold"].is_null() && found["drift_percent"].get("why_null").is_none());
+    let said = succeed(at, &["export", "c", "c.toml", "--dataset", "set"]).stderr;
+    assert!(said.starts_with("drift: nominal ") && said.contains(" %, on board "), "{said}");
+    fs::remove_file(at.join("set/truth.csv")).expect("there");
+    fs::write(at.join("set/displacement.csv"), "run,t0_s,t1_s,dx_m,dy_m,dtheta_rad\na,0,1,0.5,0,0\nb,0,1,0.5,0,0\n")
+        .expect("written");
+    let found = document(at, &["export", "c", "c.toml", "--dataset", "set"]);
+    let why = found["drift_percent"]["why_null"].as_str().unwrap_or_default().to_owned();
+    assert!(found["drift_percent"]["on_board"].is_null() && why.contains("no absolute truth"), "{found}");
 }
 
 #[test]

@@ -4,3 +4,4 @@
 mod engines_agree;
 mod hypotheses;
 mod laws;
+mod on_board;

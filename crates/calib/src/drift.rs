@@ -115,6 +115,39 @@ pub fn evaluate_runs(
     session.runs.iter().map(of).collect()
 }
 
+/// One run along a path that something else dead-reckoned, measured as under a calibration: `path` makes it
+/// from the pose at the log's first row and the distance driven in the session before, metres.
+///
+/// Both begin at the same pose and meet the first measurement; the length is that under the calibration.
+#[must_use]
+pub fn evaluate_path(
+    session: &Session<'_>,
+    run: &RunView<'_>,
+    calibration: &AugmentedCalibration,
+    options: &EvaluationOptions,
+    driven_m: &mut f64,
+    path: impl FnOnce(Pose, f64) -> Option<Vec<(f64, Pose)>>,
+) -> RunDrift {
+    let before_m = *driven_m;
+    let Some(mut trajectory) = Trajectory::under(session, run, Some(calibration), driven_m) else {
+        return unknown(run, 0.0, "the calibration has no value that this robot's geometry needs");
+    };
+    let (Ok(moved), Some((_, first)), Some((t_s, measured))) =
+        (trajectory.moved, trajectory.log.first(), trajectory.measured.first().copied())
+    else {
+        return run_drift(run, trajectory, options.pose_errors.as_ref());
+    };
+    let Some(log) = path(moved * *first, before_m) else {
+        return unknown(run, trajectory.length_m, "its wheels are not logged as counts");
+    };
+    let log_start_s = log.first().map_or(t_s, |(start_s, _)| *start_s);
+    let to_first = |there: Pose| measured * there.inverse();
+    let no_overlap = "the truth does not overlap the odometry in time";
+    trajectory.moved = at(&log, t_s.max(log_start_s), &mut 0).map(to_first).ok_or(no_overlap);
+    trajectory.log = log;
+    run_drift(run, trajectory, options.pose_errors.as_ref())
+}
+
 impl CalibrationDrift {
     /// The drift of runs that were evaluated under one calibration.
     #[must_use]

@@ -29,7 +29,7 @@ pub use alignment::Alignment;
 pub use compare::{
     ComparedMethod, ComparedSession, Comparison, KindMean, Pair, Refusal, TooFewSessions, compare, path_kind,
 };
-pub use drift::{CalibrationDrift, EvaluationOptions, RunDrift, evaluate, evaluate_runs};
+pub use drift::{CalibrationDrift, EvaluationOptions, RunDrift, evaluate, evaluate_path, evaluate_runs};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,

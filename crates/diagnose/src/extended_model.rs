@@ -55,7 +55,8 @@ pub enum ExtendedModelError {
 pub struct ModelledEffect {
     /// Its id; of a term outside of the catalogue that of such terms.
     pub id: &'static str,
-    /// Sizes of its mean term by name, with what is held of it; empty where it has none.
+    /// Sizes of its mean term by name, with what is held of it; those of its simulation model where it has no
+    /// mean.
     pub values: Vec<(String, f64)>,
     /// Its mean terms among those of the calibration.
     pub terms: Range<usize>,
@@ -92,7 +93,7 @@ impl ExtendedModel {
         for effect in &scenario.effects {
             let id = effect.id();
             let first = terms.len();
-            let mut of_mean = Vec::new();
+            let mut own_sizes = sizes(effect);
             match effect.hypothesis().ok_or(ExtendedModelError::NoTerm { id })? {
                 Hypothesis::Geometry | Hypothesis::Silent => {}
                 Hypothesis::UnknownMotion { .. } => {
@@ -114,10 +115,10 @@ impl ExtendedModel {
                         terms.push(term);
                         term_values.extend(values);
                     }
-                    of_mean = values;
+                    own_sizes = values;
                 }
             }
-            effects.push(ModelledEffect { id, values: of_mean, terms: first..terms.len() });
+            effects.push(ModelledEffect { id, values: own_sizes, terms: first..terms.len() });
         }
         let calibration = NamedCalibration { name: scenario.name.clone(), values: calibrated(scenario)? };
         Ok(Self { calibration: AugmentedCalibration { calibration, terms, term_values }, effects, remarks, faults })

@@ -7,7 +7,7 @@
 
 use crate::benchmark::Benchmark;
 use crate::estimates::Estimates;
-use crate::on_board::OnBoard;
+use crate::on_board::{OnBoard, UNSTATED};
 
 /// Properties of an effect, whatever its sizes.
 #[derive(Clone)]
@@ -72,7 +72,7 @@ impl Description {
             clock_offset: None,
             extrinsic: None,
             geometry: None,
-            on_board: OnBoard::LeftOut,
+            on_board: OnBoard::Never(UNSTATED),
             benchmark: Benchmark::OF_MEAN,
         }
     }

@@ -36,7 +36,7 @@ pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};
 pub use forward::{Command, Forward, Hooks, PoseReading, Readout, RunStart, SampleClock, Step};
 pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
-pub use on_board::OnBoard;
+pub use on_board::{Code, Correction, Input, IntervalScatter, OnBoard, RawInterval, Scatter, ScatterModel, SizeOf};
 pub use stream::{Address, Stream, StreamName};
 pub use term::{Sparse, SparseTerm};
 

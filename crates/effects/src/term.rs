@@ -25,6 +25,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant};
 use crate::motion_history::{MotionHistory, MotionHistoryTracker};
+use crate::on_board::OnBoard;
 use recorded::{OfRows, ROW_SHARE, Recorded};
 pub use sparse::Sparse;
 use sparse::{CONSTANT, on_channel, parameter, seen};
@@ -190,7 +191,10 @@ impl PhysicalEffect for SparseTerm {
     }
 
     fn description() -> Description {
-        Description::of("a product of covariates that no effect of the catalogue has")
+        Description {
+            on_board: OnBoard::Never("a product of covariates has no statements of its own"),
+            ..Description::of("a product of covariates that no effect of the catalogue has")
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use effects::{
-    Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError,
+    Address, CATALOGUE, Description, Estimate, Estimates, Excitation, HostRobot, Hypothesis, IsolatedError, OnBoard,
     ParameterLaw, ParameterValues, StreamName, description, hypothesis,
 };
 use model_term::TermParameter;
@@ -35,7 +35,7 @@ speed, yaw rate and acceleration of the drive's centre, v_w, a_w those of a whee
 paths: what tells two apart is the path.
 
 *Meaning* is how a report tells of the effect, here with its sizes large. *Large* is what a real robot may have: detection limits and plans are judged by it. What is driven excites
-an effect unless it says otherwise under *Excited by*. *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or at a
+an effect unless it says otherwise under *Excited by*. *On board* is what a robot's own program can do of it ([export.md](export.md#on-board)). *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or at a
 scale of the sizes given, and where it has another functional form than the catalogue's, in that on one robot in two.
 
 This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test --release -p effects --test document`.
@@ -204,6 +204,13 @@ fn benchmark(id: &str, description: &Description) -> Option<String> {
     Some(format!("{law}{form}"))
 }
 
+/// How it can run on board.
+fn on_board(of: OnBoard) -> String {
+    let detail = if of.detail().is_empty() { String::new() } else { format!(": {}", of.detail()) };
+    let lag = of.lag().map_or_else(String::new, |lag| format!("; lag: {lag}"));
+    format!("{}{detail}{lag}", of.kind())
+}
+
 fn section(id: &str, source: &str) -> Result<String, String> {
     let (first, labelled) = header(id, source)?;
     let description = description(id).ok_or_else(|| format!("{id}: unknown"))?;
@@ -248,6 +255,7 @@ fn section(id: &str, source: &str) -> Result<String, String> {
     if let Some(law) = benchmark(id, &description) {
         add("Benchmark", format!("{law}."));
     }
+    add("On board", format!("{}.", on_board(description.on_board)));
     let mut text = format!("## `{id}`\n\n{first}\n\n");
     for (label, item) in items {
         writeln!(text, "- {label}: {item}").map_err(|error| error.to_string())?;
@@ -267,6 +275,51 @@ fn document() -> String {
         text.push_str(&format!("\n{}", section(id, &source(id)).unwrap_or_else(|problem| panic!("{problem}"))));
     }
     text
+}
+
+/// The table of docs/export.md: kinds in the order of what they can, and effects of the same kind and detail.
+fn table_of_kinds() -> String {
+    const KINDS: [&str; 8] = [
+        "geometry",
+        "static",
+        "with state",
+        "with an input",
+        "a constant",
+        "covariance only",
+        "never",
+        "of the instrument",
+    ];
+    let mut rows: Vec<(&str, &str, Vec<&str>)> = Vec::new();
+    for id in CATALOGUE {
+        let of = description(id).expect("known").on_board;
+        match rows.iter_mut().find(|(kind, detail, _)| (*kind, *detail) == (of.kind(), of.detail())) {
+            Some((.., ids)) => ids.push(id),
+            None => rows.push((of.kind(), of.detail(), vec![id])),
+        }
+    }
+    let place = |kind: &str| KINDS.iter().position(|of| *of == kind).unwrap_or_else(|| panic!("{kind} has no place"));
+    rows.sort_by_key(|(kind, ..)| place(kind));
+    let mut text = "| kind | effects | remembers, is told, or why not |\n| --- | --- | --- |\n".to_owned();
+    for (kind, detail, ids) in rows {
+        let detail = if detail.is_empty() { "counts of one interval and its length" } else { detail };
+        text.push_str(&format!("| {kind} | {} | {detail} |\n", listed(ids)));
+    }
+    text
+}
+
+#[test]
+fn the_table_of_what_runs_on_board_is_what_the_catalogue_says() {
+    const BEGINS: &str = "<!-- on board: generated -->\n";
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/export.md");
+    let text = fs::read_to_string(&path).expect("docs/export.md is there");
+    let (before, rest) = text.split_once(BEGINS).expect("the table's mark");
+    let (written, after) = rest.split_once("<!-- end -->").expect("the table's end");
+    let table = table_of_kinds();
+    if std::env::var("YAIR_UPDATE_DOCS").is_ok_and(|value| value == "1") {
+        fs::write(&path, format!("{before}{BEGINS}{table}<!-- end -->{after}")).expect("written");
+    } else {
+        assert_eq!(written, table, "run YAIR_UPDATE_DOCS=1 cargo test --release -p effects --test document");
+    }
 }
 
 #[test]

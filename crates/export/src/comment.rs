@@ -5,16 +5,28 @@ use crate::robot::{CalibratedRobot, Length};
 /// Longest text of a file in a comment, characters.
 const MAX_CHARS: usize = 160;
 
+/// Separators of lines that are no control characters, and signs that turn the direction of text: compilers
+/// warn of the latter, since a reader sees another text than they do.
+const BREAKS: [char; 14] = [
+    '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}',
+    '\u{2066}', '\u{2067}', '\u{2068}', '\u{2069}', '\u{feff}',
+];
+
 /// Text of a file as any comment may hold it: on one line, without what ends a comment of C or Java, and
 /// clipped.
 pub(crate) fn comment(text: &str) -> String {
-    let plain = |letter: char| if letter.is_control() { ' ' } else { letter };
+    let plain = |letter: char| if letter.is_control() || BREAKS.contains(&letter) { ' ' } else { letter };
     let mut line: String = text.chars().map(plain).take(MAX_CHARS).collect();
     if text.chars().nth(MAX_CHARS).is_some() {
         line.push('…');
     }
     // A backslash would go on to the next line (C) or begin an escape (\u in Java).
-    line.replace('\\', "/").replace("*/", "* /").replace("/*", "/ *")
+    line = line.replace('\\', "/").replace("*/", "* /").replace("/*", "/ *");
+    // A trigraph may be a backslash, or be warned of.
+    while line.contains("??") {
+        line = line.replace("??", "? ?");
+    }
+    line
 }
 
 /// Text wrapped into lines that begin alike; continuation lines are indented by two more columns.
@@ -43,14 +55,15 @@ pub(crate) fn origin(start: &str, format: &str, robot: &CalibratedRobot) -> Stri
 }
 
 /// What the calibration cautions of, and which effects of an extended model the format leaves out;
-/// `has_static` says that those with statements in C are not left out.
-pub(crate) fn limits(start: &str, robot: &CalibratedRobot, has_static: bool) -> String {
+/// `runs_effects` says that those that can run on board are not left out.
+pub(crate) fn limits(start: &str, robot: &CalibratedRobot, runs_effects: bool) -> String {
     let mut lines = String::new();
     for caution in &robot.cautions {
         lines.push_str(&wrapped(start, &format!("Caution: {}.", comment(caution))));
     }
-    for effect in robot.left_out(has_static) {
-        lines.push_str(&wrapped(start, &format!("Left out: {} ({}).", effect.id, effect.meaning)));
+    for effect in robot.left_out(runs_effects) {
+        let why = if runs_effects { format!(": {}", effect.on_board.detail()) } else { String::new() };
+        lines.push_str(&wrapped(start, &format!("Left out: {} ({}){why}.", effect.id, effect.meaning)));
     }
     lines
 }
@@ -94,6 +107,8 @@ mod tests {
     fn no_text_of_a_file_ends_a_comment() {
         assert_eq!(comment("a */ int x; /* b\n#define C\r\tend \\"), "a * / int x; / * b #define C  end /");
         assert_eq!(comment("**/"), "** /");
+        assert_eq!(comment("*??/ ???/ *\\"), "*? ?/ ? ? ?/ * /");
+        assert_eq!(comment("a\u{2028}b\u{202e}c"), "a b c");
         assert_eq!(comment(&"x".repeat(1000)).chars().count(), MAX_CHARS + 1);
     }
 

@@ -5,16 +5,21 @@
 //! of the model that are left out, with their names. What the data do not determine is never written.
 //! [`OnBoardOdometry`] is what the C header computes, in Rust, so that a test can compare the two.
 
+mod causal;
 mod comment;
 mod error;
 pub mod format;
+mod log_path;
 mod on_board;
+mod on_board_covariance;
 mod options;
 mod robot;
 mod settings;
 mod tum;
 
+pub use causal::OnBoardInputs;
 pub use error::ExportError;
+pub use log_path::LogStart;
 pub use on_board::OnBoardOdometry;
 pub use options::{Lengths, Options};
 pub use robot::{CalibratedRobot, Length, RobotEffect};

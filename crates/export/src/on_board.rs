@@ -1,32 +1,45 @@
-//! What the C header computes, in Rust: dead reckoning as a robot does it on line, from counts alone.
+//! What the C header computes, in Rust: dead reckoning as a robot does it on line, from counts and from what
+//! it is told, with nothing of what comes after.
 //!
 //! A plain calibration goes by the midpoint rule and an extended model by exact arcs of counts and terms
 //! together, as evaluation does; the mean terms of the effects are the estimation model's own, with speeds
-//! from the interval itself instead of from rows around it. Covariance:
-//! `kinematics::OdometryCovariance` along the counts, and the noise of turns.
+//! from the interval itself and those before instead of from rows around it (`causal.rs`). Covariance:
+//! `on_board_covariance.rs`.
 
-use calib::OdometryNoise;
 use dataset::RunInfo;
-use effects::OnBoard;
-use kinematics::{Increment, OdometryCovariance, Pose, WheelNoise, Wheels};
+use effects::{Input, OnBoard, RawInterval};
+use kinematics::{Increment, Pose, Wheels};
 use model_term::{Interval, ModelTerm};
 use nalgebra::Matrix3;
 
+use crate::causal::{FollowedInputs, KnownInputs, OnBoardInputs, PastIntervals};
 use crate::error::ExportError;
-use crate::robot::CalibratedRobot;
+use crate::on_board_covariance::OnBoardCovariance;
+use crate::robot::{CalibratedRobot, RobotEffect};
 use crate::settings::DEFAULT_COUNTER_BITS;
+
+/// A mean term on board.
+struct Term {
+    term: Box<dyn ModelTerm>,
+    values: Vec<f64>,
+    input: Option<Input>,
+    gradient: Vec<Pose>,
+}
 
 /// A robot's odometry on line.
 pub struct OnBoardOdometry {
     m_per_count: Wheels<f64>,
+    rad_per_count: f64,
     wheel_separation_m: f64,
     is_extended: bool,
     counter_bits: u8,
-    noise: Option<OdometryNoise>,
-    terms: Vec<(Box<dyn ModelTerm>, Vec<f64>)>,
+    corrections: Vec<RobotEffect>,
+    terms: Vec<Term>,
+    past: PastIntervals,
+    inputs: FollowedInputs,
     run: RunInfo,
     pose: Pose,
-    covariance: OdometryCovariance,
+    covariance: Option<OnBoardCovariance>,
     counts: Wheels<i64>,
 }
 
@@ -41,69 +54,86 @@ impl OnBoardOdometry {
         let m_per_count = geometry
             .m_per_count(ticks_per_rev)
             .map_err(|source| ExportError::NotADrive { place: robot.place.clone(), source })?;
-        let has_statements = |effect: &&crate::RobotEffect| matches!(effect.on_board, OnBoard::Static(_));
-        let terms = robot.effects.iter().filter(has_statements).flat_map(|effect| effect.terms.clone());
+        let terms = robot.effects.iter().filter(|effect| effect.on_board.has_mean()).flat_map(|effect| {
+            let input = effect.on_board.input();
+            effect.terms.iter().map(move |(term, values)| {
+                let mut term = term.clone();
+                term.linearize_at(values);
+                term.restart(&RunInfo::default());
+                Term { term, values: values.clone(), input, gradient: vec![Pose::IDENTITY; values.len()] }
+            })
+        });
+        let wheel_separation_m = geometry.wheel_separation_m();
         Ok(Self {
             m_per_count,
-            wheel_separation_m: geometry.wheel_separation_m(),
+            rad_per_count: std::f64::consts::TAU / ticks_per_rev,
+            wheel_separation_m,
             is_extended: robot.is_extended,
             counter_bits: width(robot, counter_bits),
-            noise: robot.noise,
+            corrections: robot.corrections().cloned().collect(),
             terms: terms.collect(),
+            past: PastIntervals::default(),
+            inputs: FollowedInputs::default(),
             run: RunInfo::default(),
             pose: Pose::IDENTITY,
-            covariance: OdometryCovariance::default(),
+            covariance: robot.noise.map(|noise| OnBoardCovariance::new(noise, robot, wheel_separation_m)),
             counts,
         })
     }
 
-    /// Goes on to these counts, which came so many seconds after those before.
+    /// From this pose on.
+    #[must_use]
+    pub const fn starting_at(mut self, pose: Pose) -> Self {
+        self.pose = pose;
+        self
+    }
+
+    /// Goes on to these counts, which came so many seconds after those before; nothing new is told.
     pub fn step(&mut self, counts: Wheels<i64>, dt_s: f64) {
+        self.step_with(counts, dt_s, &OnBoardInputs::default());
+    }
+
+    /// Goes on to these counts, which came so many seconds after those before, with what is told of them.
+    pub fn step_with(&mut self, counts: Wheels<i64>, dt_s: f64, told: &OnBoardInputs) {
         let bits = self.counter_bits;
         let since = counts.zip_with(self.counts, |now, before| difference(now, before, bits));
         self.counts = counts;
+        let raw = RawInterval { counts: since, dt_s };
+        let RawInterval { counts: since, dt_s } = self.corrections.iter().fold(raw, |raw, effect| {
+            let OnBoard::Constant(correction) = effect.on_board else { return raw };
+            (correction.correct)(&|name| effect.size(name), raw)
+        });
         let travel_m = self.m_per_count.zip_with(since, |m_per_count, counts| m_per_count * counts);
         let speed_m_s = travel_m.map(|travel_m| if dt_s > 0.0 { travel_m / dt_s } else { 0.0 });
         let before = self.pose;
         let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.wheel_separation_m);
+        let turned_rad = since.map(|counts| self.rad_per_count * counts);
+        let known = self.inputs.after(told, before, turned_rad, (distance_m, turn_rad, dt_s));
+        if let (Some(payload_kg), Some(key)) = (known.payload_kg, Input::Payload.covariate()) {
+            self.run.covariates.insert(key.to_owned(), payload_kg);
+        }
         let interval = Interval {
-            t_s: 0.0,
+            t_s: known.session_s.unwrap_or(0.0),
             dt_s,
-            late_s: [0.0; 2],
+            late_s: self.past.lateness(dt_s),
             travel_m,
             speed_m_s,
-            speed_at_ends_m_s: [speed_m_s; 2],
+            speed_at_ends_m_s: self.past.speeds(travel_m, dt_s),
             count_m: self.m_per_count,
             wheel_separation_m: self.wheel_separation_m,
-            wheel_rad: Wheels::both(0.0),
-            turned_rad: Wheels::both(0.0),
-            world_from_body: before,
-            session_m: 0.0,
+            wheel_rad: known.wheel_rad.map(|from_rad| from_rad.unwrap_or(0.0)),
+            turned_rad,
+            world_from_body: Pose { theta_rad: known.room_heading_rad.unwrap_or(before.theta_rad), ..before },
+            session_m: known.session_m.unwrap_or(0.0),
             run: &self.run,
         };
-        let mut change = Pose::IDENTITY;
-        for (term, values) in &mut self.terms {
-            let mut gradient = vec![Pose::IDENTITY; values.len()];
-            term.motion(&interval, &mut gradient);
-            for (by, value) in gradient.iter().zip(values.iter()) {
-                change.x_m += value * by.x_m;
-                change.y_m += value * by.y_m;
-                change.theta_rad += value * by.theta_rad;
-            }
-        }
+        let change = of_terms(&mut self.terms, &interval, &known);
         let moved = Increment { distance_m: distance_m + change.x_m, turn_rad: turn_rad + change.theta_rad };
+        if let Some(covariance) = &mut self.covariance {
+            covariance.after(before, before.theta_rad + moved.turn_rad, &interval);
+        }
         let moved = if self.is_extended { moved.arc() } else { moved.midpoint() };
         self.pose = before * moved * Pose::new(0.0, change.y_m, 0.0);
-        self.scatter(before, travel_m, turn_rad);
-    }
-
-    fn scatter(&mut self, before: Pose, travel_m: Wheels<f64>, turn_rad: f64) {
-        let Some(OdometryNoise { wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad }) = self.noise else { return };
-        let wheels = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(wheel_sigma_m_per_sqrt_m) };
-        self.covariance.propagate(before, travel_m, self.wheel_separation_m, &wheels);
-        let mut matrix = *self.covariance.matrix();
-        matrix[(2, 2)] += turn_sigma_rad_per_sqrt_rad.powi(2) * turn_rad.abs();
-        self.covariance = OdometryCovariance::starting_at(matrix);
     }
 
     /// The pose of the drive's centre.
@@ -112,17 +142,43 @@ impl OnBoardOdometry {
         self.pose
     }
 
-    /// Its covariance (x, y, θ) since the start, by the noise of the odometry alone; `None` where that was
-    /// not estimated.
+    /// Its covariance (x, y, θ) since the start, by the noise of the odometry and what else scatters; `None`
+    /// where that was not estimated.
     #[must_use]
     pub fn covariance(&self) -> Option<&Matrix3<f64>> {
-        self.noise.map(|_| self.covariance.matrix())
+        self.covariance.as_ref().map(OnBoardCovariance::matrix)
     }
 }
 
-/// Width of a robot's counters: as chosen, as stated, or the usual one.
+/// What the terms add to the motion by the counts; those without their input add nothing.
+fn of_terms(terms: &mut [Term], interval: &Interval<'_>, known: &KnownInputs) -> Pose {
+    // Without its angle a wheel does not turn, as far as its phase goes.
+    let turned_rad = Wheels::from_sides(|side| known.wheel_rad[side].map_or(0.0, |_| interval.turned_rad[side]));
+    let by_phase = Interval { turned_rad, ..*interval };
+    let mut change = Pose::IDENTITY;
+    for Term { term, values, input, gradient } in terms {
+        if input.is_some_and(|input| !known.has(input)) {
+            continue;
+        }
+        gradient.fill(Pose::IDENTITY);
+        term.motion(if *input == Some(Input::WheelAngles) { &by_phase } else { interval }, gradient);
+        for (by, value) in gradient.iter().zip(values.iter()) {
+            change.x_m += value * by.x_m;
+            change.y_m += value * by.y_m;
+            change.theta_rad += value * by.theta_rad;
+        }
+    }
+    change
+}
+
+/// Width of a robot's counters: as chosen, as its records have it, as stated, or the usual one.
 pub(crate) fn width(robot: &CalibratedRobot, chosen: Option<u8>) -> u8 {
-    chosen.or(robot.counter_bits).unwrap_or(DEFAULT_COUNTER_BITS)
+    let of_record = |effect: &RobotEffect| match effect.on_board {
+        OnBoard::Constant(correction) => correction.counter_bits.map(|name| effect.size(name) as u8),
+        _ => None,
+    };
+    let recorded = || robot.effects.iter().find_map(of_record);
+    chosen.or_else(recorded).or(robot.counter_bits).unwrap_or(DEFAULT_COUNTER_BITS)
 }
 
 /// Counts between two readings of a counter that wraps: the nearer way round.

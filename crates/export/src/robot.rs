@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use calib::{MethodReport, NamedCalibration, OdometryNoise, Parameter, nominal_value};
 use dataset::NominalRobot;
 use diagnose::{ExtendedModel, ModelledEffect};
-use effects::{Hypothesis, OnBoard};
+use effects::{Effect, Hypothesis, OnBoard, Variant};
 use kinematics::{DriveGeometry, Wheels};
 use model_term::ModelTerm;
 use scenario::Scenario;
@@ -38,6 +38,33 @@ pub struct RobotEffect {
     pub values: Vec<(String, f64)>,
     /// Its mean terms, each with the values of its parameters.
     pub terms: Vec<(Box<dyn ModelTerm>, Vec<f64>)>,
+    /// It is innocent: a format without it leaves out nothing.
+    pub is_silent: bool,
+}
+
+impl RobotEffect {
+    /// A size by its name; 0 where it has none of that name.
+    #[must_use]
+    pub fn size(&self, name: &str) -> f64 {
+        self.values.iter().find(|(of, _)| of == name).map_or(0.0, |(_, value)| *value)
+    }
+
+    /// The sizes that its statements may read: those of its mean terms, or of its simulation model where it
+    /// has no mean.
+    pub(crate) fn size_names(&self) -> Vec<String> {
+        let variants = effects::hypothesis(self.id).and_then(Hypothesis::into_variants).unwrap_or_default();
+        let mut names: Vec<String> = Vec::new();
+        for Variant { fixed, term, .. } in &variants {
+            names.extend(fixed.iter().map(|(name, _)| (*name).to_owned()));
+            names.extend(term.parameters().iter().map(|parameter| parameter.name.to_owned()));
+        }
+        if variants.is_empty() {
+            names.extend(self.values.iter().map(|(name, _)| name.clone()));
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        names.retain(|name| self.on_board.uses(name) && seen.insert(name.clone()));
+        names
+    }
 }
 
 impl std::fmt::Debug for RobotEffect {
@@ -66,7 +93,7 @@ pub struct CalibratedRobot {
     pub noise: Option<OdometryNoise>,
     /// It is an extended model: its dead reckoning goes by exact arcs.
     pub is_extended: bool,
-    /// Effects beyond the geometry; those of the outside instrument and innocent ones are none of the robot.
+    /// Effects beyond the geometry, in the order in which they act.
     pub effects: Vec<RobotEffect>,
     /// What the data do not determine, and other cautions.
     pub cautions: Vec<String>,
@@ -144,7 +171,8 @@ impl CalibratedRobot {
             name: scenario.name.clone(),
             wheel_diameter: Wheels { left, right },
             wheel_separation,
-            ticks_per_rev: nominal.ticks_per_rev,
+            // A tick of the log may be several counts of the controller.
+            ticks_per_rev: nominal.ticks_per_rev.map(|counts| counts / counts_per_tick(scenario)),
             counter_bits: robot.and_then(|robot| robot.counter_bits),
             noise: Some(OdometryNoise {
                 wheel_sigma_m_per_sqrt_m: scenario.noise.wheel_sigma_m_per_sqrt_m,
@@ -182,18 +210,37 @@ impl CalibratedRobot {
         (self.wheel_diameter.left.value_m * self.wheel_diameter.right.value_m).sqrt()
     }
 
-    /// Effects that a format without any effect leaves out; `has_static` keeps those that have statements.
-    pub fn left_out(&self, has_static: bool) -> impl Iterator<Item = &RobotEffect> {
-        self.effects.iter().filter(move |effect| !(has_static && matches!(effect.on_board, OnBoard::Static(_))))
+    /// Effects that a format leaves out; one that runs effects leaves out what cannot run on board, and names
+    /// what is of the instrument too.
+    pub fn left_out(&self, runs_effects: bool) -> impl Iterator<Item = &RobotEffect> {
+        self.effects.iter().filter(move |effect| match effect.on_board {
+            OnBoard::OfInstrument => runs_effects,
+            _ if !runs_effects => !effect.is_silent,
+            OnBoard::Never(_) => true,
+            OnBoard::CovarianceOnly(_) => self.noise.is_none(),
+            _ => false,
+        })
+    }
+
+    /// Faults of the records in the order in which they are undone: the last that acted is the first.
+    pub fn corrections(&self) -> impl Iterator<Item = &RobotEffect> {
+        self.effects.iter().rev().filter(|effect| matches!(effect.on_board, OnBoard::Constant(_)))
     }
 }
 
-/// An effect of a model, unless the geometry has it, it is of the outside instrument, or innocent.
+/// Counts of a tick of the log.
+fn counts_per_tick(scenario: &Scenario) -> f64 {
+    let of = |effect: &Effect| effect.physical().forward()?.counts_per_tick();
+    scenario.effects.iter().filter_map(of).map(f64::from).product()
+}
+
+/// An effect of a model, unless the geometry has it or nothing is said of it.
 fn of_robot(effect: &ModelledEffect, model: &ExtendedModel) -> Option<RobotEffect> {
     let description = effects::description(effect.id);
-    let is_of_geometry = matches!(effects::hypothesis(effect.id), Some(Hypothesis::Geometry | Hypothesis::Silent));
-    let on_board = description.as_ref().map_or(OnBoard::LeftOut, |of| of.on_board);
-    if is_of_geometry || on_board == OnBoard::OfInstrument {
+    let on_board = description
+        .as_ref()
+        .map_or(OnBoard::Never("a product of covariates has no statements of its own"), |of| of.on_board);
+    if matches!(on_board, OnBoard::Geometry) {
         return None;
     }
     let mut values = &model.calibration.term_values[..];
@@ -211,6 +258,7 @@ fn of_robot(effect: &ModelledEffect, model: &ExtendedModel) -> Option<RobotEffec
         on_board,
         values: effect.values.clone(),
         terms,
+        is_silent: matches!(effects::hypothesis(effect.id), Some(Hypothesis::Silent)),
     })
 }
 

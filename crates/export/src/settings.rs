@@ -31,3 +31,15 @@ pub(crate) const WHOLE_COUNTS_TOLERANCE: f64 = 1e-9;
 /// Ratio. Nominal lengths of a dataset and of a calibration file differ from here on.
 /// Derived: what is written as a ratio comes back to a few 1e-16.
 pub(crate) const SAME_NOMINAL_TOLERANCE: f64 = 1e-9;
+
+/// Share. Lateness of a stamp that is kept from interval to interval on board.
+/// Convention: a fading mean over 20 intervals, which leaves a sixth of white jitter, √(0.05/1.95).
+pub(crate) const LATENESS_KEPT: f64 = 0.95;
+
+/// Intervals. Number of past intervals whose mean is the period of the stamps on board.
+/// Convention: two seconds at 50 Hz; the mean is known to a hundredth of the jitter.
+pub(crate) const PERIOD_INTERVALS: f64 = 100.0;
+
+/// Share of the period. An interval that is off by more is a pause and no jitter.
+/// Convention: half; a row that is missing is off by one.
+pub(crate) const MAX_JITTER_SHARE: f64 = 0.5;

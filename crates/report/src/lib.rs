@@ -7,9 +7,9 @@
 //! Why no plotting crate: `plotters` measures text through `font-kit`, the system's fonts; `charming` renders
 //! in a JavaScript engine; `kuva` 0.6 (95 000 lines, young) came nearest, but drew the outermost points half
 //! outside the frame and does not look for a place where a legend covers no data. What is left is arithmetic
-//! on margins. The hard parts are crates: `svg` (the document, escaping), `ttf-parser` (text widths), `dejavu`
-//! (DejaVu Sans 2.37, Bitstream Vera licence, 1.4 MB linked: complete in Greek and superscripts, and wider than
-//! the usual fallbacks of a browser, so that a text that fits here fits there).
+//! on margins. The hard parts are crates: `svg` (the document, escaping), `ttf-parser` (text widths),
+//! `dejavu` (DejaVu Sans 2.37, Bitstream Vera licence, 1.4 MB linked: complete in Greek and superscripts, and
+//! wider than the usual fallbacks of a browser, so that a text that fits here fits there).
 //!
 //! The feature `png` adds a PNG beside every SVG, by `resvg` (of linebender, without its `system-fonts`).
 

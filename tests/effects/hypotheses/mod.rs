@@ -10,4 +10,4 @@ mod means;
 mod scatter;
 mod terms;
 mod variants;
-mod watched;
+pub(crate) mod watched;

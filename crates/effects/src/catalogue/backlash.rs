@@ -17,6 +17,7 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, OnBoard};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -24,6 +25,22 @@ const MEANING: &str = "there is play between encoder and wheel";
 
 /// Gaps that are tried, metres at the tread.
 const WIDTH_M: [f64; 3] = [0.5e-3, 1.0e-3, 2.0e-3];
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "where in its gap each wheel is",
+    lag: "none: it goes by the past alone; where in its gap a wheel was at the start nobody knows, half of the gap at most",
+    code: Code {
+        remembers: &[("left_lead", 0.0), ("right_lead", 0.0)],
+        functions: &[],
+        statements: "\
+const double left_before = own->left_lead, right_before = own->right_lead;
+own->left_lead = fmin(fmax(left_before + left_m / width_m, -0.5), 0.5);
+own->right_lead = fmin(fmax(right_before + right_m / width_m, -0.5), 0.5);
+left_change_m += left_gap_m * (left_before - own->left_lead);
+right_change_m += right_gap_m * (right_before - own->right_lead);",
+    },
+};
 
 /// Play of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -71,6 +88,7 @@ impl PhysicalEffect for Backlash {
                     },
                 )
             },
+            on_board: ON_BOARD,
             ..Description::of(MEANING)
         }
     }

@@ -9,6 +9,7 @@
 //! a rigid wheel.
 
 use kinematics::{Side, Wheels};
+use model_term::Interval;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, ParameterValue};
@@ -16,12 +17,55 @@ use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Sign, value_of};
+use crate::on_board::{Code, IntervalScatter, OnBoard, Scatter, ScatterModel};
 use crate::stream::Stream;
 
 /// Height of a bump of scale 1 in the blind benchmark, metres.
 const LARGE_HEIGHT_M: f64 = 3e-3;
 /// Scales of the distance that a wheel loses over a bump, metres: from what no instrument shows to a sill.
 const LOSS_SCALES_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+
+/// [`lost_m`] in C.
+const LOST_M: &str = "\
+/* Distance that a wheel loses over a bump. */
+static inline double yair_lost_over_bump(double radius_m, double height_m) {
+    const double h = fmin(height_m, radius_m);
+    return 2.0 * (radius_m * acos(1.0 - h / radius_m) - sqrt(h * (2.0 * radius_m - h)));
+}
+";
+
+/// What a robot's own odometry adds to its covariance: the variance of a compound Poisson process. The mean
+/// loss is in the calibrated wheels.
+const ON_BOARD: OnBoard = OnBoard::CovarianceOnly(Scatter {
+    of: "bumps that each wheel meets, in proportion to its travel",
+    code: Code {
+        remembers: &[],
+        functions: &[LOST_M],
+        statements: "\
+const double left_lost_m = yair_lost_over_bump(left_radius_m, height_m);
+const double right_lost_m = yair_lost_over_bump(right_radius_m, height_m);
+left_var_m2 += per_m * left_lost_m * left_lost_m * fabs(left_m);
+right_var_m2 += per_m * right_lost_m * right_lost_m * fabs(right_m);",
+    },
+    model: |size| Box::new(Met { per_m: size("per_m"), height_m: size("height_m") }),
+});
+
+struct Met {
+    per_m: f64,
+    height_m: f64,
+}
+
+impl ScatterModel for Met {
+    fn after(&mut self, interval: &Interval<'_>, scatter: &mut IntervalScatter) {
+        for side in Side::BOTH {
+            let turned_rad = interval.turned_rad[side];
+            if turned_rad != 0.0 {
+                let lost_m = lost_m(interval.travel_m[side] / turned_rad, self.height_m);
+                scatter.travel_var_m2[side] += self.per_m * lost_m * lost_m * interval.travel_m[side].abs();
+            }
+        }
+    }
+}
 
 /// Bumps on the floor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,6 +98,7 @@ impl PhysicalEffect for Bumps {
                     (vec![("height_m", LARGE_HEIGHT_M)], vec![("per_m", stream.log_uniform(0.1, 1.0))])
                 })
             },
+            on_board: ON_BOARD,
             ..Description::of("a wheel drives over cables, sills or crumbs")
         }
     }

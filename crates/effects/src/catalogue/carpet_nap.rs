@@ -15,6 +15,21 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, in_room, value_of};
+use crate::on_board::{Code, Input, OnBoard};
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::RoomHeading,
+    code: Code::of(
+        "\
+const double driven_m = fabs(distance_m);
+const double c = cos(room_heading_rad + 0.5 * turn_rad), d = sin(room_heading_rad + 0.5 * turn_rad);
+left_change_m += driven_m * (c * drift_x + d * drift_y);
+right_change_m += driven_m * (c * drift_x + d * drift_y);
+across_m += driven_m * (c * drift_y - d * drift_x);
+turn_change_rad += driven_m * (yaw_sin_rad_m * d + yaw_cos_rad_m * c);",
+    ),
+};
 
 /// Pull of a carpet.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -48,6 +63,7 @@ impl PhysicalEffect for CarpetNap {
     fn description() -> Description {
         Description {
             summary: Summary::Meaning,
+            on_board: ON_BOARD,
             ..Description::of("the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven")
         }
     }

@@ -20,6 +20,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::motion_history::{Hysteresis, Reversals, TURN_RAD};
+use crate::on_board::{Code, NEVER_REVERSED_M, OnBoard};
 use crate::stream::Stream;
 
 /// What it is, in one line.
@@ -27,6 +28,38 @@ const MEANING: &str = "the castor swings round after a reversal and turns the ro
 
 /// Ways that are tried for a flip, metres: 2 to 4 trails of 15 to 60 mm.
 const DECAY_M: [f64; 4] = [0.03, 0.06, 0.12, 0.24];
+
+/// The mean term in C, for a robot's own odometry: [`FlipState`].
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "the sense of the last turn, and the distance since the last reversal",
+    lag: "none: it goes by the past alone",
+    code: Code {
+        remembers: &[
+            ("leaned_rad", 0.0),
+            ("leans", 0.0),
+            ("went_m", 0.0),
+            ("sense", 0.0),
+            ("since_m", NEVER_REVERSED_M),
+        ],
+        functions: &[],
+        statements: "\
+const double band_m = fmax(5e-4, 0.5 * (left_count_m + right_count_m)), before = own->sense;
+own->went_m = fmin(fmax(own->went_m + distance_m, -band_m), band_m);
+if (fabs(own->went_m) >= band_m) {
+    own->sense = yair_sense(own->went_m);
+}
+if (own->sense * before < 0.0) {
+    own->since_m = 0.0;
+}
+own->since_m += fabs(distance_m);
+own->leaned_rad = fmin(fmax(own->leaned_rad + turn_rad, -0.03), 0.03);
+if (fabs(own->leaned_rad) >= 0.03) {
+    own->leans = yair_sense(own->leaned_rad);
+}
+turn_change_rad += kick_rad * own->leans
+                   * (exp((fabs(distance_m) - own->since_m) / decay_m) - exp(-own->since_m / decay_m));",
+    },
+};
 
 /// The kick of a castor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,6 +96,7 @@ impl PhysicalEffect for CastorKick {
                     Box::new(RollingCastor { gain, trail_m, psi_rad: 0.0 })
                 },
             ),
+            on_board: ON_BOARD,
             ..Description::of(MEANING)
         }
     }

@@ -16,6 +16,7 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::OnBoard;
 use crate::time_shift::TimeShift;
 
 /// What it is, in one line.
@@ -47,6 +48,7 @@ impl PhysicalEffect for ClockRate {
         Description {
             summary: Summary::WithValues(|values| format!("{MEANING}, by {}", values.shown("rate", 100.0, "%"))),
             excitation: Excitation::Conditions("log speeds beside an instrument with a clock of its own"),
+            on_board: OnBoard::Never("a pose by counts has no clock in it, and speeds are by the clock of the log that was fitted"),
             ..Description::of(MEANING)
         }
     }

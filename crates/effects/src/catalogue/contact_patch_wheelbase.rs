@@ -8,6 +8,7 @@
 //! Alias: wheel noise, whose heading variance grows with travel and not with the square of the turn.
 //! Reference: Navarro et al., eq. (10) and (11).
 
+use model_term::Interval;
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -15,7 +16,63 @@ use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Sign, value_of};
+use crate::on_board::{Code, IntervalScatter, OnBoard, Scatter, ScatterModel};
 use crate::stream::Stream;
+
+/// Standstill after which a robot's own odometry takes what follows for another motion, seconds: counts of a
+/// creeping robot pause for less.
+const STANDSTILL_S: f64 = 0.2;
+
+/// What a robot's own odometry adds to its covariance: one draw of the separation a motion, and the slow part
+/// as what it comes to over distances far beyond its length.
+const ON_BOARD: OnBoard = OnBoard::CovarianceOnly(Scatter {
+    of: "the separation, drawn anew after each standstill, and its slow variation",
+    code: Code {
+        remembers: &[("stood_s", 0.0)],
+        functions: &[],
+        statements: "\
+separation_var_m2 += sigma_m * sigma_m;
+if (left_m == 0.0 && right_m == 0.0) {
+    own->stood_s += dt_s;
+} else {
+    const double tread_m = 0.5 * (fabs(left_m) + fabs(right_m));
+    const double per_m = slow_sigma_m * turn_rad / YAIR_WHEEL_SEPARATION_M;
+    motion_begins |= own->stood_s >= 0.2;
+    own->stood_s = 0.0;
+    turn_var_rad2 += per_m * per_m * 2.0 * slow_length_m / tread_m;
+}",
+    },
+    model: |size| {
+        Box::new(Patch {
+            sigma_m: size("sigma_m"),
+            slow_sigma_m: size("slow_sigma_m"),
+            slow_length_m: size("slow_length_m"),
+            stood_s: 0.0,
+        })
+    },
+});
+
+struct Patch {
+    sigma_m: f64,
+    slow_sigma_m: f64,
+    slow_length_m: f64,
+    stood_s: f64,
+}
+
+impl ScatterModel for Patch {
+    fn after(&mut self, interval: &Interval<'_>, scatter: &mut IntervalScatter) {
+        scatter.separation_var_m2 += self.sigma_m * self.sigma_m;
+        let tread_m = 0.5 * (interval.travel_m.left.abs() + interval.travel_m.right.abs());
+        if tread_m == 0.0 {
+            self.stood_s += interval.dt_s;
+            return;
+        }
+        scatter.motion_begins |= self.stood_s >= STANDSTILL_S;
+        self.stood_s = 0.0;
+        let turned = self.slow_sigma_m * interval.increment().turn_rad / interval.wheel_separation_m;
+        scatter.turn_var_rad2 += turned * turned * 2.0 * self.slow_length_m / tread_m;
+    }
+}
 
 /// Scatter of the effective wheelbase.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -62,6 +119,7 @@ impl PhysicalEffect for ContactPatchWheelbase {
     fn description() -> Description {
         Description {
             benchmark: Benchmark::of_scatter(|_, _| (vec![("sigma_m", 3e-3)], vec![])),
+            on_board: ON_BOARD,
             ..Description::of("the distance between the contacts varies from motion to motion")
         }
     }

@@ -20,6 +20,7 @@ use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Counters that are cleared.
@@ -55,6 +56,7 @@ impl PhysicalEffect for CounterReset {
                 0 => vec![("probability", stream.uniform_in(0.005, 0.02)), ("persistent", 0.0)],
                 _ => vec![("probability", stream.uniform_in(0.001, 0.004)), ("persistent", 1.0)],
             }),
+            on_board: OnBoard::Never("whether a counter was cleared or the wheel went back, later readings say alone"),
             ..Description::of("a counter is cleared, for a row or from then on")
         }
     }

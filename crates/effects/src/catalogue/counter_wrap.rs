@@ -15,6 +15,11 @@ use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, value_of};
+use crate::on_board::{Correction, OnBoard};
+
+/// A robot's own odometry takes counts the nearer way round: all it needs is the counters' width.
+const ON_BOARD: OnBoard =
+    OnBoard::Constant(Correction { statements: "", correct: |_, raw| raw, counter_bits: Some("bits") });
 
 /// Width of the recorded counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +46,7 @@ impl PhysicalEffect for CounterWrap {
     fn description() -> Description {
         Description {
             benchmark: Benchmark::of_fault(|_, _| vec![("bits", 16.0)]),
+            on_board: ON_BOARD,
             ..Description::of("the log keeps only the low bits of the counters")
         }
     }

@@ -18,6 +18,7 @@ use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Rows lost with their counts.
@@ -47,6 +48,7 @@ impl PhysicalEffect for DroppedSamples {
         Description {
             record_fault: RecordFault { is_restored_roughly: true, ..RecordFault::WITH_A_TRACE },
             benchmark: Benchmark::of_fault(|_, stream| vec![("probability", stream.uniform_in(0.01, 0.05))]),
+            on_board: OnBoard::Never("what the wheels did in a missing interval, later readings and an instrument say alone"),
             ..Description::of("rows are missing, and with them what the wheels did meanwhile")
         }
     }

@@ -15,9 +15,29 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
+use crate::on_board::{Code, Input, OnBoard};
 
 /// Cycles a turn that are tried; one a turn is an eccentric wheel to any data.
 const CYCLES: [f64; 11] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0];
+
+/// The mean term in C, for a robot's own odometry. A wrong phase doubles the error: it is off while the phase
+/// is not known.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::WheelAngles,
+    code: Code::of(
+        "\
+if (left_turned_rad != 0.0) {
+    const double from_rad = cycles * left_wheel_rad, to_rad = cycles * (left_wheel_rad + left_turned_rad);
+    left_change_m -= left_m / left_turned_rad
+                     * (left_sin_rad * (sin(to_rad) - sin(from_rad)) + left_cos_rad * (cos(to_rad) - cos(from_rad)));
+}
+if (right_turned_rad != 0.0) {
+    const double from_rad = cycles * right_wheel_rad, to_rad = cycles * (right_wheel_rad + right_turned_rad);
+    right_change_m -= right_m / right_turned_rad
+                      * (right_sin_rad * (sin(to_rad) - sin(from_rad)) + right_cos_rad * (cos(to_rad) - cos(from_rad)));
+}",
+    ),
+};
 
 /// Periodic error of each encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -73,6 +93,7 @@ impl PhysicalEffect for EncoderCycle {
                 let off = values.amplitudes("_rad", 1e3, "mrad", "encoder is off");
                 format!("an encoder errs {cycles} times a turn: {off}")
             }),
+            on_board: ON_BOARD,
             ..Description::of("an encoder errs several times a turn")
         }
     }

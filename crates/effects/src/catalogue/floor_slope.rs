@@ -15,6 +15,21 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, in_room, value_of};
+use crate::on_board::{Code, Input, OnBoard};
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::RoomHeading,
+    code: Code::of(
+        "\
+const double tread_m = 0.5 * (fabs(left_m) + fabs(right_m)), moving_s = tread_m > 0.0 ? dt_s : 0.0;
+const double x_m = creep_x_m_s * moving_s + slide_x * tread_m, y_m = creep_y_m_s * moving_s + slide_y * tread_m;
+const double c = cos(room_heading_rad + 0.5 * turn_rad), d = sin(room_heading_rad + 0.5 * turn_rad);
+left_change_m += c * x_m + d * y_m;
+right_change_m += c * x_m + d * y_m;
+across_m += c * y_m - d * x_m;",
+    ),
+};
 
 /// Creep down a slope.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -49,6 +64,7 @@ impl PhysicalEffect for FloorSlope {
     fn description() -> Description {
         Description {
             summary: Summary::Meaning,
+            on_board: ON_BOARD,
             ..Description::of("the floor slopes: the robot creeps in one direction of the room, whatever its heading")
         }
     }

@@ -22,7 +22,19 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, OnBoard};
 use crate::stream::Stream;
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "the speeds in the interval before, the mean period of the stamps, and how late the last one was",
+    lag: "a fit knows the beat from all rows; on board it is the mean period so far, less a mean over the last 20 intervals or so, which leaves a sixth of the irregularity as noise, and takes slow drift of the stamps for the clock's",
+    code: Code::of(
+        "\
+left_change_m += share * (left_end_m_s * late_end_s - left_start_m_s * late_start_s);
+right_change_m += share * (right_end_m_s * late_end_s - right_start_m_s * late_start_s);",
+    ),
+};
 
 /// Irregular stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -71,6 +83,7 @@ impl PhysicalEffect for IntervalError {
                 max_scale: 1.0,
                 ..Benchmark::of_mean_at(|_, robot, _| vec![("jitter_s", robot.jitter_s)])
             },
+            on_board: ON_BOARD,
             ..Description::of("the logged intervals are not the true ones")
         }
     }

@@ -16,9 +16,17 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, Input, OnBoard, PAYLOAD};
 
-/// The run's covariate that says what the robot carries; a run without it carries nothing.
-const PAYLOAD: &str = "payload_kg";
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::Payload,
+    code: Code::of(
+        "\
+left_change_m -= (common_per_kg - 0.5 * mismatch_per_kg) * payload_kg * left_m;
+right_change_m -= (common_per_kg + 0.5 * mismatch_per_kg) * payload_kg * right_m;",
+    ),
+};
 
 /// Compression by the payload.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,6 +76,7 @@ impl PhysicalEffect for PayloadCompression {
                 needs: Needs { payload: true, ..Needs::NONE },
                 ..Benchmark::OF_MEAN
             },
+            on_board: ON_BOARD,
             ..Description::of("the payload presses the tyres flatter")
         }
     }

@@ -7,12 +7,39 @@
 //! Reference: Navarro et al.: a pulse of about 1 mm is a number of the controller's counts; Sheppard 1898 for
 //! Δ²/12.
 
+use model_term::Interval;
 use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::{Code, IntervalScatter, OnBoard, Scatter, ScatterModel};
+
+/// What a robot's own odometry adds to its covariance: ticks that are so many counts are off by less than
+/// one, uniformly, and whole counts are as good as exact beside them.
+const ON_BOARD: OnBoard = OnBoard::CovarianceOnly(Scatter {
+    of: "rounding of the present readings and of the first",
+    code: Code::of(
+        "\
+const double share = (1.0 - 1.0 / (counts_per_tick * counts_per_tick)) / 12.0;
+left_reading_var_m2 += share * left_count_m * left_count_m;
+right_reading_var_m2 += share * right_count_m * right_count_m;",
+    ),
+    model: |size| Box::new(Rounding { share: (1.0 - size("counts_per_tick").powi(-2)) / 12.0 }),
+});
+
+/// Of readings, the variance over the square of a tick.
+struct Rounding {
+    share: f64,
+}
+
+impl ScatterModel for Rounding {
+    fn after(&mut self, interval: &Interval<'_>, scatter: &mut IntervalScatter) {
+        let var_m2 = interval.count_m.map(|count_m| self.share * count_m * count_m);
+        scatter.reading_var_m2 = scatter.reading_var_m2.zip_with(var_m2, |sum, var_m2| sum + var_m2);
+    }
+}
 
 /// Coarseness of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,7 +64,10 @@ impl PhysicalEffect for Quantization {
     }
 
     fn description() -> Description {
-        Description::of("the log keeps whole ticks of several counts each")
+        Description {
+            on_board: ON_BOARD,
+            ..Description::of("the log keeps whole ticks of several counts each")
+        }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

@@ -16,6 +16,19 @@ use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, value_of};
+use crate::on_board::{Correction, OnBoard, RawInterval};
+
+/// What a robot's own odometry does first.
+const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
+    statements: "\
+left_counts *= 1.0 - 2.0 * left;
+right_counts *= 1.0 - 2.0 * right;",
+    correct: |size, raw| {
+        let sign = Wheels { left: 1.0 - 2.0 * size("left"), right: 1.0 - 2.0 * size("right") };
+        RawInterval { counts: raw.counts.zip_with(sign, |counts, sign| counts * sign), ..raw }
+    },
+    counter_bits: None,
+});
 
 /// Counters that run the other way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +61,7 @@ impl PhysicalEffect for ReversedWheel {
             benchmark: Benchmark::of_fault(|faulty, _| {
                 vec![("left", f64::from(u8::from(faulty.left))), ("right", f64::from(u8::from(faulty.right)))]
             }),
+            on_board: ON_BOARD,
             ..Description::of("a counter counts down when its wheel rolls forward")
         }
     }

@@ -16,6 +16,7 @@ use crate::description::{Description, Excitation};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Motion that no wheel makes.
@@ -55,6 +56,7 @@ impl PhysicalEffect for RobotDisplaced {
     fn description() -> Description {
         Description {
             excitation: Excitation::Conditions("drive where nothing touches the robot and its wheels stay on the floor"),
+            on_board: OnBoard::Never("the counts show nothing of it"),
             ..Description::of("the robot is pushed, or its wheels turn without the floor")
         }
     }

@@ -14,6 +14,14 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, OnBoard};
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "the right wheel's speed in the interval before",
+    lag: "half an interval, as speeds are means of intervals that are past; off by the delay times the change of speed in half an interval while it changes",
+    code: Code::of("right_change_m -= right_delay_s * (right_end_m_s - right_start_m_s);"),
+};
 
 /// Delay of the right reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,6 +49,7 @@ impl PhysicalEffect for SamplingSkew {
             summary: Summary::WithValues(|values| {
                 format!("the right counter is read {} after the left one", values.shown("right_delay_s", 1e3, "ms"))
             }),
+            on_board: ON_BOARD,
             ..Description::of("the right counter is read later than the left one")
         }
     }

@@ -16,9 +16,21 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, OnBoard};
 
 /// What it is, in one line.
 const MEANING: &str = "the ground speed lags behind the wheels'";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "the wheels' speeds in the interval before",
+    lag: "half an interval: a speed is the mean of its interval, and none from the rows after it; off by κ times the change of speed in half an interval while it changes, by nothing once it is steady",
+    code: Code::of(
+        "\
+left_change_m -= kappa_s * (left_end_m_s - left_start_m_s);
+right_change_m -= kappa_s * (right_end_m_s - right_start_m_s);",
+    ),
+};
 
 /// Slip in proportion to acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,6 +64,7 @@ impl PhysicalEffect for SlipAcceleration {
                     step.travel_m = step.travel_m.zip_with(acceleration, |travel_m, a| travel_m - lost_m(a));
                 })
             }),
+            on_board: ON_BOARD,
             ..Description::of(MEANING)
         }
     }

@@ -20,10 +20,46 @@ use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
+use crate::on_board::{Code, OnBoard};
 use crate::stream::Stream;
 
 /// Scales of the distance by which a contact winds up, metres: from what no instrument shows to a sill.
 const WIND_UP_SCALES_M: [f64; 6] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+
+/// [`Term::next`] in C.
+const WIND_UP: &str = "\
+/* Where a contact's mean wind-up goes, in mean breakaways, from where it is. */
+static inline double yair_wind_up(double wound, double travel_m, double speed_m_s, double stick_speed_m_s) {
+    const double sense = travel_m < 0.0 ? -1.0 : 1.0;
+    const double unwound = fmin(sense * wound, 0.0) + fabs(travel_m) / 1e-3;
+    if (fabs(speed_m_s) >= stick_speed_m_s) {
+        return 0.0;
+    }
+    if (travel_m == 0.0) {
+        return wound;
+    }
+    if (unwound <= 0.0) {
+        return sense * unwound;
+    }
+    return sense * (2.0 / 3.0 + (fmax(sense * wound, 0.0) - 2.0 / 3.0) * exp(-unwound / 0.5));
+}
+";
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::State {
+    of: "the wind-up of each contact",
+    lag: "none in the wind-up; the speed is that of the interval itself, so that with few counts an interval a creep near the speed of sticking lets go too often",
+    code: Code {
+        remembers: &[("left_wound", 0.0), ("right_wound", 0.0)],
+        functions: &[WIND_UP],
+        statements: "\
+const double left_before = own->left_wound, right_before = own->right_wound;
+own->left_wound = yair_wind_up(left_before, left_m, left_m_s, stick_speed_m_s);
+own->right_wound = yair_wind_up(right_before, right_m, right_m_s, stick_speed_m_s);
+left_change_m += breakaway_m * (left_before - own->left_wound);
+right_change_m += breakaway_m * (right_before - own->right_wound);",
+    },
+};
 
 /// Sticking contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,6 +99,7 @@ impl PhysicalEffect for StickSlip {
             benchmark: Benchmark::of_scatter(|robot, _| {
                 (vec![("breakaway_m", 1e-3)], vec![("stick_speed_m_s", 0.5 * robot.cruise_speed_m_s)])
             }),
+            on_board: ON_BOARD,
             ..Description::of("at a creep a wheel winds up before its contact lets go")
         }
     }

@@ -16,6 +16,22 @@ use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, by_wheels, rewrite_wheels, value_of};
+use crate::on_board::{Correction, OnBoard, RawInterval};
+
+/// What a robot's own odometry does first.
+const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
+    statements: "\
+if (swapped != 0.0) {
+    const double other_counts = left_counts;
+    left_counts = right_counts;
+    right_counts = other_counts;
+}",
+    correct: |size, raw| {
+        let Wheels { left, right } = raw.counts;
+        if size("swapped") == 0.0 { raw } else { RawInterval { counts: Wheels { left: right, right: left }, ..raw } }
+    },
+    counter_bits: None,
+});
 
 /// Columns that have changed places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +58,7 @@ impl PhysicalEffect for SwappedWheels {
         Description {
             record_fault: RecordFault { leaves_a_trace: false, ..RecordFault::WITH_A_TRACE },
             benchmark: Benchmark::of_fault(|_, _| vec![("swapped", 1.0)]),
+            on_board: ON_BOARD,
             ..Description::of("the left and the right counter are exchanged")
         }
     }

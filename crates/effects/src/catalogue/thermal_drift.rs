@@ -16,12 +16,24 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, Input, OnBoard};
 
 /// What it is, in one line.
 const MEANING: &str = "the scale drifts with the time of the session";
 
 /// Time constants that are tried, seconds: tyres take from minutes to an hour.
 const TAU_S: [f64; 5] = [150.0, 300.0, 600.0, 1200.0, 3600.0];
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::SessionTime,
+    code: Code::of(
+        "\
+const double grown = growth * (1.0 - exp(-(session_s + 0.5 * dt_s) / tau_s));
+left_change_m += grown * left_m;
+right_change_m += grown * right_m;",
+    ),
+};
 
 /// Growth of the wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -62,6 +74,7 @@ impl PhysicalEffect for ThermalDrift {
                     Box::new(Warming { growth: of("growth"), tau_s: of("tau_s"), session_s: 0.0 })
                 },
             ),
+            on_board: ON_BOARD,
             ..Description::of(MEANING)
         }
     }

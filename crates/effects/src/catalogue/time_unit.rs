@@ -15,12 +15,20 @@ use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::on_board::{Correction, OnBoard, RawInterval};
 
 /// Factors between units of time that people use.
 const FACTORS: [f64; 6] = [1e3, 1e6, 1e9, 1e-3, 1e-6, 1e-9];
 
 /// How far from a factor a ratio of two spans may be: measurements need not begin and end with the log.
 const MAX_SPAN_RATIO: f64 = 4.0;
+
+/// What a robot's own odometry does first.
+const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
+    statements: "dt_s /= factor;",
+    correct: |size, raw| RawInterval { dt_s: raw.dt_s / size("factor"), ..raw },
+    counter_bits: None,
+});
 
 /// The log's unit of time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +54,7 @@ impl PhysicalEffect for TimeUnit {
     fn description() -> Description {
         Description {
             benchmark: Benchmark::of_fault(|_, stream| vec![("factor", [1e3, 1e6][stream.below(2)])]),
+            on_board: ON_BOARD,
             ..Description::of("times are written in another unit than seconds")
         }
     }

@@ -18,6 +18,7 @@ use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
 /// Steps of torn bytes, counts.
@@ -54,6 +55,7 @@ impl PhysicalEffect for TornRead {
             benchmark: Benchmark::of_fault(|_, stream| {
                 vec![("probability", stream.uniform_in(0.005, 0.02)), ("jump_counts", [256.0, 65_536.0][stream.below(2)])]
             }),
+            on_board: OnBoard::Never("what is torn shows in the readings after it alone"),
             ..Description::of("a count of several bytes is read while it changes")
         }
     }

@@ -21,6 +21,8 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
 
+mod on_board;
+
 /// Scales of what a slide costs for each change of speed, seconds: v/2a of a floor that holds little less
 /// than it should, to one that holds nearly nothing.
 const SLIDE_SCALES_S: [f64; 6] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
@@ -78,6 +80,7 @@ impl PhysicalEffect for TractionLoss {
                     (vec![("excess", 0.3)], vec![("needs", needs), ("stribeck_speed_m_s", 0.05)])
                 })
             },
+            on_board: on_board::ON_BOARD,
             ..Description::of("a wheel that is accelerated harder than the floor holds slides")
         }
     }

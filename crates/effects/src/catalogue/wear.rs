@@ -14,6 +14,18 @@ use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
+use crate::on_board::{Code, Input, OnBoard};
+
+/// The mean term in C, for a robot's own odometry.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::SessionDistance,
+    code: Code::of(
+        "\
+const double lost = loss_per_m * (session_m + 0.5 * fabs(distance_m));
+left_change_m -= lost * left_m;
+right_change_m -= lost * right_m;",
+    ),
+};
 
 /// Loss of radius with the distance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,6 +52,7 @@ impl PhysicalEffect for Wear {
         Description {
             summary: Summary::Meaning,
             excitation: Excitation::Conditions("drive the same runs again after some kilometres"),
+            on_board: ON_BOARD,
             ..Description::of("the scale drifts with the distance driven")
         }
     }

@@ -16,9 +16,29 @@ use crate::description::{Description, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
+use crate::on_board::{Code, Input, OnBoard};
 
 /// What it is, in one line.
 const MEANING: &str = "a wheel is not round or not centred";
+
+/// The mean term in C, for a robot's own odometry. A wrong phase doubles the error: it is off while the phase
+/// is not known.
+const ON_BOARD: OnBoard = OnBoard::Input {
+    input: Input::WheelAngles,
+    code: Code::of(
+        "\
+if (left_turned_rad != 0.0) {
+    const double to_rad = left_wheel_rad + left_turned_rad;
+    left_change_m += left_m / left_turned_rad
+                     * (left_sin * (cos(left_wheel_rad) - cos(to_rad)) + left_cos * (sin(to_rad) - sin(left_wheel_rad)));
+}
+if (right_turned_rad != 0.0) {
+    const double to_rad = right_wheel_rad + right_turned_rad;
+    right_change_m += right_m / right_turned_rad
+                      * (right_sin * (cos(right_wheel_rad) - cos(to_rad)) + right_cos * (sin(to_rad) - sin(right_wheel_rad)));
+}",
+    ),
+};
 
 /// Eccentricity of each wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -76,6 +96,7 @@ impl PhysicalEffect for WheelEccentricity {
                     })
                 },
             ),
+            on_board: ON_BOARD,
             ..Description::of(MEANING)
         }
     }

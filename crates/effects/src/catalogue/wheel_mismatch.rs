@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::OnBoard;
 
 /// Ratio of the diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,7 +41,7 @@ impl PhysicalEffect for WheelMismatch {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::RightOverLeft, "right_over_left")), ..Description::of("the wheels differ in diameter") }
+        Description { geometry: Some((GeometryRatio::RightOverLeft, "right_over_left")), on_board: OnBoard::Geometry, ..Description::of("the wheels differ in diameter") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::OnBoard;
 
 /// Common factor of both diameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,7 +39,7 @@ impl PhysicalEffect for WheelScale {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::Wheels, "scale")), ..Description::of("both wheels are larger or smaller than nominal, by one factor") }
+        Description { geometry: Some((GeometryRatio::Wheels, "scale")), on_board: OnBoard::Geometry, ..Description::of("both wheels are larger or smaller than nominal, by one factor") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::description::{Description, GeometryRatio};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::hypothesis::{Hypothesis, value_of};
+use crate::on_board::OnBoard;
 
 /// Ratio of the wheelbases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -35,7 +36,7 @@ impl PhysicalEffect for Wheelbase {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::Separation, "ratio")), ..Description::of("the effective wheelbase is larger or smaller than nominal") }
+        Description { geometry: Some((GeometryRatio::Separation, "ratio")), on_board: OnBoard::Geometry, ..Description::of("the effective wheelbase is larger or smaller than nominal") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

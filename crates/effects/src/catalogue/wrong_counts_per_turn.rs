@@ -18,6 +18,7 @@ use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median, rewrite_wheels, value_of};
+use crate::on_board::{Correction, OnBoard, RawInterval};
 
 /// Factors by which people err.
 const FACTORS: [(f64, &str); 14] = [
@@ -50,6 +51,15 @@ const MIN_COMPARED_MOTION: [f64; 2] = [0.2, 0.5];
 /// A displacement goes on where the one before ended, by the rounding of a file.
 const SAME_INSTANT_S: f64 = 1e-6;
 
+/// What a robot's own odometry does first.
+const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
+    statements: "\
+left_counts /= factor;
+right_counts /= factor;",
+    correct: |size, raw| RawInterval { counts: raw.counts.map(|counts| counts / size("factor")), ..raw },
+    counter_bits: None,
+});
+
 /// Counts of a turn, logged over nominal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -79,6 +89,7 @@ impl PhysicalEffect for WrongCountsPerTurn {
                 ..RecordFault::WITH_A_TRACE
             },
             benchmark: Benchmark::of_fault(|_, stream| vec![("factor", [0.25, 0.5, 2.0, 4.0][stream.below(4)])]),
+            on_board: ON_BOARD,
             ..Description::of("a wheel turn makes another number of counts than the dataset states")
         }
     }

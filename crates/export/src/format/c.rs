@@ -2,11 +2,16 @@
 //! `math.h`.
 //!
 //! A plain calibration goes by the midpoint rule, an extended model by exact arcs of counts and terms
-//! together, as `yair evaluate` does. Effects whose mean is a function of one interval are in it, by the
-//! statements of their own files (`effects::OnBoard`); all others are named as left out.
-//! [`crate::OnBoardOdometry`] is the same in Rust; `tests/compiled_header.rs` compares the two.
+//! together, as `yair evaluate` does. Effects are in it by the statements of their own files
+//! (`effects::OnBoard`), with what they remember and what they must be told; those that cannot run on board
+//! are named as left out. [`crate::OnBoardOdometry`] is the same in Rust; `tests/compiled_header.rs` compares
+//! the two.
 
-use std::fmt::Write;
+mod blocks;
+mod covariance;
+mod inputs;
+mod literal;
+mod past;
 
 use effects::OnBoard;
 
@@ -14,11 +19,13 @@ use crate::comment::{limits, origin, wrapped};
 use crate::error::ExportError;
 use crate::on_board::width;
 use crate::options::Options;
-use crate::robot::{CalibratedRobot, RobotEffect};
+use crate::robot::CalibratedRobot;
+use blocks::Blocks;
+use inputs::Inputs;
+use literal::exact;
+use past::Past;
 
-const HEADER: &str = include_str!("odometry.h.in");
-const COVARIANCE: &str = include_str!("covariance.h.in");
-const TANGENT: &str = include_str!("tangent.h.in");
+const HEADER: &str = include_str!("c/odometry.h.in");
 
 const SINC: &str = "
 /* sin(x)/x; the series' next term is below rounding. */
@@ -45,116 +52,80 @@ pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<Strin
     let mask = u64::MAX >> (64 - u32::from(bits));
     let mask = if bits > 32 { format!("UINT64_C({mask})") } else { format!("{mask}u") };
     let has_noise = robot.noise.is_some();
-    let effects = effects(robot);
+    let (blocks, inputs, past) = (Blocks::of(robot), Inputs::of(robot), Past::of(robot));
+    let covariance = covariance::of(robot, &blocks);
+    let effects = blocks.mean();
+    let uses_sense = robot.effects.iter().any(|effect| effect.on_board.uses("yair_sense"));
     let functions = [
         if has_noise || robot.is_extended { SINC } else { "" },
-        if has_noise { TANGENT } else { "" },
-        if effects.contains("yair_sense") { SENSE } else { "" },
+        &covariance.functions,
+        if uses_sense { SENSE } else { "" },
+        &blocks.functions,
     ];
     let mut limits = limits(" *", robot, true);
     if !has_noise {
         limits.push_str(&wrapped(" *", "No covariance: the calibration has no noise of the wheels."));
     }
-    limits.push_str(&wrapped(
-        " *",
-        "What this header cannot express: effects that need more than the counts of one interval.",
-    ));
+    limits.push_str(&wrapped(" *", CANNOT));
     let chord = if robot.is_extended { "moved_m * yair_sinc(0.5 * turned_rad)" } else { "moved_m" };
-    let uses_interval = !effects.is_empty();
-    let parts: [(&str, String); 17] = [
+    let uses_rad = inputs.needs_turns() || robot.effects.iter().any(uses_radius);
+    let rad_per_count = match uses_rad {
+        true => format!(
+            "/* Turn of a wheel for a count, radians. */\n#define YAIR_RAD_PER_COUNT {}\n",
+            exact(std::f64::consts::TAU / ticks_per_rev)
+        ),
+        false => String::new(),
+    };
+    let is_timed = [&effects, &past.step, &inputs.step, &blocks.corrections, &covariance.step]
+        .iter()
+        .any(|text| blocks::uses(text, "dt_s"));
+    let parts: [(&str, String); 24] = [
         ("@ORIGIN@", origin(" *", "c", robot)),
         ("@LIMITS@", limits),
         ("@LEFT_M_PER_COUNT@", exact(m_per_count.left)),
         ("@RIGHT_M_PER_COUNT@", exact(m_per_count.right)),
         ("@SEPARATION_M@", exact(robot.wheel_separation.value_m)),
-        ("@NOISE@", noise(robot)),
+        ("@CONSTANTS@", covariance.constants + &rad_per_count),
         ("@BITS@", bits.to_string()),
-        ("u@COUNT@", format!("u{count}")),
+        ("@TYPES@", inputs.types + &blocks.types),
+        ("@STATE@", covariance.state + &past.state + &inputs.state + &blocks.state),
         ("@COUNT@", count.to_owned()),
         ("@MASK@", mask),
-        ("@STATE@", if has_noise { STATE.to_owned() } else { String::new() }),
         ("@FUNCTIONS@", functions.concat()),
-        ("@INIT@", if has_noise { INIT.to_owned() } else { String::new() }),
+        ("@INIT@", covariance.init + &past.init + &inputs.init + &blocks.init),
+        ("@COUNTS@", blocks.counts()),
+        ("@INPUTS@", inputs.step),
+        ("@PAST@", past.step),
         ("@EFFECTS@", effects),
-        ("@COVARIANCE@", if has_noise { COVARIANCE.to_owned() } else { String::new() }),
+        ("@COVARIANCE@", covariance.step),
         ("@CHORD@", chord.to_owned()),
-        ("@UNUSED@", if uses_interval { String::new() } else { "    (void)dt_s;\n".to_owned() }),
+        ("@STEP@", inputs.function.to_owned()),
+        ("@TOLD@", inputs.told.to_owned()),
+        ("@INPUTS_PARAMETER@", inputs.parameter.to_owned()),
+        ("@WITHOUT_INPUTS@", inputs.without.to_owned()),
+        ("@UNUSED@", if is_timed { String::new() } else { "    (void)dt_s;\n".to_owned() }),
     ];
-    Ok(parts.iter().fold(HEADER.to_owned(), |text, (name, part)| text.replace(name, part)))
+    Ok(filled(HEADER, &parts))
 }
 
-const STATE: &str = "    double covariance[3][3]; /* of x, y, theta since the start, by the noise of the wheels */\n";
-
-const INIT: &str = "    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            s->covariance[i][j] = 0.0;
-        }
+/// A template with its marks replaced. What is put in is not looked at again: a file's text may hold marks.
+fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let (mut text, mut rest) = (String::new(), template);
+    while let Some(at) = rest.find('@') {
+        let found = parts.iter().find(|(name, _)| rest[at..].starts_with(name));
+        let (part, length) = found.map_or(("@", 1), |(name, part)| (&part[..], name.len()));
+        text.push_str(&rest[..at]);
+        text.push_str(part);
+        rest = &rest[at + length..];
     }
-";
-
-/// A number that reads back as it is; its exponent makes it a double.
-fn exact(value: f64) -> String {
-    format!("{value:e}")
+    text + rest
 }
 
-fn noise(robot: &CalibratedRobot) -> String {
-    robot.noise.map_or_else(String::new, |noise| {
-        format!(
-            "/* Noise of each wheel's travel, m/sqrt(m), and of turns beyond it, rad/sqrt(rad). */\n\
-             #define YAIR_WHEEL_SIGMA {}\n#define YAIR_TURN_SIGMA {}\n",
-            exact(noise.wheel_sigma_m_per_sqrt_m),
-            exact(noise.turn_sigma_rad_per_sqrt_rad)
-        )
-    })
-}
+const CANNOT: &str = "What this header cannot express: effects that show in later readings alone.";
 
-/// The effects' statements, each in its own block.
-fn effects(robot: &CalibratedRobot) -> String {
-    let blocks: String = robot.effects.iter().filter_map(block).collect();
-    if blocks.is_empty() {
-        return blocks;
-    }
-    let mut text = "    {
-        double left_change_m = 0.0, right_change_m = 0.0, turn_change_rad = 0.0;
-"
-    .to_owned();
-    // What no effect reads is not declared: it would be a warning.
-    let uses = |name: &str| robot.effects.iter().any(|effect| effect.on_board.uses(name));
-    for (names, value) in [
-        (&["left_m_s", "right_m_s", "v_m_s", "omega_rad_s"][..], "per_s = dt_s > 0.0 ? 1.0 / dt_s : 0.0"),
-        (&["left_m_s"], "left_m_s = left_m * per_s"),
-        (&["right_m_s"], "right_m_s = right_m * per_s"),
-        (&["v_m_s"], "v_m_s = distance_m * per_s"),
-        (&["omega_rad_s"], "omega_rad_s = turn_rad * per_s"),
-    ] {
-        if names.iter().any(|name| uses(name)) {
-            let _ = writeln!(text, "        const double {value};");
-        }
-    }
-    if !uses("dt_s") && !text.contains("per_s") {
-        text.push_str("        (void)dt_s;\n");
-    }
-    text.push_str(&blocks);
-    text.push_str(
-        "        moved_m += 0.5 * (left_change_m + right_change_m);
-        turned_rad += (right_change_m - left_change_m) / YAIR_WHEEL_SEPARATION_M + turn_change_rad;
-    }
-",
-    );
-    text
-}
-
-fn block(effect: &RobotEffect) -> Option<String> {
-    let OnBoard::Static(statements) = effect.on_board else { return None };
-    let mut text = format!("        {{ /* {}: {} */\n", effect.id, effect.meaning);
-    for (name, value) in effect.values.iter().filter(|(name, _)| effect.on_board.uses(name)) {
-        let _ = writeln!(text, "            const double {name} = {};", exact(*value));
-    }
-    for line in statements.lines() {
-        let _ = writeln!(text, "            {line}");
-    }
-    text.push_str("        }\n");
-    Some(text)
+fn uses_radius(effect: &crate::RobotEffect) -> bool {
+    matches!(effect.on_board, OnBoard::CovarianceOnly(_))
+        && ["left_radius_m", "right_radius_m"].iter().any(|name| effect.on_board.uses(name))
 }
 
 #[cfg(test)]
@@ -175,10 +146,17 @@ mod tests {
     #[test]
     fn texts_of_files_stay_in_their_comment() {
         let mut robot = specimen();
-        robot.place = "evil*/\nint x;.toml".to_owned();
-        let text = render(&robot, &Options::default()).expect("has all");
-        let (comment, _) = text.split_once("*/").expect("a comment");
-        assert!(comment.contains("int x;") && comment.contains("What this header cannot express"), "{text}");
+        for hostile in ["evil*/\nint x;.toml", "*\\\n/ int x;", "*??/\n/ int x;", "/* int x; @STATE@ @LIMITS@"] {
+            robot.place = hostile.to_owned();
+            robot.name = hostile.to_owned();
+            robot.cautions = vec![hostile.to_owned()];
+            let text = render(&robot, &Options::default()).expect("has all");
+            let (comment, rest) = text.split_once("*/").expect("a comment");
+            assert_eq!(comment.matches("int x;").count(), 3, "{text}");
+            assert!(comment.contains("What this header cannot express") && !rest.contains("int x;"), "{text}");
+            assert!(!comment.contains("??") && !comment.contains('\\') && !comment[2..].contains("/*"), "{text}");
+            assert_eq!(text.matches("yair_count_t left_count, right_count;").count(), 1, "{text}");
+        }
     }
 
     #[test]
