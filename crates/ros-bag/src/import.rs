@@ -48,8 +48,8 @@ pub struct Options {
     pub fields: WheelFields,
     /// Parent and child frame of the poses, in a topic of transforms.
     pub truth_frames: Option<(String, String)>,
-    /// Files that define types which the bag itself does not: `…/PACKAGE/msg/TYPE.msg`, or `PACKAGE/TYPE=FILE`.
-    /// Usual types are known.
+    /// Files that define types which the bag itself does not: `…/PACKAGE/msg/TYPE.msg`, or
+    /// `PACKAGE/TYPE=FILE`. Usual types are known.
     pub definitions: Vec<PathBuf>,
     /// What a speed holds for.
     pub rates: Option<Rates>,
