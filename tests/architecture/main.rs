@@ -36,7 +36,8 @@ pub(crate) fn files(folder: &str) -> Vec<PathBuf> {
         for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
             let path = entry.expect("readable").path();
             // A file, too: `.git` of a second worktree. Packages are others' sources.
-            let left_out = ["target", ".git", "tests/browser/node_modules"].iter().any(|name| path == root().join(name));
+            let left_out =
+                ["target", ".git", "tests/browser/node_modules"].iter().any(|name| path == root().join(name));
             if path.is_dir() && !left_out {
                 folders.push(path);
             } else if path.is_file() && !left_out {
