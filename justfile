@@ -51,3 +51,11 @@ features:
 # Make the bags of tests/ros2 and evo's numbers of tests/evo anew, and read an exported bag, by the programs of others; needs Python and PyPI
 interop:
     .ci/run interop
+
+# Look at the pages of every command in Chromium, with keys, on a telephone's screen, in the dark and in print; needs node
+browser:
+    .ci/run browser
+
+# Take the documents' screenshots of the pages anew; needs node and Chromium
+pictures:
+    .ci/run pictures

@@ -1,10 +1,11 @@
 //! `yair diagnose DATASET... [--out DIR] [--without ID]...`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, Options};
 use clap::Args;
+use dataset::Dataset;
 
 use crate::check;
 use crate::diagnosis_page::Page;
@@ -41,17 +42,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let mut diagnosis =
         ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone(), ..Options::default() })?;
     if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-        if let Ok(scenario) = &diagnosis.extended {
-            let path = out.join("extended.toml");
-            write_whole(&path, [reservations(&diagnosis.document), scenario.to_toml()?].concat().as_bytes())?;
-            diagnosis.document.extended_model = Some(path.display().to_string());
-        }
-        let Diagnosis { document, residuals, alternatives, .. } = &diagnosis;
-        write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;
-        Page { document, residuals, alternatives }.write(out)?;
-        let page = DiagnosisPage { diagnosis: &diagnosis, datasets: &datasets, given: &arguments.datasets };
-        page.write(out)?;
+        write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, out)?;
         terminal.remark(&format!(
             "findings in {}; report.html is to be looked at, report.md has the same text",
             out.display()
@@ -63,6 +54,25 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     show(document, terminal)?;
     terminal.document(document)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the files of a diagnosis into a folder, which is made where it is not there.
+pub(crate) fn write_diagnosis(
+    diagnosis: &mut Diagnosis,
+    datasets: &[Dataset],
+    given: &[PathBuf],
+    out: &Path,
+) -> Result<(), Failure> {
+    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    if let Ok(scenario) = &diagnosis.extended {
+        let path = out.join("extended.toml");
+        write_whole(&path, [reservations(&diagnosis.document), scenario.to_toml()?].concat().as_bytes())?;
+        diagnosis.document.extended_model = Some(path.display().to_string());
+    }
+    let Diagnosis { document, residuals, alternatives, .. } = &*diagnosis;
+    write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;
+    Page { document, residuals, alternatives }.write(out)?;
+    DiagnosisPage { diagnosis, datasets, given }.write(out)
 }
 
 /// What the extended model does not say of itself: terms of which nobody can tell whether they hold

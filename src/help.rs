@@ -45,6 +45,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
     (
         "Simulate and bench",
         &[
+            ("demo", &["yair demo", "yair demo --seed 3 --out story --no-open"]),
             ("simulate", &["yair simulate scenarios/motion-capture.toml --out robot"]),
             (
                 "sweep",
@@ -74,7 +75,7 @@ What do you have?
   a CSV of wheels and poses   yair import csv log.csv --out mine --wheel 0.15 --base 0.3
   a bag of ROS 2              yair import ros2 bag.mcap --list
   a dataset                   yair check mine, then yair calibrate mine
-  nothing yet                 yair simulate scenarios/motion-capture.toml --out robot
+  nothing yet                 yair demo
 
 yair --help lists all that it can do, yair COMMAND --help says how.";
 

@@ -6,6 +6,7 @@ mod challenge;
 mod check;
 mod compare;
 mod correct;
+mod demo;
 mod diagnose;
 mod diagnosis_page;
 mod evaluate;
@@ -52,6 +53,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Demo(demo::Arguments),
     Simulate(simulate::Arguments),
     Import(import::Arguments),
     Check(check::Arguments),
@@ -82,6 +84,7 @@ fn main() -> ExitCode {
         return ExitCode::from(USAGE);
     };
     let outcome = match command {
+        Command::Demo(arguments) => demo::run(arguments, &terminal),
         Command::Simulate(arguments) => simulate::run(arguments, &terminal),
         Command::Import(arguments) => import::run(arguments, &terminal),
         Command::Check(arguments) => check::run(arguments, &terminal),

@@ -22,23 +22,36 @@ pub(crate) struct DiagnosisPage<'d> {
     pub(crate) given: &'d [std::path::PathBuf],
 }
 
+/// Dead reckoning of datasets with the nominal robot, the calibrated one, and the extended one where something
+/// was found.
+fn under_calibrations(diagnosis: &Diagnosis, datasets: &[Dataset]) -> UnderCalibrations {
+    let Diagnosis { document, extended, base, .. } = diagnosis;
+    let calibrated = base.calibrations().into_iter().next().map(AugmentedCalibration::from);
+    let model = extended.as_ref().ok().and_then(|scenario| ExtendedModel::of(scenario).ok());
+    let mut under = vec![Under { name: "nominal".to_owned(), role: Role::Nominal, calibration: None, model: None }];
+    if let Some(calibrated) = &calibrated {
+        let name = "calibrated".to_owned();
+        under.push(Under { name, role: Role::Calibrated, calibration: Some(calibrated), model: None });
+    }
+    if let Some(model) = model.as_ref().filter(|_| !document.findings.is_empty()) {
+        let name = "extended".to_owned();
+        let calibration = Some(&model.calibration);
+        under.push(Under { name, role: Role::ExtendedModel, calibration, model: Some(model) });
+    }
+    UnderCalibrations::of(datasets, &under)
+}
+
+/// Drift of datasets, per cent of the distance: nominal, calibrated and extended.
+pub(crate) fn drift_percents(diagnosis: &Diagnosis, datasets: &[Dataset]) -> [Option<f64>; 3] {
+    let drifts = under_calibrations(diagnosis, datasets).drifts;
+    [Role::Nominal, Role::Calibrated, Role::ExtendedModel]
+        .map(|role| drifts.iter().find(|(_, of, _)| *of == role).and_then(|(_, _, drift)| drift.drift_percent))
+}
+
 impl DiagnosisPage<'_> {
     /// Writes report.html.
     pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
-        let Diagnosis { document, extended, base, .. } = self.diagnosis;
-        let calibrated = base.calibrations().into_iter().next().map(AugmentedCalibration::from);
-        let model = extended.as_ref().ok().and_then(|scenario| ExtendedModel::of(scenario).ok());
-        let mut under = vec![Under { name: "nominal".to_owned(), role: Role::Nominal, calibration: None, model: None }];
-        if let Some(calibrated) = &calibrated {
-            let name = "calibrated".to_owned();
-            under.push(Under { name, role: Role::Calibrated, calibration: Some(calibrated), model: None });
-        }
-        if let Some(model) = model.as_ref().filter(|_| !document.findings.is_empty()) {
-            let name = "extended".to_owned();
-            let calibration = Some(&model.calibration);
-            under.push(Under { name, role: Role::ExtendedModel, calibration, model: Some(model) });
-        }
-        let under = UnderCalibrations::of(self.datasets, &under);
+        let under = under_calibrations(self.diagnosis, self.datasets);
         super::write(&self.report(&under, out), out)
     }
 

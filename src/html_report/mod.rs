@@ -14,7 +14,7 @@ mod words;
 
 pub(crate) use calibration::{CalibrationPage, EvaluationPage, write_comparison};
 pub(crate) use campaign::{write_plan, write_reproduction, write_sweep};
-pub(crate) use diagnosis::DiagnosisPage;
+pub(crate) use diagnosis::{DiagnosisPage, drift_percents};
 use paths::{Under, UnderCalibrations};
 
 use std::path::Path;

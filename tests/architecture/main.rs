@@ -35,8 +35,9 @@ pub(crate) fn files(folder: &str) -> Vec<PathBuf> {
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
             let path = entry.expect("readable").path();
-            // A file, too: `.git` of a second worktree.
-            let left_out = ["target", ".git"].iter().any(|name| path == root().join(name));
+            // A file, too: `.git` of a second worktree. Packages are others' sources.
+            let left_out =
+                ["target", ".git", "tests/browser/node_modules"].iter().any(|name| path == root().join(name));
             if path.is_dir() && !left_out {
                 folders.push(path);
             } else if path.is_file() && !left_out {

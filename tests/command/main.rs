@@ -7,6 +7,7 @@ mod bad_logs;
 mod compare;
 mod contract;
 mod correct;
+mod demo;
 mod export;
 mod export_mcap;
 mod good_log;

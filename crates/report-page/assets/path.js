@@ -17,7 +17,9 @@ function checkbox(text, checked, change, swatch) {
 
 function button(text, click, name) {
   const made = element("button", { type: "button", textContent: text });
-  if (name) made.setAttribute("aria-label", name);
+  /* A name has the visible words in it: who speaks to the browser says what stands there. */
+  const has_words = /[a-z]/i.test(text) && !(name || "").includes(text);
+  if (name) made.setAttribute("aria-label", has_words ? text + ": " + name : name);
   made.addEventListener("click", click);
   return made;
 }

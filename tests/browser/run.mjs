@@ -1,0 +1,239 @@
+// The pages that `yair` writes, in a real browser: `node run.mjs YAIR`, with the built command, makes them and
+// looks at them; `node run.mjs YAIR --pictures DIR` takes the screenshots of the documents instead. It ends with
+// "N passed, N failed" and is 0 only where nothing failed. Where there is no browser it says so and is 0, but
+// with CI=true that is a failure. CHROMIUM names another browser than the usual ones.
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath, pathToFileURL } from "node:url";
+import { chromium } from "playwright-core";
+
+const WIDE = { width: 1280, height: 800 }, NARROW = { width: 390, height: 844 };
+/** What a mail takes, and what a reader waits, of the page of the motion-capture robot. */
+const MAX_PAGE_BYTES = 1e6, MAX_LOAD_MS = 1000;
+/** A line of a picture is many such pixels; noise of the renderer is none. */
+const MIN_DRAWN_PIXELS = 200;
+const HOSTILE = "</script><script>window.broken=1</script><img src=x onerror=window.broken=2>";
+
+const [command, option, folder] = process.argv.slice(2);
+const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
+const executablePath = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]
+  .find((path) => path && existsSync(path));
+if (!command || !existsSync(command)) {
+  console.error(`run.mjs: ${command || "no command given"}: build yair first, and give its path`);
+  process.exit(2);
+}
+if (!executablePath) {
+  const required = process.env.CI === "true";
+  console.log(`${required ? "failed" : "skipped"}: browser: there is no chromium; install it, or name one in CHROMIUM`);
+  console.log(`0 passed, ${required ? 1 : 0} failed`);
+  process.exit(required ? 1 : 0);
+}
+
+const work = mkdtempSync(join(tmpdir(), "yair-pages-"));
+const yair = (...words) => execFileSync(resolve(command), [...words, "--quiet"], { cwd: work, stdio: ["ignore", "ignore", "pipe"] });
+
+/** Pages by name, each with what it must have beside what all have. */
+function pages() {
+  const scenario = join(root, "scenarios/motion-capture.toml");
+  yair("simulate", scenario, "--out", "robot");
+  // The same robot without what only shows in motion.
+  const effects = /\[\[effect\]\]\nkind = "(slip_speed|wheel_eccentricity)"\n(.+\n)+\n/g;
+  const text = readFileSync(scenario, "utf8");
+  if ([...text.matchAll(effects)].length !== 2) throw new Error(`${scenario}: its two effects of motion are elsewhere`);
+  writeFileSync(join(work, "plain.toml"), text.replace(effects, ""));
+  yair("simulate", "plain.toml", "--out", "plain");
+  const hostile = join(work, "hostile");
+  mkdirSync(hostile);
+  for (const file of ["dataset.toml", "odometry.csv", "truth.csv"]) {
+    let said = readFileSync(join(work, "robot", file), "utf8").replaceAll("straight_000", HOSTILE);
+    if (file === "dataset.toml") said = `name = "${HOSTILE}"\nnotes = "${HOSTILE}"\n${said}`;
+    writeFileSync(join(hostile, file), said);
+  }
+  yair("diagnose", "robot", "--out", "found");
+  yair("diagnose", "plain", "--out", "consistent");
+  yair("diagnose", "hostile", "--out", "hostile-page");
+  yair("calibrate", "robot", "--out", "robot.toml", "--out-dir", "calibrate");
+  yair("evaluate", "robot", "--calibration", "robot.toml", "--calibration", "found/extended.toml", "--out-dir", "evaluate");
+  yair("compare", "robot", "plain", "--out-dir", "compare");
+  yair("plan", "robot", "--out", "plan");
+  yair("sweep", join(root, "scenarios/noise-levels.toml"), "--trials", "20", "--out", "sweep");
+  yair("reproduce", "--trials", "20", "--out", "reproduce");
+  const drive = { runs: true };
+  return {
+    found: { ...drive, answers: ["Cause", "Size", "Gain", "Drive next"], small: true },
+    consistent: { ...drive, answers: ["Cause", "Drift", "Could not show", "Drive next"] },
+    "hostile-page": { ...drive, hostile: true },
+    calibrate: drive, evaluate: drive, compare: { plain: true }, plan: { still: true }, sweep: {}, reproduce: {},
+  };
+}
+
+let passed = 0, failed = 0;
+function check(page, what, holds, detail = "") {
+  if (holds) passed += 1;
+  else { failed += 1; console.log(`failed: ${page}: ${what}${detail ? `: ${detail}` : ""}`); }
+}
+
+/** Pixels with a colour, which axes and grid do not have, and a sum that moves with any pixel. */
+const pixels = (canvas) => {
+  // Greys of the grid have a chroma of about 10 of 255, the colours of the tracks over 100.
+  const MIN_CHROMA = 60;
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let sum = 0, drawn = 0;
+  for (let k = 0; k < data.length; k += 4) {
+    if (data[k + 3] === 0) continue;
+    const [red, green, blue] = [data[k], data[k + 1], data[k + 2]];
+    if (Math.max(red, green, blue) - Math.min(red, green, blue) > MIN_CHROMA) drawn += 1;
+    sum = (Math.imul(sum, 31) + (red << 16) + (green << 8) + blue + k) | 0;
+  }
+  return { drawn, sum };
+};
+
+async function opened(browser, name, viewport, colorScheme) {
+  const context = await browser.newContext({ viewport, colorScheme, reducedMotion: "reduce" });
+  const page = await context.newPage();
+  const errors = [];
+  page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
+  page.on("pageerror", (error) => errors.push(String(error)));
+  page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) errors.push(`loads ${request.url()}`); });
+  await page.goto(pathToFileURL(join(work, name, "report.html")).href, { waitUntil: "load" });
+  return { context, page, errors };
+}
+
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+/** Opens all parts and waits until their pictures are drawn. */
+const openAll = (page) => page.evaluate(() => new Promise((done) => {
+  document.querySelectorAll("details").forEach((part) => { part.open = true; });
+  requestAnimationFrame(() => requestAnimationFrame(done));
+}));
+
+/** Serious and critical violations, with all parts open; the page's own policy forbids foreign scripts, so
+ * that axe comes by the debugger. */
+async function violations(page) {
+  await openAll(page);
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
+  return violations.filter(({ impact }) => ["serious", "critical"].includes(impact))
+    .map(({ id, nodes }) => `${id} (${nodes.length}: ${nodes[0].html.slice(0, 120)})`);
+}
+
+const WAYS = [["1280×800", WIDE, "light"], ["390×844", NARROW, "light"], ["dark", WIDE, "dark"]];
+
+async function look(browser, name, wanted) {
+  for (const [way, viewport, scheme] of wanted.hostile ? WAYS.slice(0, 1) : WAYS) {
+    const { context, page, errors } = await opened(browser, name, viewport, scheme);
+    const where = `${name} (${way})`;
+    if (wanted.answers) {
+      const outside = await page.evaluate((answers) => answers.filter((answer) => {
+        const terms = [...document.querySelectorAll(".tiles dt")];
+        const box = terms.find((term) => term.textContent.startsWith(answer))?.parentElement.getBoundingClientRect();
+        return !box || box.top < 0 || box.bottom > window.innerHeight || box.right > window.innerWidth;
+      }), wanted.answers);
+      check(where, "the answers stand in the first viewport", outside.length === 0, outside.join(", "));
+    }
+    const width = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+    check(where, "nothing scrolls sideways", width <= 0, `${width} px`);
+    if (viewport === WIDE) {
+      const found = await violations(page);
+      check(where, "axe finds nothing serious", found.length === 0, found.join("; "));
+    } else await openAll(page);
+    const open = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+    check(where, "nothing scrolls sideways with all parts open", open <= 0, `${open} px`);
+    const pictures = await page.$$eval("figure.picture canvas", (all) => all.length);
+    const still = await page.$$eval("svg[role=img], img", (all) => all.filter((one) => one.getBoundingClientRect().width > 40).length);
+    if (!wanted.plain) check(where, "pictures are there", wanted.still ? still > 0 : pictures + still > 0);
+    for (const canvas of await page.$$("figure.picture canvas")) {
+      const { drawn } = await canvas.evaluate(pixels);
+      check(where, "a picture is drawn", drawn >= MIN_DRAWN_PIXELS, `${drawn} pixels`);
+    }
+    check(where, "no error on the console, and nothing is loaded", errors.length === 0, errors.join("; "));
+    await context.close();
+  }
+  const { context, page, errors } = await opened(browser, name, WIDE, "light");
+  const dangling = await page.$$eval('a[href^="#"]', (all) => all.map((a) => a.getAttribute("href").slice(1)).filter((id) => !document.getElementById(id)));
+  check(name, "links into the page lead somewhere", dangling.length === 0, dangling.join(", "));
+  if (wanted.small) {
+    const bytes = statSync(join(work, name, "report.html")).size;
+    check(name, `at most ${MAX_PAGE_BYTES} bytes`, bytes <= MAX_PAGE_BYTES, `${bytes}`);
+    const load_ms = await page.evaluate(() => performance.getEntriesByType("navigation")[0].loadEventEnd);
+    check(name, `loads within ${MAX_LOAD_MS} ms`, load_ms > 0 && load_ms < MAX_LOAD_MS, `${load_ms} ms`);
+  }
+  if (wanted.runs) {
+    const canvas = await page.$("figure.path canvas");
+    const before = await canvas.evaluate(pixels);
+    // By keys alone: Tab until the first run's switch, then Space.
+    let reached = false;
+    for (let k = 0; k < 120 && !reached; k++) {
+      await page.keyboard.press("Tab");
+      reached = await page.evaluate(() => document.activeElement.matches("fieldset .runs input"));
+    }
+    check(name, "Tab reaches the switches of runs", reached);
+    await page.keyboard.press("Space");
+    const off = await canvas.evaluate(pixels);
+    check(name, "Space switches a run off, and the picture changes", off.sum !== before.sum && off.drawn !== before.drawn);
+    await page.keyboard.press("Space");
+    check(name, "Space again brings the same picture back", (await canvas.evaluate(pixels)).sum === before.sum);
+  }
+  if (wanted.hostile) {
+    check(name, "names of runs run nothing", (await page.evaluate(() => window.broken)) === undefined && errors.length === 0, errors.join("; "));
+    check(name, "the name of a run is shown as text", (await page.evaluate(() => document.body.innerText)).includes(HOSTILE));
+  }
+  await page.emulateMedia({ media: "print" });
+  const controls = await page.$$eval("button, input, select, nav", (all) => all.filter((one) => one.getClientRects().length > 0).map((one) => one.outerHTML.slice(0, 60)));
+  check(name, "print has no controls", controls.length === 0, `${controls.length}: ${controls[0]}`);
+  await context.close();
+}
+
+/** Screenshots as WebP, of what the documents show. */
+async function take(browser, into) {
+  for (const [file, name, viewport, scheme, section] of [
+    ["report-diagnosis.webp", "found", WIDE, "light"],
+    ["report-path.webp", "found", WIDE, "light", "path"],
+    ["report-dark-narrow.webp", "found", NARROW, "dark"],
+  ]) {
+    const { context, page } = await opened(browser, name, viewport, scheme);
+    if (section) await page.evaluate((id) => document.getElementById(id).scrollIntoView(), section);
+    const session = await context.newCDPSession(page);
+    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 80 });
+    writeFileSync(join(into, file), Buffer.from(data, "base64"));
+    console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
+    await context.close();
+  }
+}
+
+/** Every page as PNG, to be looked at. */
+async function takeAll(browser, into, names) {
+  for (const name of names) for (const [way, viewport, scheme] of WAYS) {
+    const { context, page } = await opened(browser, name, viewport, scheme);
+    await page.screenshot({ path: join(into, `${name}-${way.replace("×", "x")}.png`), fullPage: true });
+    await context.close();
+  }
+}
+
+let browser;
+try {
+  const all = pages();
+  // Without its own sandbox, which a container's root does not have; the pages are our own.
+  browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--hide-scrollbars"] });
+  if (option === "--pictures") await take(browser, folder);
+  else if (option === "--all-pictures") await takeAll(browser, folder, Object.keys(all));
+  // Two at a time, as CI has two cores.
+  else {
+    const waiting = Object.entries(all);
+    const worker = async () => {
+      for (let next = waiting.shift(); next; next = waiting.shift()) await look(browser, ...next);
+    };
+    await Promise.all([worker(), worker()]);
+  }
+} catch (error) {
+  failed += 1;
+  console.log(`failed: ${error.stderr ? error.stderr.toString() : error.stack}`);
+} finally {
+  await browser?.close();
+  rmSync(work, { recursive: true, force: true });
+}
+console.log(`${passed} passed, ${failed} failed`);
+process.exit(failed > 0 ? 1 : 0);
