@@ -81,6 +81,8 @@ struct Document<'d> {
     /// The hidden fault is the first name of its finding.
     named_first: bool,
     finding: Option<&'d Finding>,
+    /// Of the size that was found from the hidden one.
+    size_off_sigmas: Option<f64>,
     findings: Vec<&'d str>,
     new_session_drift_percent: Drift,
     planned: Option<&'d str>,
@@ -151,7 +153,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
                 tell(&diagnosis, terminal)?;
             }
             Err(why) => {
-                terminal.remark(&format!("warning: the first diagnosis stands, with these runs there is none: {why}"))
+                terminal.remark(&format!("warning: the first diagnosis stands, with these runs there is none: {why}"));
             }
         }
     } else {
@@ -178,6 +180,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         found: finding.is_some(),
         named_first,
         finding,
+        size_off_sigmas: finding.and_then(|finding| sigmas_off(&hidden, finding)),
         findings: findings.iter().map(|finding| finding.id.as_str()).collect(),
         new_session_drift_percent: drift,
         planned: planned.as_deref(),
@@ -283,7 +286,27 @@ fn verdict(hidden: &Hidden, finding: Option<&Finding>, first: bool, terminal: &T
         })
         .collect();
     let named = if first { "and rightly named".to_owned() } else { format!("among {}", finding.names.join(", ")) };
-    terminal.say(&format!("It was found, {named}: {}", sizes.join(", ")))
+    terminal.say(&format!("It was found, {named}: {}", sizes.join(", ")))?;
+    match sigmas_off(hidden, finding) {
+        Some(sigmas) if sigmas > MAX_SIGMAS => terminal.say(&format!(
+            "Its size is off by {sigmas:.0} standard deviations: at this size the fault is not what its linear term says"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Standard deviations beyond which a size is said to be off; by chance one in 16 000 is.
+const MAX_SIGMAS: f64 = 4.0;
+
+/// The largest difference of a size that was found from the hidden one, in standard deviations; `None` where
+/// the finding is of another cause or has none.
+fn sigmas_off(hidden: &Hidden, finding: &Finding) -> Option<f64> {
+    let off = hidden.parameters.iter().filter_map(|(name, value)| {
+        let found = finding.parameters.get(*name)?;
+        let sigma = found.sigma.filter(|sigma| *sigma > 0.0)?;
+        Some((found.value - value).abs() / sigma)
+    });
+    off.reduce(f64::max).filter(|_| finding.id == hidden.id)
 }
 
 /// Opens a page where there is a display; that it cannot be opened is no error.

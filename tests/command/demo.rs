@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::support::{refusal, succeed};
 
-/// A right size is beyond so many standard deviations once in 16 000 draws; half of a size is beyond hundreds.
+/// A right size is beyond so many standard deviations once in 16 000 draws.
 const MAX_SIGMAS: f64 = 4.0;
 
 #[test]
