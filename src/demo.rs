@@ -18,8 +18,8 @@ use crate::html_report::drift_percents;
 use crate::simulate::{refuse_filled, write_dataset, write_whole};
 use crate::terminal::{Failure, Terminal};
 
-/// The whole story in a minute: a robot with a hidden fault is simulated, calibrated, diagnosed and corrected,
-/// and drives what its diagnosis asks for.
+/// The whole story in a minute: a robot with a hidden fault is simulated, calibrated, diagnosed and
+/// corrected, and drives what its diagnosis asks for.
 ///
 /// The exit code is 0 only where the hidden fault is among the names that are found.
 #[derive(Args)]
@@ -44,8 +44,8 @@ pub(crate) struct Arguments {
 /// The robot that is driven: scenarios/motion-capture.toml, its geometry's errors without its faults.
 const ROBOT: &str = include_str!("../scenarios/motion-capture.toml");
 
-/// How large the hidden fault is, in units of what is large on a real robot (the prior sigma of its estimation
-/// model). The blind benchmark draws means up to 3; at 2 some faults hide everything else.
+/// How large the hidden fault is, in units of what is large on a real robot (the prior sigma of its
+/// estimation model). The blind benchmark draws means up to 3; at 2 some faults hide everything else.
 const SCALE: f64 = 1.0;
 
 /// Directions of a fault's sizes that are tried until one is physical.

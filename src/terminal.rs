@@ -70,8 +70,8 @@ impl Terminal {
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
     }
 
-    /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and then;
-    /// nothing when quiet.
+    /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and
+    /// then; nothing when quiet.
     pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
         if self.quiet {
             return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());

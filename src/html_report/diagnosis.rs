@@ -22,8 +22,8 @@ pub(crate) struct DiagnosisPage<'d> {
     pub(crate) given: &'d [std::path::PathBuf],
 }
 
-/// Dead reckoning of datasets with the nominal robot, the calibrated one, and the extended one where something
-/// was found.
+/// Dead reckoning of datasets with the nominal robot, the calibrated one, and the extended one where
+/// something was found.
 fn under_calibrations(diagnosis: &Diagnosis, datasets: &[Dataset]) -> UnderCalibrations {
     let Diagnosis { document, extended, base, .. } = diagnosis;
     let calibrated = base.calibrations().into_iter().next().map(AugmentedCalibration::from);

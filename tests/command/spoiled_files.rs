@@ -1,4 +1,5 @@
-//! Files that are malformed or say something else than they mean, each way to spoil them by itself, in a table:
+//! Files that are malformed or say something else than they mean, each way to spoil them by itself, in a
+//! table:
 //! `calibrate` refuses them with what, where and what to do, or gives the right numbers.
 
 use std::fs;

@@ -73,8 +73,8 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
 }
 
 /// Of cases 0 to 39 of a seed all 14 nulls and 14 singles, and the two pairs and four effects that are left
-/// out of the first block, of which nothing is asked here but an answer. CI's gate drives 440 cases of another
-/// seed.
+/// out of the first block, of which nothing is asked here but an answer. CI's gate drives 440 cases of
+/// another seed.
 #[test]
 fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
