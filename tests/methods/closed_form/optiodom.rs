@@ -99,7 +99,8 @@ fn optiodom_sessions_stand_in_the_document_as_found() {
     let document =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/calibration.md")).expect("read");
     let mut rows = 0;
-    for row in document.lines().filter(|line| line.starts_with("| `")) {
+    // Tables of other things have no errors.
+    for row in document.lines().filter(|line| line.starts_with("| `") && line.contains(" ± ")) {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
         let method = calib::method(cells[0].trim_matches('`')).expect("a method");
         let dataset = optiodom(&folder.join("diff").join(cells[1]));
