@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::calibration_file::GivenCalibration;
 use crate::check;
 use crate::simulate::refuse_filled;
-use crate::terminal::{Failure, Terminal, datasets_at, folder_name};
+use crate::terminal::{Failure, Terminal, datasets_at, folder_name, warn};
 
 /// Corrected poses at every row of the logs, from each run's first truth pose where it has one.
 #[derive(Args)]
@@ -130,11 +130,7 @@ fn correct(
     (out, files): (&Path, &mut Files<'_>),
     terminal: &Terminal,
 ) -> Result<CorrectedDataset, Failure> {
-    let warn = |warnings: &[Warning]| {
-        for warning in warnings {
-            terminal.remark(&format!("warning: {}: {warning}", path.display()));
-        }
-    };
+    let warn = |warnings: &[Warning]| warn(path, warnings, terminal);
     let place = path.display().to_string();
     let mut driven_m = 0.0;
     let mut runs = Vec::new();

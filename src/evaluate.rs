@@ -12,7 +12,7 @@ use crate::calibration_file::GivenCalibration;
 use crate::check;
 use crate::html_report::{EvaluationPage, refuse_file};
 use crate::import_robot::named;
-use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table};
+use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table, warn};
 
 /// Drift and pose errors of dead reckoning against the truth, under the nominal values and under each
 /// calibration
@@ -159,11 +159,7 @@ fn evaluate(
     for path in paths {
         let opened = RunByRun::open(path)?;
         let place = path.display().to_string();
-        let warn = |warnings: &[Warning]| {
-            for warning in warnings {
-                terminal.remark(&format!("warning: {place}: {warning}"));
-            }
-        };
+        let warn = |warnings: &[Warning]| warn(path, warnings, terminal);
         warn(opened.warnings());
         let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
         let robot = opened.header().robot;

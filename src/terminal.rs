@@ -134,9 +134,7 @@ pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Ve
         .iter()
         .map(|path| {
             let loaded = dataset::read(path)?;
-            for warning in &loaded.warnings {
-                terminal.remark(&format!("warning: {}: {warning}", path.display()));
-            }
+            warn(path, &loaded.warnings, terminal);
             let mut dataset = loaded.dataset;
             dataset.provenance.name.get_or_insert_with(|| folder_name(path));
             Ok(dataset)
