@@ -48,20 +48,20 @@ fn write_session(dir: &Path, megabytes: usize, lasts: f64) -> std::io::Result<us
 
 /// The instrument's error in a row is this share of the one before, and something new.
 fn write_run(file: &Path, seed: u64, lasts: f64) -> std::io::Result<()> {
-    let mut chance = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut generator = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut out = BufWriter::with_capacity(1 << 16, File::create(file)?);
     let (mut pose, mut speed, mut counts, mut off) = ([0.0_f64; 3], [0.0; 2], [0.0_f64; 2], [0.0; 3]);
     for row in 0..ROWS {
         if row % 200 == 0 {
-            speed = [0; 2].map(|_| chance.random_range(20.0..90.0));
+            speed = [0; 2].map(|_| generator.random_range(20.0..90.0));
         }
         let [left, right] = counts.map(f64::trunc);
         for off in &mut off {
-            *off = lasts * *off + (1.0 - lasts * lasts).sqrt() * chance.random_range(-3e-4..3e-4);
+            *off = lasts * *off + (1.0 - lasts * lasts).sqrt() * generator.random_range(-3e-4..3e-4);
         }
         let seen: [f64; 3] = std::array::from_fn(|k| pose[k] + off[k]);
         writeln!(out, "{},{},{},{},{right},{left}", 0.05 * row as f64, seen[0], seen[1], seen[2])?;
-        let turned = speed.map(|speed: f64| speed + chance.random_range(-1.0..1.0));
+        let turned = speed.map(|speed: f64| speed + generator.random_range(-1.0..1.0));
         let [left_m, right_m] = [turned[0] * M_PER_COUNT[0], turned[1] * M_PER_COUNT[1]];
         let (distance_m, half_rad) = (0.5 * (left_m + right_m), 0.5 * (right_m - left_m) / SEPARATION_M);
         let (sin, cos) = (pose[2] + half_rad).sin_cos();

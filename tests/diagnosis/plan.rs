@@ -181,10 +181,10 @@ fn mean_offset(first: &Dataset, new: &Dataset, predicted: &Predicted) -> f64 {
     cut.runs.retain(|run| direction(run) == predicted.direction);
     for run in &mut cut.runs {
         // The servos settle a little after the last command: the last row of a run is later than its motion
-        // by less than the nearest look is off.
+        // by less than the nearest measurement is off.
         let at_s = predicted.share_of_duration * run.odometry.t_s.last().expect("a log");
         let nearest = run.truth.iter().min_by(|a, b| (a.t_s - at_s).abs().total_cmp(&(b.t_s - at_s).abs()));
-        run.truth = vec![run.truth[0], *nearest.expect("looks")];
+        run.truth = vec![run.truth[0], *nearest.expect("measurements")];
     }
     let ends = base.on_planned_runs(&[cut.session()]).dead_reckoned(&base.solution.model, &mut []);
     assert_eq!(ends.len(), cut.runs.len());

@@ -74,7 +74,7 @@ fn off(found: &Calibration, truth: &DriveGeometry) -> f64 {
 }
 
 fn calibrated(dataset: &Dataset) -> Calibration {
-    Joint::DEFAULT.calibrate(&[dataset.session()]).expect("looks")
+    Joint::DEFAULT.calibrate(&[dataset.session()]).expect("measurements")
 }
 
 fn keep_ends(truth: &mut Vec<TruthSample>) {
@@ -206,7 +206,7 @@ fn what_the_runs_do_not_show_is_named_and_stays_nominal() {
 fn profile_intervals_are_those_of_sigma_where_the_cost_is_a_parabola() {
     let (dataset, _) = drive(&motion_capture(mix(), Pose::IDENTITY), 6);
     let sessions = [dataset.session()];
-    let fit = Joint::DEFAULT.settings.fit(&sessions).expect("looks");
+    let fit = Joint::DEFAULT.settings.fit(&sessions).expect("measurements");
     let (_, covariance) =
         fit.solution.information(&fit.columns).and_then(|information| information.solve()).expect("seen");
     for (row, column) in Column::GEOMETRY.into_iter().enumerate() {
@@ -316,7 +316,7 @@ fn sessions_and_runs_may_have_an_instrument_of_their_own() {
     let mounted = [Pose::new(0.03, -0.012, 0.02), Pose::new(-0.02, 0.01, -0.015)];
     let (first, truth) = drive(&motion_capture(mix(), mounted[0]), 11);
     let (second, _) = drive(&motion_capture(mix(), mounted[1]), 12);
-    let found = Joint::DEFAULT.calibrate(&[first.session(), second.session()]).expect("looks");
+    let found = Joint::DEFAULT.calibrate(&[first.session(), second.session()]).expect("measurements");
     assert_eq!(found.group_instruments.len(), 2, "{found:?}");
     for (own, mounted) in found.group_instruments.iter().zip(mounted) {
         let near = |found: Option<f64>, truth: f64| found.is_some_and(|found| (found - truth).abs() < 1e-4);

@@ -135,10 +135,10 @@ impl Case {
         let of =
             |kind: EffectKind| all.iter().filter(move |(_, of)| *of == kind).map(|(id, _)| *id).collect::<Vec<_>>();
         let mut one = |gross: f64, scatter: f64| {
-            let chance = draw.uniform(0.0, 1.0);
-            let list = of(if chance < gross {
+            let uniform = draw.uniform(0.0, 1.0);
+            let list = of(if uniform < gross {
                 EffectKind::Gross
-            } else if chance < gross + scatter {
+            } else if uniform < gross + scatter {
                 EffectKind::Scatter
             } else {
                 EffectKind::Mean

@@ -97,18 +97,18 @@ impl Conditions {
             stamps: stamps(draws, needs, hidden, 1.0 / log_rate_hz),
             lost_row_share: {
                 let mut lost = draws.of("lost rows");
-                if lost.chance(0.2) { lost.uniform(0.005, MAX_LOST_ROW_SHARE) } else { 0.0 }
+                if lost.bernoulli(0.2) { lost.uniform(0.005, MAX_LOST_ROW_SHARE) } else { 0.0 }
             },
             clock_drift: {
                 let mut drift = draws.of("clock drift");
-                let drifts = drift.chance(0.25) && !is_hidden(OrdinaryCondition::DriftingClocks, hidden);
+                let drifts = drift.bernoulli(0.25) && !is_hidden(OrdinaryCondition::DriftingClocks, hidden);
                 if drifts { drift.uniform(-MAX_CLOCK_DRIFT, MAX_CLOCK_DRIFT) } else { 0.0 }
             },
-            wheel_sigma_m_per_sqrt_m: if wheels.chance(0.15) { 0.0 } else { wheels.log_uniform(3e-5, 2e-3) },
-            ripple: ripple.chance(0.5).then(|| (ripple.log_uniform(0.05, 0.4), ripple.log_uniform(1.0, 8.0))),
+            wheel_sigma_m_per_sqrt_m: if wheels.bernoulli(0.15) { 0.0 } else { wheels.log_uniform(3e-5, 2e-3) },
+            ripple: ripple.bernoulli(0.5).then(|| (ripple.log_uniform(0.05, 0.4), ripple.log_uniform(1.0, 8.0))),
             driving_s: driving.log_uniform(60.0, 300.0),
             // One log in six, beside those that are drawn so.
-            runs: match driving.chance(1.0 / 6.0) {
+            runs: match driving.bernoulli(1.0 / 6.0) {
                 _ if needs.payload => runs.max(MIN_RUNS_WITH_LOADS),
                 true => 1,
                 false => runs,

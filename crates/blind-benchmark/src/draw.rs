@@ -43,7 +43,7 @@ impl Draw {
     }
 
     /// True with this probability.
-    pub(crate) fn chance(&mut self, probability: f64) -> bool {
+    pub(crate) fn bernoulli(&mut self, probability: f64) -> bool {
         self.0.uniform() < probability
     }
 
@@ -54,6 +54,6 @@ impl Draw {
 
     /// 1 or −1.
     pub(crate) fn sign(&mut self) -> f64 {
-        if self.chance(0.5) { 1.0 } else { -1.0 }
+        if self.bernoulli(0.5) { 1.0 } else { -1.0 }
     }
 }

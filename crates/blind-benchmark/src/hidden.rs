@@ -80,7 +80,7 @@ impl Hidden {
         let mut hidden = Self {
             id,
             kind,
-            other_form: benchmark.other_form.is_some() && draw.chance(0.5),
+            other_form: benchmark.other_form.is_some() && draw.bernoulli(0.5),
             values: Vec::new(),
             fixed: Vec::new(),
             scale: 1.0,

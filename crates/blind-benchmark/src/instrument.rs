@@ -104,7 +104,7 @@ impl InstrumentModel {
             TruthKind::Endpoints => RATE_AT_ENDS_HZ,
         };
         let can_be_on_rows = kind != TruthKind::Endpoints && !matches!(conditions.stamps, Stamps::Irregular { .. });
-        let on_rows = rate.chance(0.5) && can_be_on_rows;
+        let on_rows = rate.bernoulli(0.5) && can_be_on_rows;
         let every = (conditions.log_rate_hz / wanted_hz).round().max((conditions.log_rate_hz / MAX_RATE_HZ).ceil());
         let mut noise = draws.of("truth noise");
         let class = match noise.below(10) {

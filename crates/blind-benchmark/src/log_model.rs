@@ -14,7 +14,7 @@ const ROW_ON_LINE_S: f64 = 1e-4;
 /// Makes of a run with exact stamps what is recorded of it.
 pub(crate) fn record(conditions: &Conditions, run: &mut Run, draw: &mut Draw) {
     if conditions.lost_row_share > 0.0 {
-        lose_rows(run, |_| draw.chance(conditions.lost_row_share));
+        lose_rows(run, |_| draw.bernoulli(conditions.lost_row_share));
     }
     match conditions.stamps {
         Stamps::Exact | Stamps::Irregular { .. } => {}

@@ -188,7 +188,7 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
 }
 
 impl Detectability {
-    /// Looks at noise-free runs with every name's hypotheses at hand. `without` are the same runs without the
+    /// Noise-free runs under every effect's estimation model. `without` are the same runs without the
     /// effect: what they show, rounded counts and measurements between two rows, is not the effect's.
     pub(crate) fn of(
         datasets: &[Dataset],

@@ -77,16 +77,16 @@ impl RandomRobot {
     ) -> Result<Self, scenario::ScenarioError> {
         let mut draw = draws.of("robot");
         let base = scenario(conditions, &mut draw)?;
-        let payload_kg = if needs.payload || draw.chance(0.2) {
+        let payload_kg = if needs.payload || draw.bernoulli(0.2) {
             // A load goes with the size.
             let load = draw.uniform(2.0, 10.0) * conditions.wheel_separation_m / USUAL_SEPARATION_M;
-            if draw.chance(0.5) { vec![0.0, load] } else { vec![0.0, 0.5 * load, load] }
+            if draw.bernoulli(0.5) { vec![0.0, load] } else { vec![0.0, 0.5 * load, load] }
         } else {
             Vec::new()
         };
         let jitter_s = if let Stamps::Irregular { jitter_s } = conditions.stamps { jitter_s } else { 0.0 };
         let family = PathFamily::ALL[draw.below(PathFamily::ALL.len())];
-        let sessions = if conditions.runs > 1 && draw.chance(0.5) { 2 } else { 1 };
+        let sessions = if conditions.runs > 1 && draw.bernoulli(0.5) { 2 } else { 1 };
         let driving_s = conditions.driving_s.min(MAX_ROWS / conditions.log_rate_hz).min(MAX_MEASUREMENTS / rate_hz)
             / f64::from(sessions);
         let mut paths = draws.of("paths");

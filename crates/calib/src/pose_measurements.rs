@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(measurements.start.x_m, 0.0625);
         let xs: Vec<f64> = measurements.later.iter().take(4).map(|measurement| measurement.pose.x_m).collect();
         assert_eq!(xs, [0.5625, 1.0625, 1.5625, 2.0]);
-        let last = measurements.later.last().expect("looks");
+        let last = measurements.later.last().expect("measurements");
         assert!((last.pose.theta_rad - (3.0 + 19.75)).abs() < 1e-12, "{}", last.pose.theta_rad);
         let turned: f64 = measurements
             .later

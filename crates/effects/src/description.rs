@@ -102,7 +102,7 @@ pub enum Summary {
 /// What excites an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Excitation {
-    /// What is driven: a plan of manoeuvres can bring it into sight.
+    /// What is driven: a plan of manoeuvres can make it detectable.
     Manoeuvres,
     /// Other conditions than what is driven; what to do instead, as an instruction.
     Conditions(&'static str),

@@ -1,5 +1,5 @@
 //! The same runs once more, as the fitted model would have them: the path smoothed, its counts rounded anew
-//! with phases by chance, its measurements made by the model with noise of the fitted sizes.
+//! with random phases, its measurements made by the model with noise of the fitted sizes.
 //!
 //! Where encoders are coarse, errors of rounding are neither normal nor independent: on a straight whose rows
 //! have whole numbers of counts, the error stays. No formula says what whiteness, kurtosis or a score are
@@ -128,7 +128,7 @@ fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
     segment.intervals.iter().map(of).collect()
 }
 
-/// Counts the smoothed turns, each wheel from a phase by chance on.
+/// Counts the smoothed turns, each wheel from a random phase on.
 fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
     for side in Side::BOTH {
         let quantum_rad = segment.quantum_rad[side];

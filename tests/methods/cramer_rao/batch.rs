@@ -42,7 +42,7 @@ struct Piece {
     /// The motion, from row `motion` to row `motion + 1`.
     motion: usize,
     share: f64,
-    /// What looks at its end.
+    /// What measures at its end.
     measurements: (usize, usize),
 }
 
@@ -75,7 +75,7 @@ impl<'a> Script<'a> {
             .map(|(&left, &right)| Wheels { left: left as f64, right: right as f64 });
 
         // At one instant all marks are read: count the first one's readings.
-        let looks_at = |t_s: f64| {
+        let measurements_at = |t_s: f64| {
             let same = |other_s: f64| (other_s - t_s).abs() < 1e-9;
             (
                 run.truth.iter().filter(|sample| same(sample.t_s)).count(),
@@ -93,7 +93,7 @@ impl<'a> Script<'a> {
                 let middle_s = 0.5 * (ends[0] + ends[1]);
                 let motion = rows_s.partition_point(|row_s| *row_s < middle_s) - 1;
                 let share = (ends[1] - ends[0]) / (rows_s[motion + 1] - rows_s[motion]);
-                Piece { motion, share, measurements: looks_at(ends[1]) }
+                Piece { motion, share, measurements: measurements_at(ends[1]) }
             })
             .collect();
         let counts_per_tick =
@@ -105,7 +105,7 @@ impl<'a> Script<'a> {
         Self {
             scenario,
             rows: rows.collect(),
-            first_measurements: looks_at(0.0),
+            first_measurements: measurements_at(0.0),
             pieces,
             counts_per_tick: scenario.effects.iter().find_map(counts_per_tick).map_or(1.0, f64::from),
             separation_sigma_m: scenario.effects.iter().find_map(separation_sigma_m).unwrap_or(0.0),
@@ -176,7 +176,7 @@ impl<'a> Script<'a> {
         }
     }
 
-    /// Variance of every reading, in the order of [`Self::look`].
+    /// Variance of every reading, in the order of its measurement.
     fn reading_var(&self) -> Vec<f64> {
         let measurements =
             std::iter::once(self.first_measurements).chain(self.pieces.iter().map(|piece| piece.measurements));

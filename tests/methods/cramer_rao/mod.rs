@@ -218,7 +218,7 @@ fn information_is_that_of_a_batch_over_all_raw_readings() {
         assert!(off < 1e-6, "{off}\n{}\n{}", found.matrix(), batch.information());
         for wrong in [Wrong::NoScatterWithin, Wrong::IndependentRounding] {
             let off = difference(found.matrix(), &Batch::of(scenario, motions, wrong).information());
-            // The least is the noise inside the pieces between two looks at 7 and 10 Hz: 4e-5.
+            // The least is the noise inside the pieces between two measurements at 7 and 10 Hz: 4e-5.
             assert!(off > 1e-5, "{wrong:?} is not told apart: {off}");
         }
     }
@@ -305,7 +305,7 @@ fn a_program_driven_twice_tells_twice_and_an_empty_one_nothing() {
 }
 
 #[test]
-fn looks_are_those_of_the_simulator() {
+fn measurements_are_those_of_the_simulator() {
     let motions = program(&[
         Motion::Straight { length_m: 0.61 },
         Motion::Pause { duration_s: 0.21 },

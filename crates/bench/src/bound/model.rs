@@ -106,7 +106,7 @@ impl Model {
 /// An instrument as the pose that its readings come to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseInstrument {
-    /// Looks per second while time passes; `None` for one that reads the standing robot.
+    /// Measurements per second while time passes; `None` for one that reads the standing robot.
     pub(super) rate_hz: Option<f64>,
     /// Covariance of the pose in the body's frame, order x, y, θ.
     covariance: Matrix3<f64>,

@@ -135,7 +135,7 @@ impl SweepPlan {
 
     /// The chunk at which a point that has reached its decision is examined again; `None` when it is done.
     /// With a precision it is where the error, falling with the root of the number of trials, will have
-    /// reached it, but no more than four times as far. Looks depend on the trials alone and never on when
+    /// reached it, but no more than four times as far. They depend on the trials alone and never on when
     /// somebody looked: the number of trials is part of the result.
     pub(super) fn next_decision(&self, point: usize, sum: &PointSum) -> Option<u64> {
         let done = sum.chunks.next();

@@ -41,7 +41,7 @@ fn is_driven(candidate: &Candidate) -> bool {
 }
 
 /// Effects that stay undetectable, and what would reveal them.
-fn out_of_sight(ids: &[&str]) -> String {
+fn not_detectable_among(ids: &[&str]) -> String {
     if ids.is_empty() {
         return String::new();
     }
@@ -162,8 +162,8 @@ fn mix(
     (parts, equations, minutes)
 }
 
-/// Takes runs out again, the last kinds first, as long as the same effects stay in sight: what came into
-/// sight late makes earlier runs needless, and what never did made some in vain.
+/// Takes runs out again, the last kinds first, as long as the same effects stay detectable: what became
+/// detectable late makes earlier runs needless, and what never did made some in vain.
 fn pruned<'i>(
     parts: &mut Vec<Part>,
     options: &[(Manoeuvre, NormalEquations)],
@@ -186,7 +186,7 @@ fn pruned<'i>(
     of(parts)
 }
 
-/// What to drive to bring into sight what the data were blind to; the error says why nothing does.
+/// What to drive to make detectable what was not detectable in these data; the error says why nothing does.
 pub(super) fn show(
     model: &AugmentedModel<'_>,
     catalogue: &[Candidate],
@@ -222,9 +222,9 @@ pub(super) fn show(
     if parts.is_empty() || now.is_empty() {
         let ids: Vec<&str> = detectability.iter().map(|detectability| &detectability.id[..]).collect();
         return Err(format!(
-            "nothing that can be driven {} brings anything else into sight.{}",
+            "nothing that can be driven {} makes anything else detectable.{}",
             setting.within,
-            out_of_sight(&ids)
+            not_detectable_among(&ids)
         ));
     }
     let predicts: BTreeMap<String, String> =
@@ -234,10 +234,10 @@ pub(super) fn show(
         .map(|detectability| &detectability.id[..])
         .filter(|id| !predicts.contains_key(*id) && !was.contains(id))
         .collect();
-    let still = out_of_sight(&still);
+    let still = not_detectable_among(&still);
     let ids: Vec<&str> = now.iter().map(|(id, ..)| *id).collect();
     let why = format!(
-        "it takes {minutes:.1} min and brings {} into sight, sought {}. Diagnose the new runs together with the old ones.{still}",
+        "it takes {minutes:.1} min and makes {} detectable, sought {}. Diagnose the new runs together with the old ones.{still}",
         ids.join(", "),
         setting.within
     );

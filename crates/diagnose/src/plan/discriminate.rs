@@ -99,7 +99,7 @@ fn listed(names: &[Candidate]) -> String {
 /// A pair of names, by their places.
 type Pair = (usize, usize);
 
-/// Kinds of run, each with the evidence of a pair of them.
+/// Kinds of run, each with the normal equations of a pair of them.
 type Driven = (Manoeuvre, NormalEquations);
 
 /// Which pairs of causes are discriminated, at what confidence, and by what.
@@ -166,7 +166,7 @@ impl DiscriminationSearch<'_> {
         }
     }
 
-    /// The evidence with so many pairs of runs of each of some kinds.
+    /// The normal equations with so many pairs of runs of each of some kinds.
     fn after(&self, kinds: &[&Driven], pairs: u32) -> NormalEquations {
         let added: Vec<(&NormalEquations, f64)> = kinds.iter().map(|(_, of)| (of, f64::from(pairs))).collect();
         with_runs(self.before, &added)

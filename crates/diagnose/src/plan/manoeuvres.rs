@@ -311,7 +311,7 @@ impl Part {
     }
 }
 
-/// The evidence of a pair of runs of each manoeuvre for a fit's own terms and some more.
+/// The normal equations of a pair of runs of each manoeuvre for a fit's own terms and some more.
 pub(crate) fn equations_of(
     fit: &ModelFit<'_>,
     all: &[Candidate],
@@ -401,7 +401,7 @@ pub(super) mod tests {
                     Measurements::AsSoFar,
                 )
                 .expect("a run");
-                let end = run.truth.last().expect("looks");
+                let end = run.truth.last().expect("measurements");
                 let turned = match program.settings {
                     dataset::ProtocolSettings { length_m: Some(length_m), .. } => {
                         assert!((end.x_m - length_m).abs() < 1e-9, "{program:?}: {end:?}");

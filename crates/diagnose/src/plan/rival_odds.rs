@@ -1,4 +1,4 @@
-//! What evidence says of names: sizes under each, and how far off one name's prediction stays when another
+//! What normal equations say of causes: sizes under each, and how far off one cause's prediction stays when another
 //! may do its best.
 //!
 //! With Î the information of old and planned runs together, n what is free beside and b another name's
@@ -72,7 +72,7 @@ impl Frame {
         })
     }
 
-    /// Estimates of some columns from evidence, as steps from the model in force, and their covariance.
+    /// Estimates of some columns from normal equations, as steps from the model in force, and their covariance.
     pub(crate) fn estimate(
         &self,
         equations: &NormalEquations,
@@ -164,7 +164,7 @@ impl Rivals {
         (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect()
     }
 
-    /// What evidence makes of a pair, whichever of the two is true.
+    /// What normal equations make of a pair, whichever of the two is true.
     pub(crate) fn discrimination(
         &self,
         equations: &NormalEquations,
@@ -194,7 +194,7 @@ impl Rivals {
     }
 }
 
-/// Evidence with so many times a pair of runs added.
+/// Normal equations with so many times a pair of runs added.
 pub(crate) fn with_runs(before: &NormalEquations, added: &[(&NormalEquations, f64)]) -> NormalEquations {
     let mut all = before.clone();
     added.iter().for_each(|(equations, times)| all.add(equations, *times));
@@ -222,7 +222,7 @@ pub(super) mod tests {
     use super::*;
     use crate::statistics::p_of_z;
 
-    /// Evidence of measurements whose derivatives by the columns are the rows of `slopes`, each with unit
+    /// Normal equations of measurements whose derivatives by the columns are the rows of `slopes`, each with unit
     /// variance, and of measured values.
     pub(in crate::plan) fn normal_equations(slopes: &DMatrix<f64>, values: &DVector<f64>) -> NormalEquations {
         NormalEquations {

@@ -87,8 +87,8 @@ impl Forward for State {
         let Some(stream) = &mut self.stream else { return };
         let counted = readout.ticks;
         for side in Side::BOTH {
-            let (chance, share) = (stream.uniform(), stream.uniform());
-            let is_cleared = chance < self.effect.probability;
+            let (uniform, share) = (stream.uniform(), stream.uniform());
+            let is_cleared = uniform < self.effect.probability;
             readout.ticks[side] = match self.last {
                 // Cleared anywhere between the rows.
                 Some(last) if is_cleared && self.effect.persistent => {

@@ -76,9 +76,9 @@ impl Forward for State {
 
     fn readout(&mut self, readout: &mut Readout) {
         let Some(stream) = &mut self.stream else { return };
-        let (counts, chance) = (readout.ticks, stream.uniform());
+        let (counts, uniform) = (readout.ticks, stream.uniform());
         if let Some(last) = self.last
-            && chance < self.effect.probability
+            && uniform < self.effect.probability
         {
             readout.written = false;
             let since = counts.zip_with(last, |counts, last| counts - last);

@@ -83,8 +83,8 @@ impl Forward for State {
     fn readout(&mut self, readout: &mut Readout) {
         let Some(stream) = &mut self.stream else { return };
         for side in Side::BOTH {
-            let (chance, sense) = (stream.uniform(), stream.uniform());
-            if chance < self.effect.probability {
+            let (uniform, sense) = (stream.uniform(), stream.uniform());
+            if uniform < self.effect.probability {
                 let jump = i64::from(self.effect.jump_counts);
                 readout.ticks[side] += if sense < 0.5 { jump } else { -jump };
             }

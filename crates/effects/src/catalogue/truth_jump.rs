@@ -81,11 +81,11 @@ impl Forward for State {
 
     fn instrument(&mut self, reading: &mut PoseReading) {
         let Some(stream) = &mut self.stream else { return };
-        let (chance, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
+        let (uniform, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
         let since_s = self.last_s.map_or(0.0, |last_s| reading.t_s - last_s);
         self.last_s = Some(reading.t_s);
         let seen = self.frame * reading.world_from_body;
-        let jumps = chance < -(-self.effect.rate_hz * since_s).exp_m1();
+        let jumps = uniform < -(-self.effect.rate_hz * since_s).exp_m1();
         if jumps {
             let TruthJump { jump_m, jump_rad, .. } = self.effect;
             let moved = Pose::new(

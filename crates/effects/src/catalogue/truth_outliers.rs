@@ -88,8 +88,8 @@ impl Forward for State {
         let Some(stream) = &mut self.stream else { return };
         // Drawn for every measurement: at a larger probability the same measurements jump as at a smaller
         // one, by the same, and others too.
-        let (chance, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
-        if chance < self.effect.probability {
+        let (uniform, jump) = (stream.uniform(), [stream.normal(), stream.normal(), stream.normal()]);
+        if uniform < self.effect.probability {
             reading.world_from_body.x_m += self.effect.jump_m * jump[0];
             reading.world_from_body.y_m += self.effect.jump_m * jump[1];
             reading.world_from_body.theta_rad += self.effect.jump_rad * jump[2];
