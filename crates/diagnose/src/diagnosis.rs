@@ -18,7 +18,7 @@ use crate::document::{Document, Gain};
 use crate::findings::{StageResults, findings};
 use crate::gain::gain_by_level;
 use crate::log_rows::{check_rows, check_spans};
-use crate::mean_structure::mean_structure;
+use crate::mean_structure::{THINNED, mean_structure};
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
@@ -144,6 +144,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
             }
         }
     };
+    let base = correlated_base(records, base);
     // Where the counts do not follow the robot at all, no small effect has a meaning.
     let uncorrelated = !is_correlated(&base);
     let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
@@ -199,6 +200,18 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     };
     let found = FittedModel::of(model);
     Ok(Diagnosis { document, extended, residuals, alternatives, base, found })
+}
+
+/// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
+/// measurements the robot moves less than their lasting errors, or wrong stamps, move them.
+fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'a> {
+    if is_correlated(&base) {
+        return base;
+    }
+    match THINNED.fit(&sessions(records)) {
+        Ok(thinned) if is_correlated(&thinned) => thinned,
+        _ => base,
+    }
 }
 
 fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) -> (Option<Gain>, Option<String>) {

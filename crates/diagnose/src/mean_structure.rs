@@ -21,7 +21,7 @@ use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL
 use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
 use crate::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
 
-const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
+pub(crate) const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 fn is_white(checked: &Checked) -> bool {
     let (coefficient, sigmas) = checked.correlation;
