@@ -20,7 +20,7 @@ fn a_robot_is_calibrated_and_drifts_less_in_the_new_session() {
         let line = out.lines().find_map(|line| line.strip_prefix(&format!("drift of {name} in the new session: ")));
         line.and_then(|line| line.split_once(' ')?.0.parse().ok()).unwrap_or_else(|| panic!("{name}: {out}"))
     };
-    // Stated lengths are off by 1 to 7 %, calibrated ones by the effect that is left: a fifteenth of the drift.
+    // Stated lengths are off by 1 to 7 %. What is left after the calibration drifts a fifteenth of that.
     assert!(drift("joint") < 0.2 * drift("nominal"), "{out}");
     assert!(out.contains("wheel_separation_multiplier: 1.06"), "{out}");
 }
