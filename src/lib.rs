@@ -33,3 +33,6 @@ pub use report;
 pub use ros_bag;
 pub use scenario;
 pub use sim_yair;
+
+#[cfg(doctest)]
+mod readmes;

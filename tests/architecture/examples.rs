@@ -46,8 +46,8 @@ fn a_method_of_ones_own_is_benched_and_misses_what_it_says_it_cannot_see() {
         assert_eq!(row.failures, 0, "{method}");
         row.bias.expect("a bias") / row.truth
     };
-    // The wheels differ by 0.2 %; a tape measure sees their mean, half of that off on each side. A trial scatters
-    // by 0.04 %, the mean of 20 by 0.01 %; the bound is four times that.
+    // The wheels differ by 0.2 %; a tape measure sees their mean, half of that off on each side. A trial
+    // scatters by 0.04 %, the mean of 20 by 0.01 %; the bound is four times that.
     for (side, expected) in [("left_m_per_tick", -0.001), ("right_m_per_tick", 0.001)] {
         assert!((of("tape", side) - expected).abs() < 4e-4, "{side}: {}", of("tape", side));
         assert!(of("joint", side).abs() < 4e-4, "{side}: {}", of("joint", side));

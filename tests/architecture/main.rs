@@ -12,6 +12,7 @@ mod effect_ids;
 mod examples;
 mod file_graph;
 mod files;
+mod packages;
 mod settings;
 #[path = "../support/mod.rs"]
 mod support;
