@@ -34,7 +34,7 @@ impl ModelTerm for Cable {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         // Derivative of the interval's motion by the parameter: x ahead, y to the left, θ counter-clockwise.
-        // An effect of several parameters fills several; one with a state keeps it in `self` and forgets it in
+        // One of several parameters fills several; one with a state keeps it in `self` and forgets it in
         // `restart`; one that is in what the instrument sees implements `measurement`.
         let middle_s = interval.t_s + 0.5 * interval.dt_s;
         gradient[0] = Pose::new(0.0, 0.0, interval.increment().distance_m * middle_s);
