@@ -44,6 +44,10 @@ challenge:
 fresh-seeds:
     .ci/run fresh-seeds
 
+# Package every crate, unpack it and build it from what is in it
+package:
+    .ci/run package
+
 # Test the optional features: Parquet files, PNG pictures, bags in SQLite; needs a C compiler
 features:
     .ci/run features

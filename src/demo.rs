@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
 }
 
 /// The robot that is driven: scenarios/motion-capture.toml, its geometry's errors without its faults.
-const ROBOT: &str = include_str!("../scenarios/motion-capture.toml");
+const ROBOT: &str = scenario::MOTION_CAPTURE;
 
 /// How large the hidden fault is, in units of what is large on a real robot (the prior sigma of its
 /// estimation model). The blind benchmark draws means up to 3; at 2 some faults hide everything else.

@@ -28,6 +28,11 @@ pub use kinematics;
 pub use model_term;
 pub use motion_programs;
 pub use paper_reproduction;
+pub use preflight;
 pub use report;
+pub use ros_bag;
 pub use scenario;
 pub use sim_yair;
+
+#[cfg(doctest)]
+mod readmes;

@@ -170,7 +170,8 @@ pub(super) fn appendix(document: &Document, found: &Residuals, extended: bool) -
         let section = Section::new("all-residuals", "Residuals against everything that was recorded").text(text);
         appendix.push(section.with(Block::Charts(all)));
     }
-    appendix.push(Section::new("words", "Words").with(Block::Table(glossary())));
+    let words = Section::new("words", "Words").with(Block::Table(glossary()));
+    appendix.push(words.text("docs/reading-a-report.md of yair goes through this page part by part."));
     appendix
 }
 

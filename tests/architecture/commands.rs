@@ -236,8 +236,13 @@ mod documents_show_what_commands_print {
     }
 
     #[test]
+    fn tutorial() {
+        shows_what_its_commands_print("docs/tutorial.md", 11);
+    }
+
+    #[test]
     fn faq() {
-        shows_what_its_commands_print("docs/faq.md", 7);
+        shows_what_its_commands_print("docs/faq.md", 11);
     }
 
     #[test]

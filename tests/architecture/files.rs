@@ -20,7 +20,7 @@ const WIDEST_COMMENT: usize = 110;
 
 #[test]
 fn the_rooms_are_there_and_every_file_says_what_it_is() {
-    for folder in ["src", "crates", "scenarios", "tests", "benches", "docs", ".ci"] {
+    for folder in ["src", "crates", "scenarios", "tests", "benches", "examples", "docs", ".ci"] {
         assert!(root().join(folder).is_dir(), "the house has a folder {folder}");
     }
     for (name, _) in ARROWS {
@@ -28,7 +28,7 @@ fn the_rooms_are_there_and_every_file_says_what_it_is() {
         assert!(*name == "yair" || root().join("crates").join(name).join("src/lib.rs").is_file(), "{name}");
         assert!(text("ARCHITECTURE.md").contains(&format!("`{name}`")), "ARCHITECTURE.md does not speak of {name}");
     }
-    let sources = files("crates").into_iter().chain(files("src")).chain(files("tests"));
+    let sources = files("crates").into_iter().chain(files("src")).chain(files("tests")).chain(files("examples"));
     for file in sources.filter(|file| file.extension().is_some_and(|extension| extension == "rs")) {
         let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         assert!(!NO_NOUNS.contains(&stem.as_str()), "{}: a helper lives with its noun", file.display());

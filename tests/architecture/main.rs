@@ -9,8 +9,10 @@ mod arrows;
 mod commands;
 mod documents;
 mod effect_ids;
+mod examples;
 mod file_graph;
 mod files;
+mod packages;
 mod settings;
 #[path = "../support/mod.rs"]
 mod support;

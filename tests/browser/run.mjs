@@ -187,17 +187,34 @@ async function look(browser, name, wanted) {
   await context.close();
 }
 
-/** Screenshots as WebP, of what the documents show. */
+/** What the tutorial makes (docs/tutorial.md): the robot that drifts, diagnosed. */
+function tutorial() {
+  yair("simulate", join(root, "scenarios/drifting.toml"), "--out", "lab");
+  yair("import", "csv", "lab/odometry.csv", "lab/truth.csv", "--out", "monday", "--wheel", "0.16", "--base", "0.363", "--ticks-per-rev", "40000");
+  yair("diagnose", "monday", "--out", "diagnosis");
+}
+
+/** Screenshots as WebP, of what the documents show: a part of a page, from the top of one element to the
+ * bottom of another one. */
 async function take(browser, into) {
-  for (const [file, name, viewport, scheme, section] of [
-    ["report-diagnosis.webp", "found", WIDE, "light"],
-    ["report-path.webp", "found", WIDE, "light", "path"],
-    ["report-dark-narrow.webp", "found", NARROW, "dark"],
+  tutorial();
+  const MARGIN = 5;
+  for (const [file, viewport, scheme, first, last] of [
+    ["report-diagnosis.webp", WIDE, "light", "header .badge, h1", ".tiles"],
+    ["report-path.webp", WIDE, "light", "figure.path h3", "figure.path canvas"],
+    ["report-residuals.webp", WIDE, "light", "#residuals figure:last-of-type", "#residuals figure:last-of-type"],
+    ["report-next.webp", WIDE, "light", "#next h2", "#next table"],
+    ["report-narrow.webp", NARROW, "dark", "header .badge, h1", ".tiles"],
   ]) {
-    const { context, page } = await opened(browser, name, viewport, scheme);
-    if (section) await page.evaluate((id) => document.getElementById(id).scrollIntoView(), section);
+    const { context, page } = await opened(browser, "diagnosis", viewport, scheme);
+    const clip = await page.evaluate(([first, last, margin]) => {
+      const [from, to] = [first, last].map((selector) => document.querySelector(selector).getBoundingClientRect());
+      const x = Math.max(0, Math.min(from.left, to.left) - margin), y = Math.max(0, from.top + window.scrollY - margin);
+      const width = Math.max(from.right, to.right) + margin - x;
+      return { x, y, width, height: to.bottom + window.scrollY + margin - y, scale: 1 };
+    }, [first, last, MARGIN]);
     const session = await context.newCDPSession(page);
-    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 80 });
+    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 80, clip, captureBeyondViewport: true });
     writeFileSync(join(into, file), Buffer.from(data, "base64"));
     console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
     await context.close();
@@ -215,7 +232,7 @@ async function takeAll(browser, into, names) {
 
 let browser;
 try {
-  const all = pages();
+  const all = option === "--pictures" ? {} : pages();
   // Without its own sandbox, which a container's root does not have; the pages are our own.
   browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--hide-scrollbars"] });
   if (option === "--pictures") await take(browser, folder);

@@ -16,7 +16,7 @@ use super::conditions::{Conditions, Stamps, USUAL_SEPARATION_M};
 use super::draw::{CaseDraws, Draw};
 use super::ripple::SLACK_GAIN;
 
-const TEMPLATE: &str = include_str!("../../../scenarios/motion-capture.toml");
+const TEMPLATE: &str = scenario::MOTION_CAPTURE;
 
 /// What paths a case has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

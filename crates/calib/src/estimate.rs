@@ -81,7 +81,8 @@ pub struct Estimate {
 /// Joint covariance of the drive's geometry, order: left diameter, right diameter, separation (m²).
 pub type Covariance = DMatrix<f64>;
 
-/// Extrinsics of the outside instrument, for methods that estimate them.
+/// Extrinsics of the outside instrument, for methods that estimate them: its pose in the robot's frame,
+/// metres and radians, with the covariance in the order x, y, θ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extrinsics {
     /// The instrument's frame on the robot.
@@ -106,7 +107,8 @@ pub struct GroupInstrument {
     pub latency_s: Option<f64>,
 }
 
-/// Noise of the odometry, for methods that estimate it.
+/// Noise of the odometry, for methods that estimate it: variances grow with what was driven, not with time
+/// (Chong & Kleeman 1997).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OdometryNoise {
     /// Of each wheel's travel: one standard deviation is this times the root of the travel, m/√m.
@@ -133,7 +135,9 @@ pub struct Rejected {
     pub why: String,
 }
 
-/// What a method found.
+/// What a method found: effective diameters and separation in metres with their covariance (order left,
+/// right, separation), and what was not found, with the reason. [`Self::estimate`] gives single values with
+/// their standard deviations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// The method's name.
@@ -299,6 +303,11 @@ impl CalibError {
 }
 
 /// A calibration method.
+///
+/// It sees borrowed sessions of one robot and nothing else: records, nominal values, stated precision of the
+/// instrument. Everything is in SI units, poses in the room's frame (x, y metres, θ radians,
+/// counter-clockwise). A method of your own works wherever one of [`crate::METHODS`] does in the library,
+/// in a sweep too.
 pub trait Method: Sync + Send {
     /// The name that commands and files use.
     fn name(&self) -> &'static str;

@@ -32,7 +32,7 @@ pub struct ErrorStatistics {
     pub median: f64,
     /// Standard deviation of the population: no degree of freedom is taken off.
     pub std: f64,
-    /// The smallest.
+    /// The smallest, in the unit of what is summarised: metres, or radians of a rotation.
     pub min: f64,
     /// The largest.
     pub max: f64,

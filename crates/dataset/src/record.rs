@@ -48,7 +48,8 @@ pub struct Provenance {
     pub notes: Option<String>,
 }
 
-/// Nominal geometry and encoder of the robot.
+/// Nominal geometry and encoder of the robot, metres: what its odometry uses today, and what a calibration
+/// corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NominalRobot {
@@ -234,7 +235,7 @@ pub struct ProtocolSettings {
     pub turn_rad: Option<f64>,
 }
 
-/// What the robot counted, as columns in time order.
+/// What the robot counted, as columns in time order: one row a reading, on the robot's clock.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Odometry {
     /// Seconds from the run's start, strictly increasing.
@@ -296,7 +297,8 @@ impl ExtraChannel {
     }
 }
 
-/// Where the outside instrument saw the robot, 32 bytes.
+/// Where the outside instrument saw the robot: the pose of what it sees (a marker, a sensor) in the room's
+/// frame, x and y right-handed, heading counter-clockwise from x. 32 bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct TruthSample {
     /// Seconds from the run's start.

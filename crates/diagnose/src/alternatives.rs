@@ -18,7 +18,7 @@ pub struct Alternative {
     pub z: f64,
     /// Log Bayes factor of the effect over none; to second order, before any refit.
     pub log_odds: f64,
-    /// The same less that of the best.
+    /// The same less that of the best, nats: 0 is as probable as the best.
     pub to_the_best: f64,
     /// What became of it.
     #[serde(rename = "fate")]

@@ -77,7 +77,7 @@ pub struct CandidateCause {
 pub struct Check {
     /// Its name.
     pub name: String,
-    /// What was computed.
+    /// What was computed: a χ², a mean square, a kurtosis or a count, by the check.
     pub statistic: f64,
     /// Its p-value: the probability of as large a statistic when nothing is wrong.
     pub p_value: f64,
@@ -85,7 +85,8 @@ pub struct Check {
     pub passes: bool,
 }
 
-/// Something that the calibrated model gets wrong.
+/// Something that the calibrated model gets wrong: its causes, the most probable first, with sizes in SI
+/// units and one standard deviation each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// The most probable name, or `unlisted`.
@@ -187,7 +188,8 @@ pub struct Smallest {
     pub parameter: String,
 }
 
-/// What an extension gains on runs that were held out.
+/// What an extension gains on runs that were held out: fitted without them, then tried on them. Bounds are at
+/// 95 %, over runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gain {
     /// How many runs, or blocks of runs, were held out, each once.
@@ -247,9 +249,9 @@ impl Gain {
 /// Base and extended model compared; positive bounds are a gain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Compared {
-    /// Without the extension.
+    /// Without the extension, in the unit of what is compared.
     pub base: f64,
-    /// With it.
+    /// With it, in the same unit.
     pub extended: f64,
     /// Lower bound of the gain at 95 %.
     pub low: f64,

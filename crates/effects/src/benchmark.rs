@@ -88,7 +88,7 @@ pub struct Benchmark {
     pub needs: Needs,
     /// The law of its sizes.
     pub values: ParameterLaw,
-    /// Largest scale of a real robot.
+    /// Largest scale of a real robot, in units of what is large (`prior_sigma` of the estimation model).
     pub max_scale: f64,
     /// Another functional form, of which one robot in two is.
     pub other_form: Option<OtherForm>,

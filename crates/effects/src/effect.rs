@@ -70,7 +70,8 @@ impl EffectError {
     }
 }
 
-/// An effect with its sizes.
+/// An effect with its sizes: what a file of the catalogue implements. Sizes are fields in SI units, with the
+/// unit at the end of the name.
 pub trait PhysicalEffect {
     /// Checks that the sizes are physical.
     ///

@@ -10,7 +10,8 @@ use kinematics::{Pose, Wheels};
 
 use crate::stream::Stream;
 
-/// One step on its way through the stages.
+/// One step on its way through the stages: a stage reads what those before it left and writes its own fields.
+/// The frame is the robot's, x ahead and y to the left, but for `world_from_body` and `creep_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start of the step, seconds from the run's start.
@@ -164,7 +165,8 @@ impl Hooks {
     }
 }
 
-/// An effect at work during one run.
+/// An effect at work during one run: the simulation model. Hooks are called stage by stage, in the order
+/// command, motor, wheel, floor, encoder, clock, instrument; an effect implements those at which it acts.
 pub trait Forward: Send {
     /// Which of the hooks below do anything: all, unless the effect says otherwise.
     fn hooks(&self) -> Hooks {

@@ -9,7 +9,8 @@ use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Pose, Twist, Wheels, sin_cos};
 use model_term::{Interval, ModelTerm};
 
-/// How data would show an effect.
+/// How data would show an effect: the estimation model. It sees recorded quantities, and nothing of the
+/// simulation model's state.
 pub enum Hypothesis {
     /// The three geometry parameters of the drive, which every calibration fits.
     Geometry,

@@ -22,6 +22,10 @@ use crate::settings::{
 use crate::thinning::{Selection, Thinning};
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
+///
+/// Values are in `solution.model`, SI units. Steps and covariances are by [`Column`]: relative changes of
+/// both diameters and the separation, metres and radians of the instrument, seconds of latency, then the
+/// parameters of terms in their own units. [`FitSettings::fit`](crate::FitSettings::fit) makes one.
 #[derive(Debug, Clone)]
 pub struct ModelFit<'a> {
     /// The runs.

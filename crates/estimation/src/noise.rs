@@ -28,7 +28,7 @@ impl NoiseComponent {
 /// How many variances there are.
 pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 
-/// Values of the four variances.
+/// Values of the four variances; [`NoiseComponent`] says what each is of, and its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// The variances in the order of [`NoiseComponent::ALL`].

@@ -260,7 +260,7 @@ fn drawn(id: &str, scale: f64) -> Vec<(String, f64)> {
 
 /// A robot with effects.
 fn with_effects(ids: &[&str], scale: f64) -> CalibratedRobot {
-    let text = include_str!("../../../scenarios/motion-capture.toml");
+    let text = scenario::MOTION_CAPTURE;
     let mut scenario = Scenario::parse(text, "motion-capture.toml").expect("a scenario");
     scenario.effects.clear();
     let mut terms = Vec::new();
@@ -421,7 +421,7 @@ fn cost_of_a_step() {
 
 #[test]
 fn what_cannot_run_on_board_is_named_with_its_reason() {
-    let text = include_str!("../../../scenarios/motion-capture.toml");
+    let text = scenario::MOTION_CAPTURE;
     let mut scenario = Scenario::parse(text, "motion-capture.toml").expect("a scenario");
     let effect = |toml: &str| toml::from_str::<Effect>(toml).expect("an effect");
     scenario.effects = vec![

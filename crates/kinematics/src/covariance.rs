@@ -95,7 +95,7 @@ fn tangent_closed_form(turn_rad: f64, sin: f64, cos: f64) -> (f64, f64) {
     ((0.5 * (1.0 + whole) - half * half) * per_tt, 0.5 * (1.0 - whole) * per_tt)
 }
 
-/// Covariance of a dead-reckoned pose, world axes, order x, y, θ.
+/// Covariance of a dead-reckoned pose since its start: world axes, order x, y, θ; m², m·rad and rad².
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OdometryCovariance {
     matrix: Matrix3<f64>,

@@ -168,7 +168,9 @@ impl CompensatedSum {
     }
 }
 
-/// Online dead reckoning: feed it cumulative counts, read the pose.
+/// Online dead reckoning: feed it cumulative counts, read the pose of the drive's centre in the frame of the
+/// start pose. Counts are cumulative readings, not differences; a row may be left out, and costs the bend in
+/// it.
 #[derive(Debug, Clone, Copy)]
 pub struct DeadReckoning<C> {
     pub(crate) odometry: Odometry,

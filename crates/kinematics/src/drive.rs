@@ -24,6 +24,9 @@ fn positive(quantity: &'static str, value: f64) -> Result<f64, GeometryError> {
 }
 
 /// Wheel diameters and separation of a differential drive, nominal or effective.
+///
+/// All are positive and finite, metres: a diameter is that of rolling (travel of a turn over π), the
+/// separation that which makes turns right (travel right minus left, over the turn), which no ruler measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveGeometry {
     wheel_diameter_m: Wheels<f64>,
@@ -110,7 +113,8 @@ pub struct Twist {
     pub omega_rad_s: f64,
 }
 
-/// A motion of constant curvature: arc length of the centre and turn (paper, eq. 1 and 2).
+/// A motion of constant curvature: arc length of the centre, metres, positive ahead, and turn, radians,
+/// counter-clockwise (paper, eq. 1 and 2).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Increment {
     /// Arc length of the centre, metres, negative backward (`ΔS`).

@@ -16,7 +16,7 @@ pub mod table_1;
 pub mod table_2;
 mod units;
 
-use scenario::{Scenario, ScenarioError};
+use scenario::{PAPER, Scenario, ScenarioError};
 use serde::Serialize;
 
 pub use error::PaperError;
@@ -27,15 +27,12 @@ use figures::{Figure4, Figure7};
 use table_1::{Hypothesis, Table1};
 use table_2::Table2;
 
-/// The scenario that is shipped as `scenarios/paper.toml`.
-const SCENARIO: &str = include_str!("../../../scenarios/paper.toml");
-
 /// The paper's robot and protocols.
 ///
 /// # Errors
 /// Never for the shipped text; a test parses it.
 pub fn scenario() -> Result<Scenario, ScenarioError> {
-    Scenario::parse(SCENARIO, "scenarios/paper.toml")
+    Scenario::parse(PAPER, "scenarios/paper.toml")
 }
 
 /// Everything that `yair reproduce` finds.

@@ -68,9 +68,9 @@ impl<'de> Deserialize<'de> for Levels {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Smallest level.
+    /// Smallest level, in the unit of the key.
     pub from: f64,
-    /// Largest level.
+    /// Largest level, in the same unit.
     pub to: f64,
     /// How levels are spread in between.
     #[serde(default)]

@@ -162,7 +162,7 @@ mod tests {
     use super::*;
     use crate::experiment::Scenario;
 
-    const PAPER: &str = include_str!("../../../scenarios/paper.toml");
+    use crate::shipped::PAPER;
 
     const ROOM: Budget = Budget {
         room_x_m: 2.0,

@@ -321,7 +321,7 @@ fn check_schedules(location: &str, key: &str, schedules: &[Schedule]) -> Result<
 mod tests {
     use super::*;
 
-    const PAPER: &str = include_str!("../../../scenarios/paper.toml");
+    use crate::shipped::PAPER;
 
     fn error(text: &str) -> String {
         Scenario::parse(text, "x.toml").expect_err("not a scenario").to_string()

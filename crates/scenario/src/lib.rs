@@ -14,6 +14,7 @@ mod limits;
 mod points;
 mod programs;
 mod robot;
+mod shipped;
 mod sweep;
 
 pub use axis::{Level, Levels, Range, Scale};
@@ -24,4 +25,5 @@ pub use experiment::{Engine, Instrument, Log, Noise, Placement, Scenario};
 pub use file::LARGEST_FILE_BYTES;
 pub use points::{Axis, CASE_AXIS, Point};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
+pub use shipped::{MOTION_CAPTURE, PAPER};
 pub use sweep::{Case, Sobol, Sweep};

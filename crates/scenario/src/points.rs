@@ -148,8 +148,7 @@ mod tests {
     }
 
     fn paper(axes: &[(&str, &[f64])]) -> Scenario {
-        let mut scenario =
-            Scenario::parse(include_str!("../../../scenarios/paper.toml"), "paper.toml").expect("shipped");
+        let mut scenario = Scenario::parse(crate::shipped::PAPER, "paper.toml").expect("shipped");
         let axes = axes.iter().map(|(key, levels)| ((*key).to_owned(), Levels::List(levels.to_vec()))).collect();
         scenario.sweep = Some(Sweep { axes, ..empty() });
         scenario
@@ -207,7 +206,7 @@ mod tests {
 
     /// Paper's robot with another sweep.
     fn parse(sweep: &str) -> Result<Scenario, ScenarioError> {
-        let text = include_str!("../../../scenarios/paper.toml");
+        let text = crate::shipped::PAPER;
         let (head, _) = text.split_once("[sweep]").expect("the paper sweeps");
         Scenario::parse(&format!("{head}[sweep]\ntrials = 2\nmethods = [\"direct\"]\n{sweep}"), "x.toml")
     }

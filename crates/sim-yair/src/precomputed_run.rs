@@ -125,8 +125,7 @@ mod tests {
     /// that scatter from motion to motion.
     #[test]
     fn a_precomputed_run_gives_the_records_of_a_run_that_asks_its_clock() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/paper.toml");
-        let paper = Scenario::read(&path).expect("the shipped scenario");
+        let paper = Scenario::parse(scenario::PAPER, "paper.toml").expect("the shipped scenario");
         assert_eq!(paper.engine, Engine::ClosedForm);
         let mut scattering = paper.clone();
         scattering.noise.sensitivity_sigma = 1e-3;

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::robot::{SimulatedRobot, SimulationError};
 
-/// What a simulation gives.
+/// What a simulation gives: what was measured, and apart from it what no estimator may see.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// What was measured. Nothing in it says what was hidden.
@@ -18,7 +18,8 @@ pub struct Simulation {
     pub truth: HiddenTruth,
 }
 
-/// The truth behind a simulated dataset, kept apart from it.
+/// The truth behind a simulated dataset, kept apart from it. Diameters and separation are means over what
+/// varies with motion; effects have their sizes as the scenario has them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HiddenTruth {
     /// The scenario's name.
@@ -74,10 +75,12 @@ impl TrueRun {
     }
 }
 
-/// Drives a scenario's protocols once.
+/// Drives a scenario's protocols once. The result is a function of its arguments: equal seeds and trials give
+/// equal bits on any machine, other trials of a seed are independent of each other.
 ///
 /// # Errors
-/// [`SimulationError`] when the scenario cannot be simulated.
+/// [`SimulationError`] when the scenario cannot be simulated: the closed form is asked for where an effect is
+/// not exact in it, or the controllers cannot reach the commanded speed.
 pub fn simulate(scenario: &Scenario, seed: u64, trial: u64) -> Result<Simulation, SimulationError> {
     simulate_programs(scenario, &scenario.programs(), Address { seed, point: 0, trial, run: 0 })
 }

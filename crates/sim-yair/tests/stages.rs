@@ -13,8 +13,7 @@ const ENGINES: [Engine; 2] = [Engine::ClosedForm, Engine::Stepping { step_s: 1e-
 const LENGTH_M: f64 = 0.5;
 
 fn scenario(engine: Engine) -> Scenario {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/paper.toml");
-    let mut scenario = Scenario::read(&path).expect("the shipped scenario");
+    let mut scenario = Scenario::parse(scenario::PAPER, "paper.toml").expect("the shipped scenario");
     scenario.engine = engine;
     scenario.effects.clear();
     scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;

@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn equal_phases_of_a_tick_are_one() {
-        let text = include_str!("../../../../scenarios/paper.toml");
+        let text = scenario::PAPER;
         let scenario = Scenario::parse(text, "paper.toml").expect("the shipped scenario");
         let model = Model::of(&scenario).expect("bounded");
         // 500 ticks of 80 counts, forth and back, and an odd one.

@@ -71,7 +71,7 @@ pub struct Coverage {
 pub struct Quantile {
     /// The share.
     pub share: f64,
-    /// The error.
+    /// The error, in the parameter's unit.
     pub error: f64,
     /// Its Monte-Carlo standard error (Woodruff 1952).
     pub mcse: f64,
@@ -84,7 +84,7 @@ pub struct EstimatorResult {
     pub method: String,
     /// The parameter's key.
     pub parameter: String,
-    /// Its true value.
+    /// Its true value, SI.
     pub truth: f64,
     /// Mean error.
     pub bias: Option<f64>,

@@ -87,8 +87,7 @@ mod tests {
 
     #[test]
     fn a_scale_error_drifts_by_itself_on_a_straight_and_not_at_all_on_a_square() {
-        let mut scenario =
-            Scenario::parse(include_str!("../../../../scenarios/paper.toml"), "paper.toml").expect("shipped");
+        let mut scenario = Scenario::parse(scenario::PAPER, "paper.toml").expect("shipped");
         let with = |scenario: &mut Scenario, path: Schedule| {
             scenario.sweep.as_mut().expect("the paper sweeps").validation = vec![path];
             Validation::new(scenario).expect("valid").expect("there is a path")

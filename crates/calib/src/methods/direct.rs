@@ -33,7 +33,7 @@ pub struct Direct {
 pub struct RunValue<'a> {
     /// The run.
     pub run: &'a str,
-    /// The value.
+    /// The value, in the unit of its parameter.
     pub value: f64,
     /// Its standard deviation by the instrument's stated precision alone; 0 when none is stated.
     pub stated_sigma: f64,
