@@ -29,5 +29,6 @@ pub use model_term;
 pub use motion_programs;
 pub use paper_reproduction;
 pub use report;
+pub use ros_bag;
 pub use scenario;
 pub use sim_yair;
