@@ -251,7 +251,7 @@ fn a_gyroscope_may_have_gaps_and_keeps_them() {
     let gaps = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,\na,1,5,0,0.5\na,2,9,0,\nb,0,0,0,\nb,1,1,1,\n";
     let case = Case::good().with("odometry.csv", gaps);
     let set = read(case.path()).expect("no fault").dataset;
-    let of = |run: usize| set.runs[run].odometry.extra.values().map(|values| values.clone()).collect::<Vec<_>>();
+    let of = |run: usize| set.runs[run].odometry.extra.values().cloned().collect::<Vec<_>>();
     assert_eq!(format!("{:?} {:?}", of(0), of(1)), "[[NaN, 0.5, NaN]] []");
     let again = case.path().join("again");
     dataset::write(&set, &again, dataset::Existing::Refuse).expect("written");
