@@ -119,11 +119,8 @@ pub(crate) fn gyro(survey: &Survey) -> (Option<&Topic>, Option<String>) {
         [] => (None, None),
         ref several => {
             let named: Vec<String> = several.iter().map(|topic| format!("--gyro {}", topic.name)).collect();
-            let why = format!(
-                "{} topics may be the gyroscope; none was taken; say {}",
-                several.len(),
-                named.join(" or ")
-            );
+            let why =
+                format!("{} topics may be the gyroscope; none was taken; say {}", several.len(), named.join(" or "));
             (None, Some(why))
         }
     }

@@ -41,7 +41,8 @@ pub(crate) fn read(message: &Value) -> Result<GyroReading, String> {
     }
     let yaw_rate_rad_s = number("angular_velocity.z")?;
     let acceleration = || Some(["x", "y", "z"].map(|axis| message.number(&format!("linear_acceleration.{axis}"))));
-    let acceleration_m_s2 = acceleration().filter(|_| has("linear_acceleration")).and_then(|[x, y, z]| Some([x?, y?, z?]));
+    let acceleration_m_s2 =
+        acceleration().filter(|_| has("linear_acceleration")).and_then(|[x, y, z]| Some([x?, y?, z?]));
     Ok(GyroReading { yaw_rate_rad_s, acceleration_m_s2 })
 }
 

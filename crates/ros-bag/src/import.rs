@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use dataset::import::csv::{Rates, RobotGiven};
 use dataset::{
-    Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
-    moving_pieces, wrap_warnings,
+    Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma,
+    WheelLog, moving_pieces, wrap_warnings,
 };
 use kinematics::{DriveGeometry, Wheels};
 use serde::Serialize;
@@ -396,7 +396,8 @@ fn assemble(
         }
     }
     let has_rates = runs.iter().any(|run| !run.odometry.extra.is_empty());
-    let rates = both.gyro.as_ref().filter(|_| has_rates).map(|gyro| format!(", yaw rates of {} ({IMU})", gyro.rows.topic));
+    let rates =
+        both.gyro.as_ref().filter(|_| has_rates).map(|gyro| format!(", yaw rates of {} ({IMU})", gyro.rows.topic));
     let notes = format!(
         "ROS 2 bag: wheels of {} ({}), poses of {} ({}){}",
         both.wheels.topic,

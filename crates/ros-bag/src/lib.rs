@@ -36,7 +36,7 @@ pub use error::RosBagError;
 pub use import::{FromBag, Options, Took, TookTopic, import};
 pub use listing::{ListedTopic, Listing, list};
 pub use recorder::{
-    BODY_FRAME, FIRST_STAMP_S, GYRO_FRAME, RUN_GAP_S, RecordedGyro, RecordedPath, RecordedRun, RecordedTopic, RecordedWheels, Recorder,
-    TRUTH_FRAME, WORLD_FRAME,
+    BODY_FRAME, FIRST_STAMP_S, GYRO_FRAME, RUN_GAP_S, RecordedGyro, RecordedPath, RecordedRun, RecordedTopic,
+    RecordedWheels, Recorder, TRUTH_FRAME, WORLD_FRAME,
 };
 pub use wheels::{WheelFields, WheelQuantity};

@@ -193,12 +193,7 @@ fn read_one(
     Ok(BothRows { wheels, quantity, truth, gyro, losses })
 }
 
-fn read_two(
-    bag: &Bag,
-    pair: &WheelPair,
-    resampling: Resampling,
-    others: Others<'_>,
-) -> Result<BothRows, RosBagError> {
+fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<'_>) -> Result<BothRows, RosBagError> {
     let sides = [&pair.left, &pair.right];
     let mut rows: [Rows<f64>; 2] = sides.map(|side| Rows::new(&side.topic, &side.type_name));
     let Visited { truth, gyro, mut losses } = visit(bag, others, |channel, received_ns, message| {
