@@ -71,7 +71,8 @@ pub struct TookTopic {
     pub type_name: String,
     /// Which joints, fields or frames.
     pub what: String,
-    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument, `radps` of a gyroscope.
+    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument, `radps` of a
+    /// gyroscope.
     pub quantity: &'static str,
     /// Rows that were taken.
     pub rows: usize,
