@@ -62,7 +62,7 @@ fn an_import_that_is_interrupted_leaves_no_dataset() {
     }
     fs::write(here.join("log.csv"), table).expect("written");
     let arguments = ["import", "csv", "log.csv", "--out", "new", "--wheel", "0.15", "--base", "0.3"];
-    let arguments = [&arguments[..], &["--ticks-per-rev", "4096", "--time-unit", "s"]].concat();
+    let arguments = [&arguments[..], &["--ticks-per-rev", "4096", "--time-unit", "s", "--angle-unit", "rad"]].concat();
     let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
     is_of_the_signal(ended);
     assert!(!here.join("new").exists(), "{:?}", everything_in(here));
