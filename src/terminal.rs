@@ -122,7 +122,11 @@ fn bar(total: u64, template: &str) -> ProgressBar {
         // Before the first step nobody knows.
         let _ = match state.pos() {
             0 => write!(text, "{} so far", HumanDuration(state.elapsed())),
-            _ => write!(text, "{} left", HumanDuration(state.eta())),
+            // By the mean pace so far: what the last steps took says nothing where one takes long.
+            done => {
+                let to_do = state.len().unwrap_or(done).saturating_sub(done) as f64;
+                write!(text, "{} left", HumanDuration(state.elapsed().mul_f64(to_do / done as f64)))
+            }
         };
     };
     if let Ok(style) = ProgressStyle::with_template(template) {
