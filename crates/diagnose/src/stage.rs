@@ -51,9 +51,9 @@ pub(crate) enum Step {
     Residuals,
 }
 
-/// The stages in their order, each with its share of the time. Source: measured on the robots of
-/// scenarios/motion-capture.toml and of docs/real-robots.md (2026-11-24); they say when to look again, and
-/// nothing depends on them.
+/// The stages in their order, each with its share of the time. Tuned: by hand, not measured; on long logs
+/// the search for effects takes more than its share. They say when to look again, and nothing depends on
+/// them.
 const STEPS: [(Step, &str, f64); 8] = [
     (Step::Motions, "intervals that do not belong", 0.05),
     (Step::RecordFaults, "calibrated model, and faults of the records", 0.15),

@@ -16,7 +16,8 @@ pub(crate) const IMU: &str = "sensor_msgs/msg/Imu";
 
 /// Longest step between two messages that is bridged, in median steps: a message or two may be lost, and the
 /// rate in between is nearly linear. Source: a robot turns up to some 3 rad/s², an IMU measures 50 times a
-/// second or more; linear over 3 steps is then off by 3 rad/s² · 60 ms / 8 = 0.02 rad/s at most.
+/// second or more; where that sets in half-way, the mean over 3 steps of 20 ms is off by
+/// 3 rad/s² · 60 ms / 8 = 0.02 rad/s.
 const MAX_STEP_IN_MEDIANS: f64 = 3.5;
 /// The mean acceleration holds gravity if it is at least that, m/s²: half of 9.81.
 const MIN_GRAVITY_M_S2: f64 = 4.9;
