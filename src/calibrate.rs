@@ -18,7 +18,7 @@ use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 use crate::check;
 use crate::html_report::{CalibrationPage, refuse_file};
 use crate::simulate::write_whole;
-use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, cell, datasets_at, folder_name, read_datasets, table};
 
 /// Calibrate one robot from its sessions.
 #[derive(Args)]
@@ -96,13 +96,17 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     };
     let mut large = large;
     let mut outcomes = Vec::with_capacity(chosen.len());
-    for method in chosen {
+    let bar = terminal.stages("calibrate");
+    let methods = chosen.len() as f64;
+    for (number, method) in chosen.into_iter().enumerate() {
+        advance(&bar, method.name(), number as f64 / methods);
         let outcome = match &mut large {
             Some(large) if method.name() == joint => calibrate_large(large, &arguments.datasets, terminal)?,
             _ => method.calibrate(&sessions),
         };
         outcomes.push((method.name(), outcome));
     }
+    bar.finish_and_clear();
     let mut report = CalibrationReport {
         dataset: names,
         trained_on: sessions.iter().map(TrainedOn::of).collect(),

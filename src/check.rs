@@ -10,7 +10,7 @@ use dataset::{Blocks, Dataset};
 use preflight::{Preflight, Problem, Severity};
 use serde::Serialize;
 
-use crate::terminal::{Failure, Terminal, folder_name, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, folder_name, read_datasets, table};
 
 /// What is wrong with a log, or would make a calibration wrong, before anything is fitted.
 ///
@@ -32,7 +32,7 @@ struct Document<'a> {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let datasets = read_datasets(&arguments.datasets, terminal)?;
-    let found = preflight::check(&datasets);
+    let found = checked(&datasets, terminal);
     show(&found, terminal)?;
     let names = Names::of(datasets.iter().filter_map(|dataset| dataset.provenance.name.clone()).collect());
     terminal.document(&Document {
@@ -42,6 +42,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         determined: &found.determined,
     })?;
     Ok(if found.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn checked(datasets: &[Dataset], terminal: &Terminal) -> Preflight {
+    let bar = terminal.stages("check");
+    advance(&bar, "what is wrong with the logs", 0.0);
+    let found = preflight::check(datasets);
+    bar.finish_and_clear();
+    found
 }
 
 fn show(found: &Preflight, terminal: &Terminal) -> Result<(), Failure> {
@@ -82,7 +90,7 @@ const fn word(problem: &Problem) -> &'static str {
 
 /// Checks datasets before another subcommand and passes on what is no hint.
 pub(crate) fn before(datasets: &[Dataset], terminal: &Terminal) {
-    let found = preflight::check(datasets);
+    let found = checked(datasets, terminal);
     for problem in found.problems.iter().filter(|problem| problem.severity != Severity::Hint) {
         terminal.remark(&line(problem));
     }
@@ -151,7 +159,7 @@ fn line(problem: &Problem) -> String {
 
 /// Refuses datasets with an error, in the words of the worst.
 pub(crate) fn refuse(datasets: &[Dataset], terminal: &Terminal) -> Result<(), Failure> {
-    let found = preflight::check(datasets);
+    let found = checked(datasets, terminal);
     let mut errors = found.problems.iter().filter(|problem| problem.severity == Severity::Error);
     if let Some(first) = errors.next() {
         let more = errors.count();

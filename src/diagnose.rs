@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, Options};
+use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, OnStage, Options, Stage};
 use clap::Args;
 use dataset::Dataset;
+use indicatif::ProgressBar;
 
 use crate::check;
 use crate::diagnosis_page::Page;
 use crate::html_report::DiagnosisPage;
-use crate::simulate::{refuse_filled, write_whole};
-use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
+use crate::simulate::{refuse_filled, write_folder, write_whole};
+use crate::terminal::{Failure, Terminal, advance, cell, read_datasets, table};
 
 /// What the calibrated model gets wrong: the causes that explain it, the extended model, and the gain
 /// on runs that it has not seen.
@@ -39,8 +40,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let datasets = read_datasets(&arguments.datasets, terminal)?;
     check::before(&datasets, terminal);
-    let mut diagnosis =
-        ::diagnose::diagnose(&datasets, &Options { without: arguments.without.clone(), ..Options::default() })?;
+    let bar = terminal.stages("diagnose");
+    let options = Options { without: arguments.without.clone(), on_stage: shown_on(bar.clone()), ..Options::default() };
+    let diagnosis = ::diagnose::diagnose(&datasets, &options);
+    bar.finish_and_clear();
+    let mut diagnosis = diagnosis?;
     if let Some(out) = &arguments.out {
         write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, out)?;
         terminal.remark(&format!(
@@ -56,6 +60,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
+/// Stages of a diagnosis on a bar.
+pub(crate) fn shown_on(bar: ProgressBar) -> OnStage {
+    OnStage::call(move |stage: Stage| advance(&bar, stage.name, stage.done))
+}
+
 /// Writes the files of a diagnosis into a folder, which is made where it is not there.
 pub(crate) fn write_diagnosis(
     diagnosis: &mut Diagnosis,
@@ -63,16 +72,18 @@ pub(crate) fn write_diagnosis(
     given: &[PathBuf],
     out: &Path,
 ) -> Result<(), Failure> {
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    if let Ok(scenario) = &diagnosis.extended {
-        let path = out.join("extended.toml");
-        write_whole(&path, [reservations(&diagnosis.document), scenario.to_toml()?].concat().as_bytes())?;
-        diagnosis.document.extended_model = Some(path.display().to_string());
-    }
-    let Diagnosis { document, residuals, alternatives, .. } = &*diagnosis;
-    write_whole(&out.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;
-    Page { document, residuals, alternatives }.write(out)?;
-    DiagnosisPage { diagnosis, datasets, given }.write(out)
+    write_folder(out, |folder| {
+        if let Ok(scenario) = &diagnosis.extended {
+            let name = "extended.toml";
+            let text = [reservations(&diagnosis.document), scenario.to_toml()?].concat();
+            write_whole(&folder.join(name), text.as_bytes())?;
+            diagnosis.document.extended_model = Some(out.join(name).display().to_string());
+        }
+        let Diagnosis { document, residuals, alternatives, .. } = &*diagnosis;
+        write_whole(&folder.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;
+        Page { document, residuals, alternatives }.write(folder)?;
+        DiagnosisPage { diagnosis, datasets, given, out }.write(folder)
+    })
 }
 
 /// What the extended model does not say of itself: terms of which nobody can tell whether they hold

@@ -81,6 +81,7 @@ pub(crate) fn run(
             truth: &run.truth,
             rows_s: &run.odometry.t_s,
             wheels: wheels(run, &dataset),
+            gyro: None,
             paths: paths.iter().filter_map(|path| path.get(&run.info.id).cloned()).collect(),
         };
         recorder.push(&recorded).map_err(failed)?;

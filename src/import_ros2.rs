@@ -14,7 +14,8 @@ use crate::terminal::{Failure, Terminal, table};
 
 /// A bag of ROS 2: a folder of rosbag2 or one .mcap file, plain or compressed
 ///
-/// Two topics become a dataset: the robot's wheels and the poses of an outside instrument. --list shows what
+/// Two topics become a dataset: the robot's wheels and the poses of an outside instrument; with an Imu, its
+/// yaw rates too. --list shows what
 /// a bag holds and what to type. Known types of wheels: JointState and DynamicJointState (joints by name),
 /// SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the Create 3, and the twists of Odometry
 /// and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
@@ -41,6 +42,11 @@ pub(crate) struct Arguments {
     /// Topic of the poses of an outside instrument.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     truth: Option<String>,
+    /// Topic of a gyroscope (Imu), if the bag's only one is not meant: its rates about the z axis of its
+    /// frame, which is taken as up, become the column gyro_radps, their mean over the interval that ends at a
+    /// row.
+    #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
+    gyro: Option<String>,
     /// Which transform is the robot's pose, where --truth is a topic of transforms.
     #[arg(long, value_name = "PARENT,CHILD", value_parser = frames, help_heading = "Topics")]
     truth_frames: Option<(String, String)>,
@@ -130,7 +136,9 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
         _ => error.into(),
     };
     let FromBag { dataset, took, warnings } = ros_bag::import(&arguments.bag, &arguments.options()?).map_err(asked)?;
-    for (what, flag, topic) in [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)] {
+    let gyro = took.gyro.iter().map(|gyro| ("gyro", "--gyro", gyro));
+    let both = [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)];
+    for (what, flag, topic) in both.into_iter().chain(gyro) {
         let TookTopic { topic, type_name, what: of, quantity, rows, times } = topic;
         terminal.say(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
     }
@@ -160,6 +168,7 @@ impl Arguments {
         Ok(Options {
             wheels: self.wheels.clone(),
             truth: self.truth.clone(),
+            gyro: self.gyro.clone(),
             definitions: self.definitions.clone(),
             fields: WheelFields {
                 left_joint: self.left_joint.clone(),
@@ -229,9 +238,10 @@ fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
     let quoted = |name: &str| if name.contains(' ') { format!("'{name}'") } else { name.to_owned() };
     let topic = |topic: &Option<String>| topic.as_deref().map_or_else(|| "TOPIC".to_owned(), quoted);
     let flags: String = listing.flags.iter().map(|flag| format!(" {flag}")).collect();
+    let gyro = listing.gyro.as_deref().map(|topic| format!(" --gyro {}", quoted(topic))).unwrap_or_default();
     let ticks = if listing.is_counted { " --ticks-per-rev COUNTS" } else { "" };
     Some(format!(
-        "yair import ros2 {} --out DIR --wheels {} --truth {}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
+        "yair import ros2 {} --out DIR --wheels {} --truth {}{gyro}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
         quoted(&arguments.bag.display().to_string()),
         topic(&listing.wheels),
         topic(&listing.truth),

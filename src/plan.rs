@@ -8,9 +8,10 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
+use crate::diagnose::shown_on;
 use crate::html_report::write_plan;
 use crate::simulate::{refuse_filled, write_whole};
-use crate::terminal::{Failure, Terminal, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, read_datasets, table};
 
 /// The next experiment: what discriminates the candidates that a diagnosis leaves, or shows what it could not
 /// see; from a scenario, what to drive before there is any data.
@@ -88,8 +89,11 @@ fn of_data(
     terminal: &Terminal,
 ) -> Result<ExitCode, Failure> {
     let datasets = read_datasets(sources, terminal)?;
-    let options = Options { without: arguments.without.clone(), limits: *limits };
-    let Diagnosis { document, extended, .. } = ::diagnose::diagnose(&datasets, &options)?;
+    let bar = terminal.stages("plan");
+    let options = Options { without: arguments.without.clone(), limits: *limits, on_stage: shown_on(bar.clone()) };
+    let diagnosis = ::diagnose::diagnose(&datasets, &options);
+    bar.finish_and_clear();
+    let Diagnosis { document, extended, .. } = diagnosis?;
     terminal.say(&document.sentence)?;
     let mut scenarios = Vec::new();
     match &document.next_experiment {
@@ -125,7 +129,11 @@ fn of_data(
 
 fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let scenario = Scenario::read(file)?;
-    let plan = plan_scenario(&scenario, limits)?;
+    let bar = terminal.stages("plan");
+    advance(&bar, "what each cause would show", 0.0);
+    let plan = plan_scenario(&scenario, limits);
+    bar.finish_and_clear();
+    let plan = plan?;
     show(&plan.next_experiment, terminal)?;
     let blind: Vec<&str> = plan.blind_to.iter().map(|blind| &blind.id[..]).collect();
     if !blind.is_empty() {

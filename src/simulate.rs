@@ -176,6 +176,33 @@ pub(crate) fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Writes a folder in one piece: `write` fills another one, which then takes the name. One that has files
+/// already is written into file by file.
+pub(crate) fn write_folder<T>(out: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) -> Result<T, Failure> {
+    let failed = |error: io::Error| format!("{}: {error}", out.display());
+    // The folder itself where `out` is a link to it or ends in `..`, as only that can be renamed.
+    let target = out.canonicalize().unwrap_or_else(|_| out.to_owned());
+    let is_there = target.is_dir();
+    if target.exists() && (!is_there || target.read_dir().map_err(failed)?.next().is_some()) {
+        std::fs::create_dir_all(out).map_err(failed)?;
+        return write(out);
+    }
+    let folder = folder_of(&target);
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    // The temporary folder's random name would tell the user nothing: only the kind of the error is shown.
+    let beside = tempfile::Builder::new().prefix(".writing-").tempdir_in(folder);
+    let beside = beside.map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+    // The folder that tempfile makes is private to the user; the one inside has the usual permissions.
+    let made = beside.path().join("made");
+    std::fs::create_dir(&made).map_err(failed)?;
+    let written = write(&made)?;
+    if is_there {
+        std::fs::remove_dir(&target).map_err(failed)?;
+    }
+    std::fs::rename(&made, &target).map_err(failed)?;
+    Ok(written)
+}
+
 /// Writes a file in one piece.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     staged(path, bytes)?.persist(path).map_err(|error| format!("{}: {}", path.display(), error.error))?;

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeSet;
 use std::error::Error;
+use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anstyle::{AnsiColor, Effects, Style};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use dataset::{Dataset, Warning};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::sparse_lines::SparseLines;
@@ -76,19 +78,62 @@ impl Terminal {
         if self.quiet {
             return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
         }
-        let watched = std::io::stderr().is_terminal();
-        let (target, template) = if watched {
-            (ProgressDrawTarget::stderr(), "{msg} {wide_bar} {human_pos}/{human_len}, {eta} left")
+        let template = if std::io::stderr().is_terminal() {
+            "{msg} {wide_bar} {human_pos}/{human_len}, {left}"
         } else {
-            let lines = ProgressDrawTarget::term_like_with_hz(Box::new(SparseLines::new()), 1);
-            (lines, "{msg}: {human_pos} of {human_len}, {eta} left")
+            "{msg}: {human_pos} of {human_len}, {left}"
         };
-        let bar = ProgressBar::with_draw_target(Some(total), target).with_message(what.to_owned());
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        bar
+        bar(total, template).with_message(what.to_owned())
     }
+
+    /// Progress of a few stages that take long each: what is done now, how much of the whole is done, and the
+    /// time left. [`advance`] says so.
+    pub(crate) fn stages(&self, what: &'static str) -> ProgressBar {
+        if self.quiet {
+            return ProgressBar::hidden();
+        }
+        let template = if std::io::stderr().is_terminal() {
+            "{prefix} {wide_bar} {percent} %, {left}: {msg}"
+        } else {
+            "{prefix}: {percent} %, {left}: {msg}"
+        };
+        bar(PARTS, template).with_prefix(what)
+    }
+}
+
+/// Parts in which stages are counted.
+const PARTS: u64 = 1000;
+
+/// A stage begins, with the share of the whole that is done.
+pub(crate) fn advance(bar: &ProgressBar, stage: &'static str, done: f64) {
+    bar.set_position((done * PARTS as f64) as u64);
+    bar.set_message(stage);
+}
+
+/// A bar where somebody watches, else a line now and then; both go on by themselves while a step takes long.
+fn bar(total: u64, template: &str) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::term_like_with_hz(Box::new(SparseLines::new()), 1)
+    };
+    let bar = ProgressBar::with_draw_target(Some(total), target);
+    let left = |state: &ProgressState, text: &mut dyn fmt::Write| {
+        // Before the first step nobody knows.
+        let _ = match state.pos() {
+            0 => write!(text, "{} so far", HumanDuration(state.elapsed())),
+            // By the mean pace so far: what the last steps took says nothing where one takes long.
+            done => {
+                let to_do = state.len().unwrap_or(done).saturating_sub(done) as f64;
+                write!(text, "{} left", HumanDuration(state.elapsed().mul_f64(to_do / done as f64)))
+            }
+        };
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.with_key("left", left));
+    }
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar
 }
 
 /// Colours of what stands before a message; `anstream` drops them where nobody watches or NO_COLOR is set.
@@ -130,16 +175,19 @@ pub(crate) fn table(headers: &[&str], left: usize) -> Table {
 
 /// Reads datasets and passes their warnings on; a folder of datasets stands for all of them.
 pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
-    datasets_at(paths)?
-        .iter()
-        .map(|path| {
-            let loaded = dataset::read(path)?;
-            warn(path, &loaded.warnings, terminal);
-            let mut dataset = loaded.dataset;
-            dataset.provenance.name.get_or_insert_with(|| folder_name(path));
-            Ok(dataset)
-        })
-        .collect()
+    let paths = datasets_at(paths)?;
+    let bar = terminal.stages("reading");
+    let read = |(number, path): (usize, &PathBuf)| {
+        advance(&bar, "datasets", number as f64 / paths.len() as f64);
+        let loaded = dataset::read(path)?;
+        bar.suspend(|| warn(path, &loaded.warnings, terminal));
+        let mut dataset = loaded.dataset;
+        dataset.provenance.name.get_or_insert_with(|| folder_name(path));
+        Ok(dataset)
+    };
+    let all = paths.iter().enumerate().map(read).collect();
+    bar.finish_and_clear();
+    all
 }
 
 /// A dataset, or those in a folder of datasets, by name.

@@ -11,8 +11,8 @@ use diagnose::{Alternative, Document, Residuals, Status, Verdict};
 
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
-pub(crate) use pictures::that_matter;
 use pictures::{Picture, pictures};
+pub(crate) use pictures::{predictions_title, that_matter};
 
 /// What is drawn and told.
 pub(crate) struct Page<'d> {

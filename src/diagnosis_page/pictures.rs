@@ -1,6 +1,6 @@
 //! The diagnosis drawn: residuals against what was recorded, and what names predict.
 
-use diagnose::{Component, NextExperiment, Profile, Residuals, ResidualsByCovariate};
+use diagnose::{Component, NextExperiment, Predicted, Profile, Residuals, ResidualsByCovariate};
 use report::{Axis, Colour, Figure, Marks, Panel, Range, Series};
 
 /// Half of a band's width, in standard errors: 95 %.
@@ -28,15 +28,25 @@ fn chi_square(against: &ResidualsByCovariate) -> f64 {
     against.components.iter().map(|component| component.before.varies_chi_square).fold(0.0, f64::max)
 }
 
-/// Covariates with which the calibrated model's residuals go, the strongest first.
-pub(crate) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
-    let tests: usize = residuals.by_covariate.iter().map(|against| against.components.len()).sum();
+/// All covariates, the strongest first.
+fn strongest_first(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
     let mut all: Vec<&ResidualsByCovariate> = residuals.by_covariate.iter().collect();
     // p-values of large statistics are all zero in a double: the statistic itself goes on.
     all.sort_by(|a, b| chi_square(b).total_cmp(&chi_square(a)));
+    all
+}
+
+/// How many of them stand out.
+fn standing(residuals: &Residuals) -> usize {
+    let tests: usize = residuals.by_covariate.iter().map(|against| against.components.len()).sum();
     let level = STANDS_OUT / tests.max(1) as f64;
-    let standing = all.iter().filter(|against| p_value(against) < level).count();
-    all.truncate(standing.clamp(LEAST, MOST));
+    residuals.by_covariate.iter().filter(|against| p_value(against) < level).count()
+}
+
+/// Covariates with which the calibrated model's residuals go, the strongest first.
+pub(crate) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
+    let mut all = strongest_first(residuals);
+    all.truncate(standing(residuals).clamp(LEAST, MOST));
     all
 }
 
@@ -44,16 +54,27 @@ pub(crate) fn that_matter(residuals: &Residuals) -> Vec<&ResidualsByCovariate> {
 pub(super) fn pictures(residuals: &Residuals, next: Option<&NextExperiment>, extended: bool) -> Vec<Picture> {
     let mut pictures: Vec<Picture> = Vec::new();
     let matter = that_matter(residuals);
+    let standing = standing(residuals);
     if !matter.is_empty() {
         let labels: Vec<&str> = matter.iter().map(|against| &against.label[..]).collect();
         let alt = format!("Mean residuals against {}", labels.join(", "));
-        pictures.push(("residuals", alt, figure("Residuals against what matters most", &matter, residuals, extended)));
-        let all: Vec<&ResidualsByCovariate> = residuals.by_covariate.iter().collect();
-        let alt = "Mean residuals against every covariate".to_owned();
-        pictures.push(("residuals-all", alt, figure("Residuals against every covariate", &all, residuals, extended)));
+        let title = if standing == 0 {
+            "The residuals follow nothing that was recorded".to_owned()
+        } else {
+            let names: Vec<&str> = matter.iter().map(|against| &against.label[..]).collect();
+            format!("The residuals follow the {}", names.join(", the "))
+        };
+        pictures.push(("residuals", alt, figure(&title, &matter, residuals, extended)));
+        let all = strongest_first(residuals);
+        let alt = "Mean residuals against every covariate, those that they follow first".to_owned();
+        let title = format!(
+            "The residuals follow {standing} of {} covariates; the strongest first",
+            residuals.by_covariate.len()
+        );
+        pictures.push(("residuals-all", alt, figure(&title, &all, residuals, extended)));
     }
     if let Some(figure) = next.and_then(predictions) {
-        pictures.push(("next-experiment", "What each name predicts for the next experiment".to_owned(), figure));
+        pictures.push(("next-experiment", "What each cause predicts for the next experiment".to_owned(), figure));
     }
     pictures
 }
@@ -131,7 +152,15 @@ fn with_bars(name: &str, profile: &Profile) -> Series {
     Series::new(name, Marks::Points { points, y_error: Some(errors) })
 }
 
-/// What each name predicts, with what is not known of it.
+/// How far apart the causes are.
+pub(crate) fn predictions_title(predicted: &Predicted) -> String {
+    let unit = if predicted.component == "heading" { "mrad" } else { "mm" };
+    let values = || predicted.values.values().map(|value| 1e3 * value.value);
+    let apart = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
+    format!("The next experiment sets the causes up to {apart:.1} {unit} apart")
+}
+
+/// What each cause predicts, with what is not known of it.
 fn predictions(next: &NextExperiment) -> Option<Figure> {
     let predicted = next.predicted.as_ref()?;
     let unit = if predicted.component == "heading" { "mrad" } else { "mm" };
@@ -140,22 +169,23 @@ fn predictions(next: &NextExperiment) -> Option<Figure> {
         "across" => "to the left of dead reckoning",
         _ => "turned to the left of dead reckoning",
     };
-    let most = predicted.values.len() as f64 + 0.5;
-    let x = Axis::dimensionless("name").range(Range::Fixed { low: 0.5, high: most });
-    let mut panel = Panel::new("", x, Axis::new(quantity, unit).include(0.0));
-    for (place, (id, value)) in (1..).map(f64::from).zip(&predicted.values) {
-        let point = vec![(place, 1e3 * value.value)];
-        let error = Some(vec![1e3 * BAND * value.sigma.unwrap_or(0.0)]);
-        panel = panel.series(Series::new(&format!("{place}: {id}"), Marks::Points { points: point, y_error: error }));
-    }
+    let x = Axis::named("if the cause is", predicted.values.keys().cloned());
+    let places = || (1..).map(f64::from).zip(predicted.values.values());
+    let points = places().map(|(place, value)| (place, 1e3 * value.value)).collect();
+    let errors = places().map(|(_, value)| 1e3 * BAND * value.sigma.unwrap_or(0.0)).collect();
+    let points = Series::new("prediction", Marks::Points { points, y_error: Some(errors) });
+    let panel = Panel::new("", x, Axis::new(quantity, unit).include(0.0))
+        .series(Series::new("0", Marks::HorizontalLine { y: 0.0 }))
+        .series(points.colour(Colour::Blue))
+        .without_legend();
     let when = if predicted.share_of_duration > 0.999 {
         "at the end".to_owned()
     } else {
         format!("after {:.0} % of the time", 100.0 * predicted.share_of_duration)
     };
     let caption = format!(
-        "Mean of the {} runs, {when}. Bars: 95 %, noise and what is not known of each name.",
+        "Mean of the {} runs, {when}. Bars: 95 %, noise and what is not known of each cause.",
         predicted.direction
     );
-    Some(Figure::new("What each name predicts").caption(&caption).panel(panel))
+    Some(Figure::new(&predictions_title(predicted)).caption(&caption).panel(panel))
 }

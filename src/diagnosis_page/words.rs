@@ -47,11 +47,19 @@ pub(crate) fn gain(document: &Document) -> Option<String> {
         )
     } else {
         format!(
-            "On runs that it was not fitted to, the gain of the extended model in dead reckoning is not significant: {becomes}, a gain of {:.0} to {:.0} % of the drift (95 %).",
-            100.0 * low / base,
-            100.0 * high / base
+            "On runs that it was not fitted to, no change in the drift can be told: {becomes}; {}.",
+            undecided(100.0 * low / base, 100.0 * high / base)
         )
     })
+}
+
+/// An interval of the gain that contains zero, per cent of the drift.
+pub(crate) fn undecided(low_percent: f64, high_percent: f64) -> String {
+    format!(
+        "with the correction it may be anything from {:.0} % less to {:.0} % more (95 %)",
+        high_percent.max(0.0),
+        (-low_percent).max(0.0)
+    )
 }
 
 /// Further names of a finding.

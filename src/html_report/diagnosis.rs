@@ -11,7 +11,7 @@ use super::words::{count, parameters, plus_minus, to_copy};
 use super::{
     Under, UnderCalibrations, contents, diagnosis_details as details, drift, made_by, next_drive, residuals, subject,
 };
-use crate::diagnosis_page::words::{capitalised, meaning, named};
+use crate::diagnosis_page::words::{self, capitalised, meaning, named};
 use crate::terminal::Failure;
 
 /// What the page is made of.
@@ -20,6 +20,8 @@ pub(crate) struct DiagnosisPage<'d> {
     pub(crate) datasets: &'d [Dataset],
     /// Datasets as they were typed.
     pub(crate) given: &'d [std::path::PathBuf],
+    /// The folder under the name that it will have.
+    pub(crate) out: &'d Path,
 }
 
 /// Dead reckoning of datasets with the nominal robot, the calibrated one, and the extended one where
@@ -49,10 +51,10 @@ pub(crate) fn drift_percents(diagnosis: &Diagnosis, datasets: &[Dataset]) -> [Op
 }
 
 impl DiagnosisPage<'_> {
-    /// Writes report.html.
-    pub(crate) fn write(&self, out: &Path) -> Result<(), Failure> {
+    /// Writes report.html into a folder.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), Failure> {
         let under = under_calibrations(self.diagnosis, self.datasets);
-        super::write(&self.report(&under, out), out)
+        super::write(&self.report(&under, self.out), folder)
     }
 
     fn report(&self, under: &UnderCalibrations, out: &Path) -> Report {
@@ -73,7 +75,7 @@ impl DiagnosisPage<'_> {
         sections.push(drift);
         sections.push(
             Section::new("residuals", "What the errors go with")
-                .text("A residual is what a measurement sees beyond what wheels, model and the measurements before predict.")
+                .text(residuals::HOW_TO_READ)
                 .with(Block::Charts(residuals::charts_that_matter(found, extended))),
         );
         sections.push(details::alternatives(alternatives, document));
@@ -278,7 +280,8 @@ fn gain_sentence(document: &Document) -> String {
             .to_owned()
     } else {
         format!(
-            "On runs that it has not seen, correcting it changes the drift too little to tell: between {low_percent:+.0} % and {high_percent:+.0} % of it goes away (95 %)."
+            "On runs that it has not seen, no change in the drift can be told: {}.",
+            words::undecided(low_percent, high_percent)
         )
     }
 }
@@ -301,7 +304,8 @@ fn gain_words(document: &Document) -> (String, String) {
     } else if high < 0.0 {
         (format!("Drifts more: {share}"), note)
     } else {
-        (format!("Not significant: {share}"), note)
+        let undecided = words::undecided(100.0 * low / base, 100.0 * high / base);
+        ("No change can be told".to_owned(), capitalised(&undecided))
     }
 }
 

@@ -6,7 +6,7 @@ use ::diagnose::{Alternative, Blind, Document, Finding, GainLevel, Residuals, St
 use report_page::{Block, Cell, Section, Table};
 
 use super::residuals;
-use super::words::plus_minus;
+use super::words::{count, plus_minus};
 use crate::diagnosis_page::words::{p_value, question, status};
 
 /// What an id means.
@@ -164,11 +164,24 @@ pub(super) fn appendix(document: &Document, found: &Residuals, extended: bool) -
     if let Some(gains) = gains(document) {
         appendix.push(Section::new("gains", "Gain, with more and more held out").with(Block::Table(gains)));
     }
-    let all = residuals::all_charts(found, extended);
-    if !all.is_empty() {
-        let text = format!("{} measurements. Each picture has its own scale.", found.measurements);
-        let section = Section::new("all-residuals", "Residuals against everything that was recorded").text(text);
-        appendix.push(section.with(Block::Charts(all)));
+    let [shown, others] = residuals::all_charts(found, extended);
+    if !(shown.is_empty() && others.is_empty()) {
+        let of = shown.len() + others.len();
+        let text = format!(
+            "{} measurements. Of {of} pictures {} show something, the strongest first. Each picture has its own scale.",
+            found.measurements,
+            shown.len()
+        );
+        let section = Section::new("all-residuals", "Residuals against everything that was recorded");
+        let mut section = section.text(residuals::HOW_TO_READ).text(text);
+        if !shown.is_empty() {
+            section = section.with(Block::Charts(shown));
+        }
+        if !others.is_empty() {
+            let label = format!("{} in which nothing shows", count(others.len(), "picture"));
+            section = section.with(Block::Folded(label, vec![Block::Charts(others)]));
+        }
+        appendix.push(section);
     }
     let words = Section::new("words", "Words").with(Block::Table(glossary()));
     appendix.push(words.text("docs/reading-a-report.md of yair goes through this page part by part."));

@@ -1,13 +1,17 @@
 //! What to drive next, with a sketch of it.
 
-use ::diagnose::{Document, NextExperiment};
+use ::diagnose::{Document, NextExperiment, Predicted};
 use motion_programs::Schedule;
-use report_page::{Block, Cell, Manoeuvre, Section, Sketch, Table, Tile};
+use report_page::{Axis, Block, Cell, Chart, Manoeuvre, Mark, Role, Section, Series, Sketch, Table, Tile};
 
 use super::words::count;
+use crate::diagnosis_page::predictions_title;
 use crate::diagnosis_page::words::capitalised;
 
 const TITLE: &str = "What to drive next";
+
+/// Half of a 95 % interval, in standard errors.
+const HALF_WIDTH: f64 = 1.959_964;
 
 /// What a plan drives, drawn.
 fn sketches(next: &NextExperiment) -> Vec<Sketch> {
@@ -78,6 +82,40 @@ pub(super) fn section(document: &Document) -> Section {
     }
 }
 
+/// What each cause predicts, with the causes along the axis.
+fn predictions(predicted: &Predicted) -> Chart {
+    let (quantity, unit) = match &predicted.component[..] {
+        "along" => ("ahead of dead reckoning", "mm"),
+        "across" => ("to the left of dead reckoning", "mm"),
+        _ => ("turned to the left of dead reckoning", "mrad"),
+    };
+    let when = if predicted.share_of_duration > 0.999 {
+        "at the end".to_owned()
+    } else {
+        format!("after {:.0} % of the time", 100.0 * predicted.share_of_duration)
+    };
+    let values = || predicted.values.values();
+    let series = Series {
+        name: "prediction".to_owned(),
+        role: Role::Calibrated,
+        mark: Mark::Points,
+        values: values().map(|value| Some(1e3 * value.value)).collect(),
+        half_widths: values().map(|value| value.sigma.map(|sigma| HALF_WIDTH * 1e3 * sigma)).collect(),
+    };
+    Chart {
+        title: predictions_title(predicted),
+        caption: format!(
+            "Where the {} runs will be seen, {when}, if one of these is the cause. Bars are 95 %: where they do not overlap, the drive tells the causes apart.",
+            predicted.direction
+        ),
+        x: Axis::new("if the cause is", ""),
+        y: Axis::new(quantity, unit),
+        at: (0_u32..).map(f64::from).take(predicted.values.len()).collect(),
+        names: predicted.values.keys().cloned().collect(),
+        series: vec![series],
+    }
+}
+
 /// The section of a plan.
 pub(super) fn section_of(next: &NextExperiment) -> Section {
     let section = Section::new("next", TITLE);
@@ -87,6 +125,10 @@ pub(super) fn section_of(next: &NextExperiment) -> Section {
         predicts.row([Cell::id(id.clone()), Cell::text(meaning), Cell::text(prediction.clone())]);
     }
     let section = section.with(Block::Sketches(sketches(next))).text(capitalised(&next.why));
+    let section = match &next.predicted {
+        Some(predicted) => section.with(Block::Chart(predictions(predicted))),
+        None => section,
+    };
     let section = if predicts.rows.is_empty() { section } else { section.with(Block::Table(predicts)) };
     section.with(Block::Code("The drive as part of a scenario (TOML)".to_owned(), next.protocol.trim_end().to_owned()))
 }

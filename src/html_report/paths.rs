@@ -2,7 +2,7 @@
 //! them.
 
 use ::diagnose::ExtendedModel;
-use calib::{AugmentedCalibration, CalibrationDrift, EvaluationOptions, RunPath, evaluate_runs, run_path};
+use calib::{AugmentedCalibration, CalibrationDrift, EvaluationOptions, RunPath, evaluate_runs_and_paths};
 use dataset::Dataset;
 use kinematics::Pose;
 use report_page::{Block, PathPicture, PathRun, Role};
@@ -42,9 +42,10 @@ impl UnderCalibrations {
                     of.model.filter(|model| model.changes_records()).and_then(|model| model.undone(dataset).ok());
                 let records = undone.as_ref().map_or(dataset, |(records, _)| records);
                 let session = records.session();
-                let (mut driven_m, mut driven_again_m) = (0.0, 0.0);
-                paths.extend(session.runs.iter().map(|run| run_path(&session, run, of.calibration, &mut driven_m)));
-                drift.extend(evaluate_runs(&session, of.calibration, &options, &mut driven_again_m));
+                for (of_run, path) in evaluate_runs_and_paths(&session, of.calibration, &options, &mut 0.0) {
+                    drift.push(of_run);
+                    paths.push(path);
+                }
             }
             let named = of.calibration.map(|calibration| &calibration.calibration);
             drifts.push((of.name.clone(), of.role, CalibrationDrift::of_runs(named, drift)));

@@ -17,9 +17,29 @@ pub(super) fn charts_that_matter(residuals: &Residuals, extended: bool) -> Vec<C
     matter.into_iter().flat_map(|against| charts(against, extended)).collect()
 }
 
-/// All of them.
-pub(super) fn all_charts(residuals: &Residuals, extended: bool) -> Vec<Chart> {
-    residuals.by_covariate.iter().flat_map(|against| charts(against, extended)).collect()
+/// How to read them, for who drives and does no statistics.
+pub(super) const HOW_TO_READ: &str = "Each point is how far the measured pose was, on average, from where the odometry had the robot a moment after the last measurement: ahead (along), to the left (across) or turned to the left (heading). What was recorded while driving is along the bottom. A flat line at zero means that the odometry is right whatever stands along the bottom; a slope or a wave means that the error comes with it.";
+
+/// All of them: first those in which something shows, the strongest first; then the others.
+pub(super) fn all_charts(residuals: &Residuals, extended: bool) -> [Vec<Chart>; 2] {
+    let mut all: Vec<(&ResidualsByCovariate, &Component)> = Vec::new();
+    for against in &residuals.by_covariate {
+        let drawn = against.components.iter().filter(|component| !component.before.bins.is_empty());
+        all.extend(drawn.map(|component| (against, component)));
+    }
+    // p-values of large statistics are all zero in a double: the statistic itself goes on.
+    all.sort_by(|(_, a), (_, b)| {
+        let of = |component: &Component| (component.before.varies_p_value, -component.before.varies_chi_square);
+        let ((p, chi), (q, psi)) = (of(a), of(b));
+        p.total_cmp(&q).then(chi.total_cmp(&psi))
+    });
+    let (shows, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, component)| shows(component));
+    [shows, others].map(|of| of.into_iter().map(|(against, component)| chart(against, component, extended)).collect())
+}
+
+/// Something shows, before or after what was found is taken out.
+fn shows(component: &Component) -> bool {
+    [&component.before, &component.after].iter().any(|profile| profile.varies_p_value < FOLLOWS_P_VALUE)
 }
 
 fn charts(against: &ResidualsByCovariate, extended: bool) -> Vec<Chart> {
@@ -74,12 +94,21 @@ fn chart(against: &ResidualsByCovariate, component: &Component, extended: bool) 
     }
     Chart {
         title: title(against, component, extended),
-        caption: "Means over bins with 95 % intervals; zero is right.".to_owned(),
+        caption: format!("{} Points: means; bars: 95 %.", meaning(&component.component)),
         x: Axis::new(&against.label, &against.unit),
         y: Axis::new(&format!("residual {}", of_component(&component.component)), unit),
         at,
         names: Vec::new(),
         series,
+    }
+}
+
+/// What a value above zero means.
+fn meaning(component: &str) -> &'static str {
+    match component {
+        "heading" => "Above zero the robot had turned further to the left than the odometry says.",
+        "across" => "Above zero the robot was further left than the odometry says.",
+        _ => "Above zero the robot was further ahead than the odometry says.",
     }
 }
 
@@ -100,6 +129,7 @@ fn title(against: &ResidualsByCovariate, component: &Component, extended: bool) 
         (true, true) => format!("{what} follows the {label}; with what was found, no longer"),
         (true, false) if extended => format!("{what} follows the {label}, and still does with what was found"),
         (true, false) => format!("{what} follows the {label}"),
+        (false, false) if extended => format!("{what} follows the {label} only once what was found is taken out"),
         (false, _) => format!("{what} does not follow the {label}"),
     }
 }

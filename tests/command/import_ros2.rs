@@ -5,6 +5,10 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use yair::dataset::TruthSample;
+use yair::kinematics::Wheels;
+use yair::ros_bag::{RecordedGyro, RecordedRun, RecordedWheels, Recorder};
+
 use crate::support::{document, everything_in, refusal, run_in, usage};
 
 /// What the robot of the bags is in truth, metres: wheels left and right, and their distance.
@@ -273,6 +277,83 @@ fn what_cannot_be_told_is_asked_for() {
     assert_eq!(everything_in(temp.path()), Vec::<PathBuf>::new());
     let wrong = usage(temp.path(), &["import", "ros2", &joints, "--out", "new", "--left-field", "a"]);
     assert!(wrong.contains("--right-field"), "{wrong}");
+}
+
+/// Our own recorder's bag: a robot that spins and drives for 20 s, its wheels 20 times a second, and a
+/// gyroscope 100 times a second without those of 5 to 6 s.
+fn bag_with_gyro(path: &Path, variance_rad2_s2: f64) {
+    let yaw_rate = |t_s: f64| 0.5 * (0.4 * t_s).sin();
+    let heading = |t_s: f64| 0.5 / 0.4 * (1.0 - (0.4 * t_s).cos());
+    let rows_s: Vec<f64> = (0..=400).map(|row| 0.05 * f64::from(row)).collect();
+    let truth: Vec<TruthSample> =
+        rows_s.iter().map(|t_s| TruthSample::new(*t_s, 0.0, 0.0, Some(heading(*t_s)))).collect();
+    // Wheels of 150 mm, 300 mm apart: half the separation over the radius, 2, is theirs to a heading.
+    let turned: Vec<f64> = rows_s.iter().map(|t_s| 2.0 * heading(*t_s)).collect();
+    let wheels = Wheels { left: turned.iter().map(|angle| -angle).collect(), right: turned };
+    let instants = (0..=2000).map(|step| 0.01 * f64::from(step) + 0.003).filter(|t_s| !(5.0..6.0).contains(t_s));
+    let gyro = RecordedGyro { yaw_rates_rad_s: instants.map(|t_s| (t_s, yaw_rate(t_s))).collect(), variance_rad2_s2 };
+    let wheels = Some(RecordedWheels::Angles(wheels));
+    let run = RecordedRun { truth: &truth, rows_s: &rows_s, wheels, gyro: Some(gyro), paths: Vec::new() };
+    let mut recorder = Recorder::new(fs::File::create(path).expect("made")).expect("a bag");
+    recorder.push(&run).expect("written");
+    recorder.finish().expect("written");
+}
+
+#[test]
+fn a_gyroscope_becomes_a_column_of_mean_rates_with_its_gaps() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    bag_with_gyro(&at.join("a.mcap"), 1e-6);
+    let listed = document(at, &["import", "ros2", "a.mcap", "--list"]);
+    assert_eq!((&listed["gyro"], &listed["topics"][0]["may_be"]), (&"/imu".into(), &"gyro".into()));
+    let command = listed["command"].as_str().expect("a command");
+    assert!(command.contains("--wheels /joint_states --truth /truth --gyro /imu --wheel"), "{command}");
+
+    let arguments = [&["import", "ros2", "a.mcap", "--out", "new"], &ROBOT[..]].concat();
+    let said = run_in(at, &arguments);
+    let line = "gyro: /imu (sensor_msgs/msg/Imu), angular_velocity.z of imu_link, whose z is taken as up, radps, 1901 rows by header stamps (--gyro)";
+    assert!(said.stdout.contains(line), "{}", said.stdout);
+    assert!(said.stderr.contains("topic /imu: 23 of 400 rows of the odometry have no rates"), "{}", said.stderr);
+    let table = fs::read_to_string(at.join("new/odometry.csv")).expect("a table");
+    assert!(table.starts_with("run,t_s,left_rad,right_rad,gyro_radps\n"), "{table}");
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let mut empty = Vec::new();
+    for pair in rows.windows(2) {
+        let number = |row: &[&str], column: usize| row[column].parse::<f64>().expect("a number");
+        let (from_s, to_s) = (number(&pair[0], 1), number(&pair[1], 1));
+        if pair[1][4].is_empty() {
+            empty.push(to_s);
+            continue;
+        }
+        // The wheels turned twice the angle that the gyroscope saw. Its rate is not linear between messages:
+        // 0.4² · 0.5 rad/s³ · (10 ms)² / 12 is 7e-7; the rate of the row's instant would be 5e-3 off.
+        let turned = 0.5 * (number(&pair[1], 3) - number(&pair[0], 3)) / (to_s - from_s);
+        assert!((number(&pair[1], 4) - turned).abs() < 1e-6, "{to_s}: {} {turned}", pair[1][4]);
+    }
+    // The first message is 3 ms late; then those intervals that reach into what is from 4.993 to 6.003 s.
+    assert!(rows[0][4].is_empty() && empty.len() == 1 + 22, "{empty:?}");
+    assert!(empty[0] < 0.06 && empty[1..].iter().all(|t_s| (4.99..6.06).contains(t_s)), "{empty:?}");
+    assert_eq!(document(at, &["evaluate", "new"])["calibrations"][0]["runs"][0]["run"], "run-01");
+}
+
+#[test]
+fn a_gyroscope_that_measures_no_rate_is_refused_by_name_or_left_out() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    bag_with_gyro(&at.join("a.mcap"), -1.0);
+    let import = [&["import", "ros2", "a.mcap", "--out", "new"], &ROBOT[..]].concat();
+    let why = "topic /imu: message 1: its angular_velocity_covariance[0] is −1";
+    for (topic, why) in [("/imu", why), ("/truth", "expected sensor_msgs/msg/Imu"), ("/nope", "no such topic")] {
+        let message = refusal(at, &[&import[..], &["--gyro", topic]].concat());
+        assert!(message.contains(why), "{message}");
+        assert!(!at.join("new").exists());
+    }
+    // Where nobody asked for it, the rest is imported.
+    let found = document(at, &import);
+    assert!(found["took"]["gyro"].is_null());
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains(why) && warnings.contains("the gyroscope was left out"), "{warnings}");
+    assert!(!fs::read_to_string(at.join("new/odometry.csv")).expect("a table").contains("gyro"));
 }
 
 /// A bag as ROS 2 Humble records it: in SQLite, without definitions of its messages.

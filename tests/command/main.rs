@@ -14,6 +14,8 @@ mod good_log;
 mod import_csv;
 mod import_ros2;
 mod import_tum;
+#[cfg(unix)]
+mod interrupt;
 mod pages;
 mod pose_errors;
 mod spoiled_files;

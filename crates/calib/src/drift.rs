@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::pose_error::{PathErrors, PoseErrorOptions, PoseErrorStatistics, PoseErrors};
 use crate::report::NamedCalibration;
-use crate::trajectory::{AugmentedCalibration, Trajectory, at};
+use crate::trajectory::{AugmentedCalibration, RunPath, Trajectory, at};
 
 /// Drift of every run under one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -104,13 +104,39 @@ pub fn evaluate_runs(
     options: &EvaluationOptions,
     driven_m: &mut f64,
 ) -> Vec<RunDrift> {
+    dead_reckoned(session, calibration, options, driven_m, |_, _| ()).into_iter().map(|(drift, _)| drift).collect()
+}
+
+/// The same with each run's path, which is what drifts: one dead reckoning gives both. `None` where the
+/// calibration has no geometry for this robot.
+#[must_use]
+pub fn evaluate_runs_and_paths(
+    session: &Session<'_>,
+    calibration: Option<&AugmentedCalibration>,
+    options: &EvaluationOptions,
+    driven_m: &mut f64,
+) -> Vec<(RunDrift, Option<RunPath>)> {
+    dead_reckoned(session, calibration, options, driven_m, RunPath::of)
+}
+
+/// The drift of every run, and what is kept of its trajectory.
+fn dead_reckoned<T>(
+    session: &Session<'_>,
+    calibration: Option<&AugmentedCalibration>,
+    options: &EvaluationOptions,
+    driven_m: &mut f64,
+    keep: impl Fn(&RunView<'_>, &Trajectory) -> T,
+) -> Vec<(RunDrift, Option<T>)> {
     let of = |run| {
-        let mut drift = match Trajectory::under(session, run, calibration, driven_m) {
-            Some(trajectory) => run_drift(run, trajectory, options.pose_errors.as_ref()),
-            None => unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"),
+        let (mut drift, kept) = match Trajectory::under(session, run, calibration, driven_m) {
+            Some(trajectory) => {
+                let kept = keep(run, &trajectory);
+                (run_drift(run, trajectory, options.pose_errors.as_ref()), Some(kept))
+            }
+            None => (unknown(run, 0.0, "the calibration has no value that this robot's geometry needs"), None),
         };
         drift.dataset = options.name_runs.then(|| session.name.to_owned());
-        drift
+        (drift, kept)
     };
     session.runs.iter().map(of).collect()
 }

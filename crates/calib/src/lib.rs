@@ -29,7 +29,9 @@ pub use alignment::Alignment;
 pub use compare::{
     ComparedMethod, ComparedSession, Comparison, KindMean, Pair, Refusal, TooFewSessions, compare, path_kind,
 };
-pub use drift::{CalibrationDrift, EvaluationOptions, RunDrift, evaluate, evaluate_path, evaluate_runs};
+pub use drift::{
+    CalibrationDrift, EvaluationOptions, RunDrift, evaluate, evaluate_path, evaluate_runs, evaluate_runs_and_paths,
+};
 pub use drive::{DriveError, drive_and_calibrate};
 pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
@@ -48,4 +50,4 @@ pub use report::{
 pub use robust::{MedianMad, Summary};
 pub use stated::nominal_value;
 pub use trained_on::TrainedOn;
-pub use trajectory::{AugmentedCalibration, CorrectedRun, RunPath, corrected_run, run_path};
+pub use trajectory::{AugmentedCalibration, CorrectedRun, RunPath, corrected_run};

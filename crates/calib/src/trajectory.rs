@@ -117,23 +117,18 @@ pub struct RunPath {
     pub at_measured: Vec<Option<Pose>>,
 }
 
-/// The path of a run under a calibration or, without one, the nominal values; from the first measured pose,
-/// or from the identity where there is none. `driven_m` is as in [`crate::evaluate_runs`].
-#[must_use]
-pub fn run_path(
-    session: &Session<'_>,
-    run: &RunView<'_>,
-    calibration: Option<&AugmentedCalibration>,
-    driven_m: &mut f64,
-) -> Option<RunPath> {
-    let Trajectory { log, measured, moved, .. } = Trajectory::under(session, run, calibration, driven_m)?;
-    let by = moved.unwrap_or_default();
-    let mut row = 0;
-    let at_measured = measured.iter().map(|(t_s, _)| at(&log, *t_s, &mut row).map(|pose| by * pose)).collect();
-    let mut rows_s = run.odometry().t_s.iter().peekable();
-    let is_row = |(t_s, _): &&(f64, Pose)| rows_s.next_if(|row_s| **row_s == *t_s).is_some();
-    let rows = log.iter().filter(is_row).map(|(_, pose)| by * *pose).collect();
-    Some(RunPath { rows, measured: measured.into_iter().map(|(_, pose)| pose).collect(), at_measured })
+impl RunPath {
+    /// From the first measured pose, or from the identity where there is none.
+    pub(crate) fn of(run: &RunView<'_>, trajectory: &Trajectory) -> Self {
+        let Trajectory { log, measured, moved, .. } = trajectory;
+        let by = moved.unwrap_or_default();
+        let mut row = 0;
+        let at_measured = measured.iter().map(|(t_s, _)| at(log, *t_s, &mut row).map(|pose| by * pose)).collect();
+        let mut rows_s = run.odometry().t_s.iter().peekable();
+        let is_row = |(t_s, _): &&(f64, Pose)| rows_s.next_if(|row_s| **row_s == *t_s).is_some();
+        let rows = log.iter().filter(is_row).map(|(_, pose)| by * *pose).collect();
+        Self { rows, measured: measured.iter().map(|(_, pose)| *pose).collect(), at_measured }
+    }
 }
 
 /// Whether a run that begins at the identity ends elsewhere on it when it begins at another pose.

@@ -236,14 +236,26 @@ pub struct ProtocolSettings {
 }
 
 /// What the robot counted, as columns in time order: one row a reading, on the robot's clock.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Odometry {
     /// Seconds from the run's start, strictly increasing.
     pub t_s: Vec<f64>,
     /// The wheels.
     pub wheels: WheelLog,
-    /// Further known columns, each as long as `t_s`.
+    /// Further known columns, each as long as `t_s`; NaN where a channel that may have gaps has none.
     pub extra: BTreeMap<ExtraChannel, Vec<f64>>,
+}
+
+impl PartialEq for Odometry {
+    /// Gaps are equal, though NaN stands for them.
+    fn eq(&self, other: &Self) -> bool {
+        let is_same = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+        let is_column = |a: &Vec<f64>, b: &Vec<f64>| a.len() == b.len() && a.iter().zip(b).all(is_same);
+        self.t_s == other.t_s
+            && self.wheels == other.wheels
+            && self.extra.len() == other.extra.len()
+            && self.extra.iter().zip(&other.extra).all(|(a, b)| a.0 == b.0 && is_column(a.1, b.1))
+    }
 }
 
 /// The wheels' columns, each as long as [`Odometry::t_s`].
@@ -278,7 +290,7 @@ pub enum ExtraChannel {
     CommandedSpeed,
     /// Commanded yaw rate, rad/s.
     CommandedYawRate,
-    /// A gyroscope's yaw rate, rad/s.
+    /// A gyroscope's yaw rate, rad/s: the mean over the interval that ends at the row.
     GyroYawRate,
 }
 
@@ -294,6 +306,12 @@ impl ExtraChannel {
             Self::CommandedYawRate => "cmd_omega_radps",
             Self::GyroYawRate => "gyro_radps",
         }
+    }
+
+    /// Whether rows of a run may be without it (NaN): a sensor beside the wheels has gaps of its own.
+    #[must_use]
+    pub const fn may_have_gaps(self) -> bool {
+        matches!(self, Self::GyroYawRate)
     }
 }
 

@@ -23,6 +23,7 @@ use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
 use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
+use crate::stage::{OnStage, Step};
 use crate::text;
 use crate::unknown_motion::unknown_motions;
 
@@ -33,6 +34,8 @@ pub struct Options {
     pub without: Vec<String>,
     /// Floor, time and speed within which the next experiment is sought.
     pub limits: Limits,
+    /// What is told when a stage begins: a large log takes minutes.
+    pub on_stage: OnStage,
 }
 
 /// Why there is no diagnosis.
@@ -110,11 +113,14 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
+    let begins = |step| options.on_stage.begins(step);
+    begins(Step::Motions);
     let clocks = clock_offsets(datasets);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
     let odd = unknown_motions(datasets, clocks.remaining_s);
     let (datasets, anomalies) =
         odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
+    begins(Step::RecordFaults);
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
     let outlying = as_recorded.as_ref().is_ok_and(|base| {
@@ -144,6 +150,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
             }
         }
     };
+    begins(Step::MeanStructure);
     let base = correlated_base(records, base);
     // Where the counts do not follow the robot at all, no small effect has a meaning.
     let uncorrelated = !is_correlated(&base);
@@ -154,6 +161,7 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     let model = structure.model();
     let names: Vec<String> =
         records.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
+    begins(Step::CarryOver);
     let carry_over: Vec<CarryOver> =
         (0..model.candidates.len()).map(|candidate| carry_over(model, candidate, &names)).collect();
     let findings = findings(&StageResults {
@@ -167,12 +175,16 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         without: &options.without,
         carry_over: &carry_over,
     });
+    begins(Step::Gain);
     let (gain, gain_why_null) = gain_of(&structure.base, model, &names);
+    begins(Step::Detectability);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
+    begins(Step::NextExperiment);
     let next =
         next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
     let carried = carried(&structure.base, model, &carry_over);
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, &carried);
+    begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, &findings);
     let calibration_of = |model: &AugmentedModel<'_>| CalibrationReport {

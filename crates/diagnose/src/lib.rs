@@ -50,6 +50,7 @@ mod scan;
 mod selection;
 mod settings;
 mod sparse_terms;
+mod stage;
 mod statistics;
 mod text;
 mod unknown_motion;
@@ -64,3 +65,4 @@ pub use document::{
 pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};
+pub use stage::{OnStage, Stage};

@@ -77,10 +77,10 @@ fn wilson(share: f64, n: f64) -> [f64; 2] {
 const DRAWN_MISMATCH: f64 = 1.2;
 
 /// Steps of a turn in figure 4.
-const STEPS_A_TURN: u32 = 90;
+pub(crate) const STEPS_A_TURN: u32 = 90;
 
 /// Turns in figure 4.
-const TURNS: u32 = 3;
+pub(crate) const TURNS: u32 = 3;
 
 /// Figure 4 for a robot of given geometry.
 #[must_use]

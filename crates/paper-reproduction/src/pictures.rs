@@ -4,6 +4,7 @@ use kinematics::{Side, Wheels};
 use report::{Axis, Colour, Figure, Marks, Panel, Series};
 
 use super::Reproduction;
+use super::figures::{STEPS_A_TURN, TURNS};
 use super::published::TABLE_1;
 
 /// Width of a histogram's bin, mm/pulse: about the published σ over two.
@@ -35,15 +36,18 @@ impl Reproduction {
     }
 
     fn draw_4(&self) -> Figure {
-        let metres = |points: &[[f64; 2]]| points.iter().map(|[x, y]| (1e3 * x, 1e3 * y)).collect::<Vec<_>>();
+        // One turn: the others lie upon it, and would fill the gaps of its dashes.
+        let one_turn = |points: &[[f64; 2]]| {
+            points.iter().take(STEPS_A_TURN as usize + 1).map(|[x, y]| (1e3 * x, 1e3 * y)).collect::<Vec<_>>()
+        };
         let panel = Panel::new("", Axis::new("x", "mm"), Axis::new("y", "mm"))
             .equal_aspect()
-            .series(Series::line("left contact", metres(&self.figure_4.left_m)))
-            .series(Series::line("right contact", metres(&self.figure_4.right_m)))
-            .series(Series::line("centre", metres(&self.figure_4.centre_m)));
-        Figure::new("Figure 4: three turns on unequal wheels")
+            .series(Series::line("left contact", one_turn(&self.figure_4.left_m)))
+            .series(Series::line("right contact", one_turn(&self.figure_4.right_m)))
+            .series(Series::line("centre", one_turn(&self.figure_4.centre_m)));
+        Figure::new("Figure 4: on unequal wheels each contact keeps its own circle, turn after turn")
             .caption(&format!(
-                "The right wheel is drawn {:.0} % larger than the left one. Each contact keeps one locus turn after turn; the centre goes round.",
+                "The right wheel is drawn {:.0} % larger than the left one. All {TURNS} turns lie upon the one that is drawn; the centre goes round on a circle of its own.",
                 100.0 * (self.figure_4.right_over_left - 1.0)
             ))
             .panel(panel)

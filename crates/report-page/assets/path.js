@@ -109,7 +109,7 @@ function pathPicture(figure, data) {
         if (axis === 0) { pen.moveTo(x, 0); pen.lineTo(x, height); } else { pen.moveTo(0, y); pen.lineTo(width, y); }
         pen.stroke();
         pen.fillStyle = colour("quiet");
-        const text = (k * step).toFixed(digits) + " m";
+        const text = (k * step).toFixed(digits).replace("-", "\u2212") + " m";
         if (axis === 0) pen.fillText(text, x + 4, height - 6); else pen.fillText(text, 6, y - 4);
       }
     }

@@ -1,12 +1,18 @@
 /* Charts, copying, and what print and dark mode need. Without this script every number is in a table. */
 "use strict";
 
+/** A number with minus signs, not hyphens. */
+function signed(number) {
+  return String(number).replaceAll("-", "\u2212");
+}
+
 /** A chart: points with bars of 95 %, or a line with its band; a series each on and off. */
 function chartPicture(figure, data) {
   const plot = figure.querySelector(".plot");
   const readout = element("p", { className: "readout" });
   readout.setAttribute("aria-hidden", "true");
-  const short = (value) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(3))));
+  const short = (value) => (value === null || value === undefined ? "–" : signed(Number(value.toPrecision(3))));
+  const labels = (u, places) => places.map((place) => (place === null ? "" : signed(Number(place.toPrecision(6)))));
   let chart = null;
 
   const shape = (pen, role, x, y, size) => {
@@ -97,8 +103,8 @@ function chartPicture(figure, data) {
       padding: data.names ? [8, 64, 0, 0] : [8, 12, 0, 0],
       cursor: { points: { show: false }, y: false, drag: { x: true, y: false } },
       axes: [
-        { ...axis, label: data.x, ...(data.names ? { values: names, rotate: -50, size: 74, space: 22 } : {}) },
-        { ...axis, label: data.y, size: 58 },
+        { ...axis, label: data.x, values: labels, ...(data.names ? { values: names, incrs: [1, 2, 5, 10, 20, 50, 100], rotate: -50, size: 74, space: 22 } : {}) },
+        { ...axis, label: data.y, values: labels, size: 58 },
       ],
       series: [{}, ...data.series.map((series, n) => ({ label: series.name, show: !hidden[n], paths: () => null, points: { show: false } }))],
       hooks: { drawSeries: [drawSeries], setCursor: [say] },

@@ -1,4 +1,4 @@
-//! Numbers for the tables beside pictures.
+//! Numbers for the tables beside pictures, and the signs of all numbers that are read.
 
 /// Significant digits: a picture of a thousand pixels shows no more.
 const DIGITS: i32 = 4;
@@ -17,9 +17,49 @@ pub(crate) fn shown(value: f64) -> String {
     }
 }
 
+/// Hyphens before numbers, and in their exponents, as minus signs. Hyphens in names, dates and words stay.
+pub(crate) fn typeset(text: &str) -> String {
+    let characters: Vec<char> = text.chars().collect();
+    let is_digit = |at: usize| characters.get(at).is_some_and(char::is_ascii_digit);
+    let is_number = |c: &char| c.is_ascii_digit() || *c == '.';
+    // Before the sign: nothing that a name or a date would have.
+    let begins = |at: usize| {
+        at.checked_sub(1).is_none_or(|before| {
+            let before = characters[before];
+            before.is_whitespace() || "(±→[,:=<>≤≥|".contains(before)
+        })
+    };
+    let is_exponent = |at: usize| {
+        let Some(e) = at.checked_sub(1).filter(|before| characters[*before] == 'e') else { return false };
+        let mantissa = characters[..e].iter().rev().take_while(|c| is_number(c)).count();
+        let start = e - mantissa;
+        mantissa > 0 && (begins(start) || characters[start - 1] == '-' && begins(start - 1))
+    };
+    let sign = |at: usize| {
+        let before_number = is_digit(at + 1) || characters.get(at + 1) == Some(&'.') && is_digit(at + 2);
+        characters[at] == '-' && before_number && (begins(at) || is_exponent(at))
+    };
+    (0..characters.len()).map(|at| if sign(at) { '−' } else { characters[at] }).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn minus_signs_stand_before_numbers_and_hyphens_stay_in_names() {
+        let cases = [
+            ("-6.5 % to +8 %", "−6.5 % to +8 %"),
+            ("-1.2e-6 ± 3e-7 (-.5)", "−1.2e−6 ± 3e−7 (−.5)"),
+            ("run-01 of 2020-06-12, x-1e-3, --room, a1e-5", "run-01 of 2020-06-12, x-1e-3, --room, a1e-5"),
+            ("clock - 3 s, 95 %-interval, 13-8", "clock - 3 s, 95 %-interval, 13-8"),
+            ("z = -4.0; <-1", "z = −4.0; <−1"),
+            ("", ""),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(typeset(text), expected);
+        }
+    }
 
     #[test]
     fn numbers_have_four_digits_on_both_sides_of_an_exponent() {

@@ -129,6 +129,8 @@ pub enum Block {
     Charts(Vec<Chart>),
     /// Manoeuvres.
     Sketches(Vec<Sketch>),
+    /// What opens when its label is chosen.
+    Folded(String, Vec<Block>),
     /// A picture that is there already: a text for who does not see it, and the whole SVG file.
     Svg(String, String),
 }

@@ -42,6 +42,7 @@ pub struct Axis {
     pub(crate) range: Range,
     pub(crate) scale: Scale,
     pub(crate) included: Vec<f64>,
+    pub(crate) names: Vec<String>,
 }
 
 impl Axis {
@@ -55,8 +56,16 @@ impl Axis {
         Self::labelled(quantity.to_owned())
     }
 
+    /// A horizontal axis whose places 1, 2, … bear names: every one stands below its place, on as many lines
+    /// as it needs.
+    pub fn named(quantity: &str, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<String> = names.into_iter().collect();
+        let high = names.len().max(1) as f64 + 0.5;
+        Self { names, range: Range::Fixed { low: 0.5, high }, ..Self::labelled(quantity.to_owned()) }
+    }
+
     fn labelled(label: String) -> Self {
-        Self { label, range: Range::Auto, scale: Scale::Linear, included: Vec::new() }
+        Self { label, range: Range::Auto, scale: Scale::Linear, included: Vec::new(), names: Vec::new() }
     }
 
     /// What part is shown.

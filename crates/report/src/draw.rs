@@ -129,7 +129,10 @@ fn axes(panel: &Panel, layout: &PanelLayout, font: &Font) -> Group {
         let length = if tick.label.is_some() { TICK_LENGTH_PX } else { TICK_LENGTH_PX / 2.0 };
         if let Some(label) = &tick.label {
             group = group.add(line(x, top, x, bottom, GRID));
-            group = group.add(text(label, x, bottom + TICK_GAP_PX + TICK_PX / 2.0, TICK_PX, "middle"));
+            for (row, label) in label.lines().enumerate() {
+                let y = bottom + TICK_GAP_PX + TICK_PX / 2.0 + row as f64 * TICK_PX * LINE;
+                group = group.add(text(label, x, y, TICK_PX, "middle"));
+            }
         }
         group = group.add(line(x, bottom, x, bottom + length, INK));
     }
@@ -142,7 +145,7 @@ fn axes(panel: &Panel, layout: &PanelLayout, font: &Font) -> Group {
         group = group.add(line(left - length, y, left, y, INK));
     }
     let x_px = font.fitting_px(&panel.x.label, LABEL_PX, Weight::Regular, layout.cell.1);
-    let x_y = bottom + TICK_GAP_PX + TICK_PX + 8.0 + LABEL_PX / 2.0;
+    let x_y = bottom + TICK_GAP_PX + layout.tick_lines_px() + 8.0 + LABEL_PX / 2.0;
     let half = font.width_px(&panel.x.label, x_px, Weight::Regular) / 2.0;
     // In the middle of the frame, unless it is so long that it would leave the column.
     let x_x = (left + w / 2.0).min(layout.cell.0 + layout.cell.1 - half).max(layout.cell.0 + half);

@@ -22,6 +22,8 @@ pub(crate) const TICK_LENGTH_PX: f64 = 5.0;
 /// From the frame to the tick labels.
 pub(crate) const TICK_GAP_PX: f64 = 8.0;
 
+/// Between the names of two places on an axis.
+const NAME_GAP_PX: f64 = 10.0;
 const MARGIN_PX: f64 = 16.0;
 const COLUMN_GAP_PX: f64 = 22.0;
 const ROW_GAP_PX: f64 = 20.0;
@@ -130,10 +132,11 @@ fn margins(figure: &Figure, font: &Font, columns: usize, room: f64) -> Vec<(f64,
             let (left, right) = &mut margins[number % columns];
             let frame = frame(panel, frame_w);
             let widest = |ticks: Vec<Tick>| {
-                ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|l| width(l, TICK_PX)).fold(0.0, f64::max)
+                let lines = ticks.iter().filter_map(|tick| tick.label.as_deref()).flat_map(str::lines);
+                lines.map(|line| width(line, TICK_PX)).fold(0.0, f64::max)
             };
             *left = left.max(widest(frame.y_ticks()) + TICK_GAP_PX + 6.0 + LABEL_PX * LINE);
-            *right = right.max(widest(frame.x_ticks(font)) / 2.0 + 2.0);
+            *right = right.max(widest(x_ticks(panel, &frame, font)) / 2.0 + 2.0);
             for series in panel.series.iter().filter(|series| matches!(series.marks, Marks::HorizontalLine { .. })) {
                 for line in font.wrap(&series.name, REFERENCE_PX, Weight::Regular, REFERENCE_WRAP_PX) {
                     *right = right.max(width(&line, REFERENCE_PX) + 8.0);
@@ -191,7 +194,7 @@ impl PanelLayout {
             title,
             title_x: cell.0 + left,
             title_y: 0.0,
-            x_ticks: frame.x_ticks(font),
+            x_ticks: x_ticks(panel, &frame, font),
             y_ticks,
             y_label_gap: widest + TICK_GAP_PX + 6.0 + LABEL_PX * LINE / 2.0,
             frame,
@@ -207,7 +210,14 @@ impl PanelLayout {
     }
 
     fn height_of_axis(&self) -> f64 {
-        TICK_GAP_PX + TICK_PX + 8.0 + LABEL_PX * LINE
+        TICK_GAP_PX + self.tick_lines_px() + 8.0 + LABEL_PX * LINE
+    }
+
+    /// What the labels below the frame take: numbers one line, names as many as the longest.
+    pub(crate) fn tick_lines_px(&self) -> f64 {
+        let labels = self.x_ticks.iter().filter_map(|tick| tick.label.as_deref());
+        let lines = labels.map(|label| label.lines().count()).max().unwrap_or(1);
+        TICK_PX * (1.0 + (lines.max(1) - 1) as f64 * LINE)
     }
 
     fn height_below(&self) -> f64 {
@@ -225,6 +235,28 @@ impl PanelLayout {
             *y += by;
         }
     }
+}
+
+/// Ticks along: round numbers, or the names of the places, broken where they are wider than their place.
+fn x_ticks(panel: &Panel, frame: &Frame, font: &Font) -> Vec<Tick> {
+    if panel.x.names.is_empty() {
+        return frame.x_ticks(font);
+    }
+    let room = frame.rect.w / panel.x.names.len() as f64 - NAME_GAP_PX;
+    let label = |name: &String| {
+        let mut lines = vec![String::new()];
+        for part in name.split_inclusive(['_', ' ']) {
+            let last = lines.len() - 1;
+            let with = format!("{}{part}", lines[last]);
+            if lines[last].is_empty() || font.width_px(&with, TICK_PX, Weight::Regular) <= room {
+                lines[last] = with;
+            } else {
+                lines.push(part.to_owned());
+            }
+        }
+        lines.join("\n")
+    };
+    (1..).map(f64::from).zip(&panel.x.names).map(|(value, name)| Tick { value, label: Some(label(name)) }).collect()
 }
 
 /// Names of horizontal references, right of the frame, pushed apart where lines are close.

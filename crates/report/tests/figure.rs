@@ -267,3 +267,30 @@ fn files_are_written_whole_and_readable() {
     let blocked = everything().write(&svg, "below-a-file");
     assert!(matches!(blocked, Err(ReportError::Write { .. })), "{blocked:?}");
 }
+
+/// Every place bears its name, however long: a name that is wider than its place goes on below.
+#[test]
+fn places_of_a_named_axis_bear_their_names() {
+    let names = ["carpet_nap", "contact_patch_wheelbase_of_a_wide_robot", "slip_speed", "wear", "backlash", "bumps"];
+    let points = (1..).map(f64::from).zip([0.0, 2.0, 1.0, 3.0, 1.0, 2.0]).collect();
+    let panel = Panel::new("", Axis::named("if the cause is", names.map(str::to_owned)), Axis::new("error", "mm"))
+        .series(Series::new("prediction", Marks::Points { points, y_error: None }));
+    let svg = Figure::new("Predictions").panel(panel).to_svg().expect("drawable");
+    let document = Document::parse(&svg).expect("XML");
+    let texts: Vec<(String, f64, f64)> = document
+        .descendants()
+        .filter(|node| node.has_tag_name("text"))
+        .map(|node| (node.text().unwrap_or_default().trim().to_owned(), attribute(&node, "x"), attribute(&node, "y")))
+        .collect();
+    let place = |text: &str| texts.iter().find(|(of, ..)| of == text).unwrap_or_else(|| panic!("{text}: {texts:?}"));
+    let (first, last) = (place("carpet_nap"), place("bumps"));
+    assert!(first.1 < last.1 && first.2 == last.2);
+    // The long name is in pieces, one below the other, in the column of its place.
+    let pieces: Vec<&(String, f64, f64)> =
+        texts.iter().filter(|(text, x, _)| *x == place("wide_robot").1 && names[1].contains(&text[..])).collect();
+    let whole: String = pieces.iter().map(|(text, ..)| text.as_str()).collect();
+    assert_eq!(whole, names[1]);
+    assert!(pieces.len() > 1 && pieces.windows(2).all(|pair| pair[0].2 < pair[1].2), "{pieces:?}");
+    // The axis' own name is below all of them.
+    assert!(place("if the cause is").2 > pieces[pieces.len() - 1].2 + 10.0);
+}

@@ -1,6 +1,7 @@
 //! Which topics are the wheels and the poses of an outside instrument, where nobody says.
 
 use crate::error::RosBagError;
+use crate::gyro;
 use crate::topics::{Survey, TRANSFORMS, Topic};
 use crate::truth::TRUTH_TYPES;
 use crate::wheels::{WHEEL_TYPES, WheelQuantity, has_joints, wheel_joints};
@@ -59,6 +60,12 @@ pub(crate) fn truth_rank(topic: &Topic) -> Rank {
     (!is_own).then_some(1)
 }
 
+/// Rates of a gyroscope on the robot; those after their driver's bias was taken out come before raw ones.
+pub(crate) fn gyro_rank(topic: &Topic) -> Rank {
+    let is_gyro = topic.count > 1 && topic.type_name == gyro::IMU && !contains(topic, &INSTRUMENTS);
+    is_gyro.then(|| u8::from(contains(topic, &["raw"])))
+}
+
 /// Are these poses, which the user named, likely the robot's own odometry, or what was fused from it?
 pub(crate) fn is_own_estimate(topic: &Topic, frames: Option<&(String, String)>) -> bool {
     if topic.type_name == TRANSFORMS {
@@ -103,6 +110,20 @@ pub(crate) fn wheels<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'
         "no topic has wheels of a known type; any other is read with --left-field PATH --right-field PATH --as ticks, rad, radps, mps or twist"
             .to_owned()
     })
+}
+
+/// The topic of the gyroscope, if there is one, and what is to be known of it otherwise.
+pub(crate) fn gyro(survey: &Survey) -> (Option<&Topic>, Option<String>) {
+    match best(survey, gyro_rank)[..] {
+        [topic] => (Some(topic), None),
+        [] => (None, None),
+        ref several => {
+            let named: Vec<String> = several.iter().map(|topic| format!("--gyro {}", topic.name)).collect();
+            let why =
+                format!("{} topics may be the gyroscope; none was taken; say {}", several.len(), named.join(" or "));
+            (None, Some(why))
+        }
+    }
 }
 
 /// The topic of the poses.

@@ -6,17 +6,19 @@ use std::path::{Path, PathBuf};
 
 use dataset::import::csv::{Rates, RobotGiven};
 use dataset::{
-    Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
-    moving_pieces, wrap_warnings,
+    Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma,
+    WheelLog, moving_pieces, wrap_warnings,
 };
 use kinematics::{DriveGeometry, Wheels};
 use serde::Serialize;
 
 use crate::bag::Bag;
 use crate::choice;
-use crate::clock::{self, Clock, Ordered, seconds};
+use crate::clock::{self, Clock, Times, seconds};
 use crate::error::RosBagError;
-use crate::rows::{self, BothRows, Rows, WheelRows, WheelSource};
+use crate::gyro::IMU;
+use crate::gyro_column::GyroColumn;
+use crate::rows::{self, BothRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
 use crate::topics::{Survey, Topic};
 use crate::truth::{TruthReader, TruthReading};
 use crate::wheel_pair::{Resampling, WheelPair};
@@ -32,8 +34,6 @@ const WRAPPED_MARGIN_RAD: f64 = 1e-3;
 /// Poses that all have the same heading are of an instrument of positions if they reach so far in both
 /// directions, metres: a robot that drives on a straight alone does so in one of its own.
 const MIN_REACH_M: f64 = 0.3;
-/// Received this much before or after a run's wheels, a pose may still be of the run, seconds.
-const RECEIPT_MARGIN_S: f64 = 1.0;
 /// Speeds say nothing of the motion in a gap; this long it is metres, seconds.
 const MAX_GAP_OF_RATES_S: f64 = 1.0;
 
@@ -44,6 +44,8 @@ pub struct Options {
     pub wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     pub truth: Option<String>,
+    /// Topic of a gyroscope's rates; where none is said, the only one of the bag.
+    pub gyro: Option<String>,
     /// Which joints or fields are the wheels.
     pub fields: WheelFields,
     /// Parent and child frame of the poses, in a topic of transforms.
@@ -69,7 +71,8 @@ pub struct TookTopic {
     pub type_name: String,
     /// Which joints, fields or frames.
     pub what: String,
-    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument.
+    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument, `radps` of a
+    /// gyroscope.
     pub quantity: &'static str,
     /// Rows that were taken.
     pub rows: usize,
@@ -84,6 +87,8 @@ pub struct Took {
     pub wheels: TookTopic,
     /// The poses.
     pub truth: TookTopic,
+    /// The gyroscope, where there is one.
+    pub gyro: Option<TookTopic>,
 }
 
 /// A dataset from a bag.
@@ -115,6 +120,10 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         Some(topic) => survey.named("--truth", topic)?,
         None => choice::truth(&survey, path)?,
     };
+    let (gyro, gyro_open) = match &options.gyro {
+        Some(topic) => (Some(named_gyro(&survey, topic)?), None),
+        None => choice::gyro(&survey),
+    };
     if wheels.has(&truth.name) {
         let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
         let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
@@ -134,7 +143,8 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         }
     };
     let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
-    let both = rows::read(&bag, &source, (&truth.name, &truth_reader))?;
+    let others = Others { truth: (&truth.name, &truth_reader), gyro: gyro.map(|topic| &topic.name[..]) };
+    let both = rows::read(&bag, &source, others)?;
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
     let is_counted = both.quantity == WheelQuantity::Ticks;
@@ -153,8 +163,10 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         ));
     }
     let clocks = clocks(&both, &mut warnings)?;
-    let took = took(&both, [wheels_what, truth_reader.describe()], clocks);
-    let dataset = assemble(&both, clocks, (robot, geometry), path, options, &mut warnings)?;
+    warnings.extend(gyro_open);
+    let gyro = gyro_column(&both, clocks[0], options, &mut warnings)?;
+    let took = took(&both, [wheels_what, truth_reader.describe()], clocks, gyro.is_some());
+    let dataset = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
 }
@@ -174,7 +186,45 @@ impl WheelTopics<'_> {
     }
 }
 
-fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2]) -> Took {
+/// The topic that `--gyro` names.
+fn named_gyro<'a>(survey: &'a Survey, topic: &str) -> Result<&'a Topic, RosBagError> {
+    let topic = survey.named("--gyro", topic)?;
+    if topic.type_name == IMU {
+        return Ok(topic);
+    }
+    let why = format!("no type of a gyroscope; expected {IMU}");
+    Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why })
+}
+
+/// The rates of the gyroscope. One that nobody named and that cannot be used is left out with a warning.
+fn gyro_column(
+    both: &BothRows,
+    clock: Clock,
+    options: &Options,
+    warnings: &mut Vec<String>,
+) -> Result<Option<GyroColumn>, RosBagError> {
+    let Some(rows) = &both.gyro else { return Ok(None) };
+    let span_ns = ends(&both.wheels.times, clock);
+    match GyroColumn::new(rows, clock, span_ns, options.cut_s.is_some(), warnings) {
+        Ok(column) => Ok(Some(column)),
+        Err(why) if options.gyro.is_none() => {
+            warnings.push(format!("{why}; the gyroscope was left out"));
+            Ok(None)
+        }
+        Err(why) => Err(why),
+    }
+}
+
+/// The first and the last time of a topic.
+fn ends(times: &[Times], clock: Clock) -> (i64, i64) {
+    let times = times.iter().filter_map(|times| match clock {
+        Clock::Stamps => times.stamp_ns,
+        Clock::Receipt => Some(times.received_ns),
+    });
+    times.clone().min().zip(times.max()).unwrap_or_default()
+}
+
+fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2], has_gyro: bool) -> Took {
     fn topic<T>(rows: &Rows<T>, what: String, quantity: &'static str, clock: Clock) -> TookTopic {
         TookTopic {
             topic: rows.topic.clone(),
@@ -188,6 +238,11 @@ fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock;
     Took {
         wheels: topic(&both.wheels, wheels_what, both.quantity.name(), clocks[0]),
         truth: topic(&both.truth, truth_what, "pose", clocks[1]),
+        gyro: both.gyro.as_ref().filter(|_| has_gyro).map(|gyro| {
+            let frame = if gyro.frame.is_empty() { "an unnamed frame" } else { &gyro.frame };
+            let what = format!("angular_velocity.z of {frame}, whose z is taken as up");
+            topic(&gyro.rows, what, "radps", clocks[0])
+        }),
     }
 }
 
@@ -203,13 +258,7 @@ fn clocks(both: &BothRows, warnings: &mut Vec<String>) -> Result<[Clock; 2], Ros
             ));
         }
     }
-    let ends = |index: usize, clock: Clock| {
-        let times = all[index].iter().filter_map(|times| match clock {
-            Clock::Stamps => times.stamp_ns,
-            Clock::Receipt => Some(times.received_ns),
-        });
-        times.clone().min().zip(times.max()).unwrap_or_default()
-    };
+    let ends = |index: usize, clock: Clock| ends(all[index], clock);
     let meet = |clocks: [Clock; 2]| {
         let ((first, last), (from, to)) = (ends(0, clocks[0]), ends(1, clocks[1]));
         first <= to && from <= last
@@ -236,36 +285,18 @@ fn clocks(both: &BothRows, warnings: &mut Vec<String>) -> Result<[Clock; 2], Ros
     })
 }
 
-/// One topic's rows in the order of time, with what was left out said.
-fn in_order<T>(
-    rows: &Rows<T>,
-    clock: Clock,
-    may_restart: bool,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<(usize, i64)>, RosBagError> {
-    let Ordered { rows: ordered, duplicates, unstamped } =
-        clock::ordered(&rows.topic, &rows.times, clock, may_restart)?;
-    for (count, why) in
-        [(duplicates, "at the instant of another"), (unstamped, "without a header stamp, which others have,")]
-    {
-        if count > 0 {
-            warnings.push(format!("topic {}: {count} messages {why} were left out", rows.topic));
-        }
-    }
-    Ok(ordered)
-}
-
 fn assemble(
     both: &BothRows,
     clocks: [Clock; 2],
+    mut gyro: Option<GyroColumn>,
     (robot, geometry): (NominalRobot, DriveGeometry),
     path: &Path,
     options: &Options,
     warnings: &mut Vec<String>,
 ) -> Result<Dataset, RosBagError> {
     let may_restart = options.cut_s.is_some();
-    let wheel_rows = in_order(&both.wheels, clocks[0], may_restart, warnings)?;
-    let truth_rows = in_order(&both.truth, clocks[1], may_restart, warnings)?;
+    let wheel_rows = both.wheels.in_order(clocks[0], may_restart, warnings)?;
+    let truth_rows = both.truth.in_order(clocks[1], may_restart, warnings)?;
     let mut wheels: Vec<[f64; 2]> = wheel_rows.iter().map(|(row, _)| both.wheels.values[*row]).collect();
     if both.quantity == WheelQuantity::Ticks {
         refuse_fractions(&both.wheels, &wheels)?;
@@ -340,12 +371,16 @@ fn assemble(
         let id = format!("run-{:02}", runs.len() + 1);
         let start_s = is_cut.then(|| seconds(session, from_ns)).filter(|start_s| *start_s >= 0.0);
         let info = RunInfo { id, start_s, ..RunInfo::default() };
-        let odometry = Odometry { t_s, wheels: log, ..Odometry::default() };
+        let rows_ns: Vec<i64> = rows.iter().map(|(_, time_ns)| *time_ns).collect();
+        let rates = gyro.as_mut().and_then(|gyro| gyro.of_run(&rows_ns, (receipt(first), receipt(last))));
+        let extra = rates.map(|rates| (ExtraChannel::GyroYawRate, rates)).into_iter().collect();
+        let odometry = Odometry { t_s, wheels: log, extra };
         runs.push(Run { info, odometry, truth, truth_sigma, ..Run::default() });
     }
     if let Some(cut_s) = options.cut_s.filter(|_| runs.is_empty()) {
         return Err(RosBagError::NothingLeft { cut_s });
     }
+    warnings.extend(gyro.and_then(|gyro| gyro.gaps()));
     let outside = truth_rows.len() - seen.len();
     if outside > 0 {
         let what =
@@ -361,9 +396,16 @@ fn assemble(
             ));
         }
     }
+    let has_rates = runs.iter().any(|run| !run.odometry.extra.is_empty());
+    let rates =
+        both.gyro.as_ref().filter(|_| has_rates).map(|gyro| format!(", yaw rates of {} ({IMU})", gyro.rows.topic));
     let notes = format!(
-        "ROS 2 bag: wheels of {} ({}), poses of {} ({})",
-        both.wheels.topic, both.wheels.type_name, both.truth.topic, both.truth.type_name
+        "ROS 2 bag: wheels of {} ({}), poses of {} ({}){}",
+        both.wheels.topic,
+        both.wheels.type_name,
+        both.truth.topic,
+        both.truth.type_name,
+        rates.unwrap_or_default()
     );
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let provenance = Provenance { name, notes: Some(notes), ..Provenance::default() };

@@ -15,7 +15,7 @@ const MAX_BYTES: u64 = 1 << 20;
 const HEADER: &str = "std_msgs/Header header\n";
 
 /// Fields of usual types.
-const USUAL: [(&str, &[&str]); 32] = [
+const USUAL: [(&str, &[&str]); 33] = [
     ("builtin_interfaces/Time", &["int32 sec\nuint32 nanosec\n"]),
     ("std_msgs/Header", &["builtin_interfaces/Time stamp\nstring frame_id\n"]),
     ("std_msgs/Int16", &["int16 data\n"]),
@@ -52,6 +52,15 @@ const USUAL: [(&str, &[&str]); 32] = [
     ),
     ("nav_msgs/Path", &[HEADER, "geometry_msgs/PoseStamped[] poses\n"]),
     ("sensor_msgs/JointState", &[HEADER, "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"]),
+    (
+        "sensor_msgs/Imu",
+        &[
+            HEADER,
+            "geometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n",
+            "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n",
+            "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
+        ],
+    ),
     ("control_msgs/InterfaceValue", &["string[] interface_names\nfloat64[] values\n"]),
     (
         "control_msgs/DynamicJointState",

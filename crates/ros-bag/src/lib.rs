@@ -3,7 +3,8 @@
 //! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
 //! `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr` messages
 //! (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
-//! (`wheel_pair` where each has its topic) and `truth` → `clock` their times → `import` the dataset.
+//! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
+//! `import` the dataset.
 //! `listing` shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 
 mod bag;
@@ -14,6 +15,8 @@ mod clock;
 mod decompress;
 mod definition;
 mod error;
+mod gyro;
+mod gyro_column;
 mod import;
 mod known_types;
 mod listing;
@@ -34,7 +37,7 @@ pub use error::RosBagError;
 pub use import::{FromBag, Options, Took, TookTopic, import};
 pub use listing::{ListedTopic, Listing, list};
 pub use recorder::{
-    BODY_FRAME, FIRST_STAMP_S, RUN_GAP_S, RecordedPath, RecordedRun, RecordedTopic, RecordedWheels, Recorder,
-    TRUTH_FRAME, WORLD_FRAME,
+    BODY_FRAME, FIRST_STAMP_S, GYRO_FRAME, RUN_GAP_S, RecordedGyro, RecordedPath, RecordedRun, RecordedTopic,
+    RecordedWheels, Recorder, TRUTH_FRAME, WORLD_FRAME,
 };
 pub use wheels::{WheelFields, WheelQuantity};

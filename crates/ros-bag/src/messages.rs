@@ -15,6 +15,7 @@ pub(crate) const POSE_STAMPED: &str = "geometry_msgs/msg/PoseStamped";
 pub(crate) const ODOMETRY: &str = "nav_msgs/msg/Odometry";
 pub(crate) const PATH: &str = "nav_msgs/msg/Path";
 pub(crate) const TF_MESSAGE: &str = "tf2_msgs/msg/TFMessage";
+pub(crate) const IMU: &str = crate::gyro::IMU;
 pub(crate) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
 
 /// When and in which frame.
@@ -132,6 +133,24 @@ pub(crate) fn joint_state(
     })
 }
 
+/// A gyroscope's yaw rate; orientation and acceleration are said to be unknown, as REP 145 has it.
+/// `variance_rad2_s2` is that of the rate: 0 unknown, −1 not measured.
+pub(crate) fn imu(header: Header<'_>, yaw_rate_rad_s: f64, variance_rad2_s2: f64) -> Vec<u8> {
+    message(|writer| {
+        writer.header(header);
+        let covariance = |writer: &mut CdrWriter, first: f64| {
+            writer.float64(first);
+            [0.0; 8].into_iter().for_each(|value| writer.float64(value));
+        };
+        [0.0, 0.0, 0.0, 1.0].into_iter().for_each(|value| writer.float64(value));
+        covariance(writer, -1.0);
+        writer.xyz(0.0, 0.0, yaw_rate_rad_s);
+        covariance(writer, variance_rad2_s2);
+        writer.xyz(0.0, 0.0, 0.0);
+        covariance(writer, -1.0);
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,6 +195,10 @@ mod tests {
         assert_eq!(value.number("twist.twist.angular.z"), Some(-0.25));
         let unknown = read(ODOMETRY, &odometry(HEADER, "base", pose, None, twist));
         assert_eq!(unknown.number("pose.covariance[35]"), Some(0.0));
+
+        let reading = |variance| crate::gyro::read(&read(IMU, &imu(HEADER, -0.75, variance)));
+        assert_eq!(reading(0.0).expect("a rate").yaw_rate_rad_s, -0.75);
+        assert!(reading(-1.0).expect_err("none").contains("no rate"));
 
         let value = read(JOINT_STATE, &joint_state(HEADER, Some(Wheels { left: 3.0, right: 4.0 }), None));
         assert_eq!((value.text("name[1]"), value.number("position[1]")), (Some(JOINTS.right), Some(4.0)));

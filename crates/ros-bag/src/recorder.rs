@@ -15,7 +15,7 @@ use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 
 use crate::known_types::KnownTypes;
-use crate::messages::{self, BodyTwist, Header, JOINT_STATE, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
+use crate::messages::{self, BodyTwist, Header, IMU, JOINT_STATE, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
 
 /// Stamp of the first row, seconds. A stamp of zero is none in ROS.
 pub const FIRST_STAMP_S: i64 = 1;
@@ -27,6 +27,8 @@ pub const RUN_GAP_S: i64 = 10;
 pub const WORLD_FRAME: &str = "map";
 /// The frame that the instrument saw.
 pub const TRUTH_FRAME: &str = "truth";
+/// The frame of the gyroscope; its z is up.
+pub const GYRO_FRAME: &str = "imu_link";
 /// Beginning of the frames that dead reckoning moves; the path's name follows.
 pub const BODY_FRAME: &str = "base_link_";
 
@@ -50,6 +52,15 @@ pub enum RecordedWheels {
     AngularSpeeds(Wheels<Vec<f64>>),
 }
 
+/// What a gyroscope measured, at instants of its own.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RecordedGyro {
+    /// Seconds from the run's start, and yaw rate of that instant, rad/s.
+    pub yaw_rates_rad_s: Vec<(f64, f64)>,
+    /// Variance of a rate, (rad/s)²; 0 says unknown, −1 that none was measured.
+    pub variance_rad2_s2: f64,
+}
+
 /// One run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedRun<'a> {
@@ -59,6 +70,8 @@ pub struct RecordedRun<'a> {
     pub rows_s: &'a [f64],
     /// The wheels, where their angles or angular speeds are known.
     pub wheels: Option<RecordedWheels>,
+    /// The gyroscope, where its rates of instants are known: a dataset has means over intervals.
+    pub gyro: Option<RecordedGyro>,
     /// Dead reckoning.
     pub paths: Vec<RecordedPath>,
 }
@@ -115,6 +128,7 @@ impl<W: Write + Seek> Recorder<W> {
         let mut waiting = Vec::new();
         self.push_truth(run.truth, stamp_ns, &mut waiting)?;
         self.push_wheels(run, stamp_ns, &mut waiting)?;
+        self.push_gyro(run, stamp_ns, &mut waiting)?;
         for path in &run.paths {
             self.push_path(path, stamp_ns, &mut waiting)?;
         }
@@ -208,6 +222,23 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(())
     }
 
+    fn push_gyro(
+        &mut self,
+        run: &RecordedRun<'_>,
+        stamp_ns: impl Fn(f64) -> i64,
+        waiting: &mut Vec<Waiting>,
+    ) -> Result<(), McapError> {
+        let Some(gyro) = &run.gyro else { return Ok(()) };
+        let channel = self.channel("/imu", IMU)?;
+        for (t_s, yaw_rate_rad_s) in &gyro.yaw_rates_rad_s {
+            let stamp_ns = stamp_ns(*t_s);
+            let header = Header { stamp_ns, frame: GYRO_FRAME };
+            let bytes = messages::imu(header, *yaw_rate_rad_s, gyro.variance_rad2_s2);
+            waiting.push(Waiting { stamp_ns, channel, bytes });
+        }
+        Ok(())
+    }
+
     fn push_path(
         &mut self,
         path: &RecordedPath,
@@ -296,6 +327,7 @@ mod tests {
             truth: &truth,
             rows_s: &rows_s,
             wheels: Some(RecordedWheels::Angles(wheels.clone())),
+            gyro: None,
             paths: vec![path],
         };
         let (topics, folder) = bag(&[run.clone(), run]);
@@ -339,6 +371,7 @@ mod tests {
             truth,
             rows_s: &rows_s,
             wheels: Some(RecordedWheels::AngularSpeeds(speeds.clone())),
+            gyro: None,
             paths: Vec::new(),
         };
         let (_, folder) = bag(&[run(&without)]);

@@ -2,15 +2,19 @@
 
 use crate::bag::Bag;
 use crate::cdr;
-use crate::clock::Times;
+use crate::clock::{self, Clock, Ordered, Times};
 use crate::definition::Definitions;
 use crate::error::RosBagError;
+use crate::gyro::{self, GyroReading};
 use crate::mcap_file::Channel;
 use crate::topics::definitions;
 use crate::truth::{TruthReader, TruthReading};
 use crate::value::Value;
 use crate::wheel_pair::{self, Resampling, WheelPair};
 use crate::wheels::{WheelQuantity, WheelReader};
+
+/// Received this much before or after a run's wheels, a message may still be of the run, seconds.
+pub(crate) const RECEIPT_MARGIN_S: f64 = 1.0;
 
 /// Rows of one topic.
 #[derive(Debug)]
@@ -72,7 +76,7 @@ impl<T> Rows<T> {
     }
 
     /// Refuses a topic of which nothing could be read.
-    fn refuse_none(&self, what: &str) -> Result<(), RosBagError> {
+    pub(crate) fn refuse_none(&self, what: &str) -> Result<(), RosBagError> {
         if self.values.len() >= 2 {
             return Ok(());
         }
@@ -81,6 +85,24 @@ impl<T> Rows<T> {
         }
         let why = format!("{} of {} messages have {what}; two are needed at least", self.values.len(), self.messages);
         Err(RosBagError::Unusable { topic: self.topic.clone(), type_name: self.type_name.clone(), why })
+    }
+
+    /// Rows in the order of time, with what was left out said.
+    pub(crate) fn in_order(
+        &self,
+        clock: Clock,
+        may_restart: bool,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<(usize, i64)>, RosBagError> {
+        let Ordered { rows, duplicates, unstamped } = clock::ordered(&self.topic, &self.times, clock, may_restart)?;
+        for (count, why) in
+            [(duplicates, "at the instant of another"), (unstamped, "without a header stamp, which others have,")]
+        {
+            if count > 0 {
+                warnings.push(format!("topic {}: {count} messages {why} were left out", self.topic));
+            }
+        }
+        Ok(rows)
     }
 
     /// What was left out, one line a reason.
@@ -108,7 +130,22 @@ pub(crate) struct BothRows {
     pub(crate) wheels: WheelRows,
     pub(crate) quantity: WheelQuantity,
     pub(crate) truth: Rows<TruthReading>,
+    pub(crate) gyro: Option<GyroRows>,
     pub(crate) losses: Vec<String>,
+}
+
+/// Rows of the gyroscope.
+pub(crate) struct GyroRows {
+    pub(crate) rows: Rows<GyroReading>,
+    /// The frame of its axes, as its first message says.
+    pub(crate) frame: String,
+}
+
+/// The topics beside the wheels.
+#[derive(Clone, Copy)]
+pub(crate) struct Others<'a> {
+    pub(crate) truth: (&'a str, &'a TruthReader),
+    pub(crate) gyro: Option<&'a str>,
 }
 
 /// Where the wheels are.
@@ -119,26 +156,22 @@ pub(crate) enum WheelSource {
     Two(WheelPair, Resampling),
 }
 
-/// Reads wheels and poses.
-pub(crate) fn read(
-    bag: &Bag,
-    wheels: &WheelSource,
-    (truth_topic, truth_reader): (&str, &TruthReader),
-) -> Result<BothRows, RosBagError> {
+/// Reads wheels, poses and, where it is asked for, the gyroscope.
+pub(crate) fn read(bag: &Bag, wheels: &WheelSource, others: Others<'_>) -> Result<BothRows, RosBagError> {
     match wheels {
-        WheelSource::One(topic, reader) => read_one(bag, (topic, reader), (truth_topic, truth_reader)),
-        WheelSource::Two(pair, resampling) => read_two(bag, pair, *resampling, (truth_topic, truth_reader)),
+        WheelSource::One(topic, reader) => read_one(bag, (topic, reader), others),
+        WheelSource::Two(pair, resampling) => read_two(bag, pair, *resampling, others),
     }
 }
 
 fn read_one(
     bag: &Bag,
     (wheel_topic, wheel_reader): (&str, &WheelReader),
-    truth: (&str, &TruthReader),
+    others: Others<'_>,
 ) -> Result<BothRows, RosBagError> {
     let mut wheels: WheelRows = Rows::new(wheel_topic, "");
     let mut quantity = None;
-    let (truth, losses) = visit(bag, truth, |channel, received_ns, message| {
+    let Visited { truth, gyro, losses } = visit(bag, others, |channel, received_ns, message| {
         if channel.topic == wheel_topic {
             wheels.type_name.clone_from(&channel.type_name);
             if let Some(value) = wheels.decode(channel, message)? {
@@ -157,18 +190,13 @@ fn read_one(
     wheels.refuse_none("both wheels")?;
     truth.refuse_none("a pose")?;
     let quantity = quantity.unwrap_or(WheelQuantity::Angles);
-    Ok(BothRows { wheels, quantity, truth, losses })
+    Ok(BothRows { wheels, quantity, truth, gyro, losses })
 }
 
-fn read_two(
-    bag: &Bag,
-    pair: &WheelPair,
-    resampling: Resampling,
-    truth: (&str, &TruthReader),
-) -> Result<BothRows, RosBagError> {
+fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<'_>) -> Result<BothRows, RosBagError> {
     let sides = [&pair.left, &pair.right];
     let mut rows: [Rows<f64>; 2] = sides.map(|side| Rows::new(&side.topic, &side.type_name));
-    let (truth, mut losses) = visit(bag, truth, |channel, received_ns, message| {
+    let Visited { truth, gyro, mut losses } = visit(bag, others, |channel, received_ns, message| {
         for (side, rows) in sides.iter().zip(&mut rows) {
             if channel.topic != side.topic {
                 continue;
@@ -203,18 +231,41 @@ fn read_two(
     }
     let mut wheels: WheelRows = Rows::new(&pair.topics(), &left.type_name);
     (wheels.times, wheels.values) = (paired.times, paired.values);
-    Ok(BothRows { wheels, quantity: pair.quantity, truth, losses })
+    Ok(BothRows { wheels, quantity: pair.quantity, truth, gyro, losses })
 }
 
-/// One pass over the bag: the poses, every message to `wheels` too, and what was lost.
+/// What is beside the wheels, and what was lost.
+struct Visited {
+    truth: Rows<TruthReading>,
+    gyro: Option<GyroRows>,
+    losses: Vec<String>,
+}
+
+/// One pass over the bag: poses and gyroscope, and every message to `wheels` too.
 fn visit(
     bag: &Bag,
-    (truth_topic, truth_reader): (&str, &TruthReader),
+    Others { truth: (truth_topic, truth_reader), gyro }: Others<'_>,
     mut wheels: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
-) -> Result<(Rows<TruthReading>, Vec<String>), RosBagError> {
+) -> Result<Visited, RosBagError> {
+    let mut gyro = gyro.map(|topic| GyroRows { rows: Rows::new(topic, ""), frame: String::new() });
     let mut truth: Rows<TruthReading> = Rows::new(truth_topic, "");
     let losses = bag.visit(|channel, received_ns, message| {
         wheels(channel, received_ns, message)?;
+        if let Some(GyroRows { rows, frame }) = gyro.as_mut().filter(|gyro| gyro.rows.topic == channel.topic) {
+            rows.type_name.clone_from(&channel.type_name);
+            if let Some(value) = rows.decode(channel, message)? {
+                if rows.messages == 1 {
+                    value.text("header.frame_id").unwrap_or_default().clone_into(frame);
+                }
+                match gyro::read(&value) {
+                    Ok(reading) => {
+                        let is_finite = reading.yaw_rate_rad_s.is_finite();
+                        rows.push(Times::of(&value, received_ns), reading, is_finite);
+                    }
+                    Err(why) => rows.note_fault(why),
+                }
+            }
+        }
         if channel.topic == truth_topic {
             truth.type_name.clone_from(&channel.type_name);
             if let Some(value) = truth.decode(channel, message)? {
@@ -231,5 +282,5 @@ fn visit(
         }
         Ok(())
     })?;
-    Ok((truth, losses.lines()))
+    Ok(Visited { truth, gyro, losses: losses.lines() })
 }

@@ -1,9 +1,9 @@
-//! One page a sweep: bias, spread, efficiency and coverage of every method against each axis.
+//! One page a sweep: bias, spread, RMSE, efficiency and coverage of every method against each axis.
 //!
 //! Against an axis of a grid the other axes stand at the middle of their levels, and the caption says where;
 //! of a sampled design every point is drawn.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use report::{Axis, Figure, Marks, Panel, Range, Scale, Series};
 use scenario::Level;
@@ -25,15 +25,16 @@ struct Quantity {
     number: Number,
     /// Where it would be without fault, and what that is called.
     ideal: Option<(f64, &'static str)>,
-    /// A share from 0 to 1.
+    /// A share, drawn from 0 to 100 %.
     share: bool,
 }
 
-const QUANTITIES: [Quantity; 4] = [
+const QUANTITIES: [Quantity; 5] = [
     Quantity { name: "bias", unit: "%", number: bias, ideal: Some((0.0, "no bias")), share: false },
     Quantity { name: "standard deviation", unit: "%", number: std, ideal: None, share: false },
+    Quantity { name: "RMSE", unit: "%", number: rmse, ideal: None, share: false },
     Quantity { name: "RMSE² / bound", unit: "", number: ratio, ideal: Some((1.0, "bound")), share: false },
-    Quantity { name: "coverage", unit: "", number: coverage, ideal: Some((0.95, "95 %")), share: true },
+    Quantity { name: "coverage", unit: "%", number: coverage, ideal: Some((95.0, "95 %")), share: true },
 ];
 
 /// What a method's calibration is worth and what it costs, where the scenario states a validation path.
@@ -57,13 +58,18 @@ fn std(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)>
     Some(percent(estimator.std()?, estimator.truth))
 }
 
+fn rmse(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
+    let estimator = estimator(point, method, parameter)?;
+    Some(percent(estimator.rmse.zip(estimator.rmse_mcse)?, estimator.truth))
+}
+
 fn ratio(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
     let estimator = estimator(point, method, parameter)?;
     estimator.cramer_rao_ratio.zip(estimator.cramer_rao_ratio_mcse)
 }
 
 fn coverage(point: &PointResult, method: &str, parameter: &str) -> Option<(f64, f64)> {
-    estimator(point, method, parameter)?.coverage_95.map(|coverage| (coverage.share, coverage.mcse))
+    estimator(point, method, parameter)?.coverage_95.map(|of| (100.0 * of.share, 100.0 * of.mcse))
 }
 
 fn drift(point: &PointResult, method: &str, _: &str) -> Option<(f64, f64)> {
@@ -115,7 +121,7 @@ pub(super) fn page(result: &SweepResult) -> Option<Figure> {
         return None;
     }
     let figure =
-        Figure::new(&format!("Calibration accuracy: {}", result.scenario)).caption(&caption).columns(TRACKED.len());
+        Figure::new(&format!("{}: {}", result.scenario, finding(result))).caption(&caption).columns(TRACKED.len());
     Some(panels.into_iter().fold(figure, Figure::panel))
 }
 
@@ -182,10 +188,6 @@ impl DesignAxis {
 
     fn caption(&self, result: &SweepResult) -> String {
         let mut text = String::new();
-        if self.is_of_cases() {
-            let names = self.levels.iter().enumerate().map(|(place, level)| format!("{} = {level}", place + 1));
-            text.push_str(&format!(" {}: {}.", self.key, names.collect::<Vec<_>>().join(", ")));
-        }
         let rest: Vec<String> = self.others.iter().map(|(key, level)| format!("{key} = {level}")).collect();
         if !rest.is_empty() && self.points.len() < result.points.len() {
             text.push_str(&format!(" Against {}: {}.", self.key, rest.join(", ")));
@@ -214,7 +216,7 @@ impl DesignAxis {
         let name = if log && signed { format!("|{}|", quantity.name) } else { quantity.name.to_owned() };
         let mut y = if quantity.unit.is_empty() { Axis::dimensionless(&name) } else { Axis::new(&name, quantity.unit) };
         if quantity.share {
-            y = y.range(Range::Fixed { low: 0.0, high: 1.05 });
+            y = y.range(Range::Fixed { low: 0.0, high: 105.0 });
         } else if log {
             y = y.scale(Scale::Log);
         } else {
@@ -247,7 +249,11 @@ impl DesignAxis {
     fn horizontal(&self, name: &str) -> Axis {
         let numbers = self.levels.iter().filter_map(|level| if let Level::Number(x) = level { Some(*x) } else { None });
         let (low, high) = numbers.fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
-        let axis = Axis::dimensionless(name);
+        let (name, unit) = with_unit(name);
+        if self.is_of_cases() {
+            return Axis::named(&name, self.levels.iter().map(ToString::to_string));
+        }
+        let axis = if unit.is_empty() { Axis::dimensionless(&name) } else { Axis::new(&name, unit) };
         if low > 0.0 && high > LINEAR_FACTOR * low { axis.scale(Scale::Log) } else { axis }
     }
 
@@ -262,12 +268,84 @@ impl DesignAxis {
     }
 }
 
-/// A parameter as the paper writes it.
+/// A parameter as the paper writes it, and what it is.
 fn symbol(parameter: &str) -> &str {
     match parameter {
-        "left_m_per_tick" => "C_L",
-        "right_m_per_tick" => "C_R",
-        "wheel_separation_m" => "B",
+        "left_m_per_tick" => "C_L, the left wheel",
+        "right_m_per_tick" => "C_R, the right wheel",
+        "wheel_separation_m" => "B, the wheel separation",
         other => other,
+    }
+}
+
+/// Ends of keys and the units that they say, longer ones first.
+const UNITS: [(&str, &str); 13] = [
+    ("_m_per_sqrt_m", "m/√m"),
+    ("_rad_per_sqrt_rad", "rad/√rad"),
+    ("_rad_per_sqrt_m", "rad/√m"),
+    ("_m_per_tick", "m/tick"),
+    ("_rad_s2", "rad/s²"),
+    ("_m_s2", "m/s²"),
+    ("_rad_s", "rad/s"),
+    ("_m_s", "m/s"),
+    ("_rad", "rad"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// The name in a key without its unit, and the unit.
+fn with_unit(key: &str) -> (String, &'static str) {
+    let of = UNITS.iter().find_map(|(end, unit)| Some((key.strip_suffix(end)?, *unit)));
+    let (name, unit) = of.filter(|(name, _)| !name.is_empty()).unwrap_or((key, ""));
+    (name.replace('_', " "), unit)
+}
+
+/// What the sweep shows in a sentence: which method is nearest to the truth, and how often.
+fn finding(result: &SweepResult) -> String {
+    let mut wins: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut all = 0;
+    for point in &result.points {
+        for parameter in TRACKED {
+            let of = point.estimators.iter().filter(|of| of.parameter == parameter.key());
+            let known = of.filter_map(|of| Some((of.rmse?, &of.method[..])));
+            if let Some((_, method)) = known.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                *wins.entry(method).or_default() += 1;
+                all += 1;
+            }
+        }
+    }
+    let methods: BTreeSet<&str> =
+        result.points.iter().flat_map(|point| &point.estimators).map(|of| &of.method[..]).collect();
+    match wins.into_iter().max_by_key(|(_, count)| *count) {
+        Some((best, count)) if methods.len() > 1 => {
+            format!("{best} has the smallest RMSE in {count} of {all} cases (points × parameters)")
+        }
+        _ => "accuracy of the calibration".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_say_their_units() {
+        let said = |key| {
+            let (name, unit) = with_unit(key);
+            format!("{name} [{unit}]")
+        };
+        let keys =
+            ["reading_sigma_m", "wheel_sigma_m_per_sqrt_m", "speed_m_s", "yaw_rate_rad_s", "right_over_left", "m"];
+        let expected = [
+            "reading sigma [m]",
+            "wheel sigma [m/√m]",
+            "speed [m/s]",
+            "yaw rate [rad/s]",
+            "right over left []",
+            "m []",
+        ];
+        assert_eq!(keys.map(said), expected);
     }
 }

@@ -190,7 +190,8 @@ impl Columns {
     }
 }
 
-/// A run whose first row leaves a channel empty does not have it; else every row must.
+/// A run whose first row leaves a channel empty does not have it; else every row must, but for channels that
+/// may have gaps.
 fn push_extra(
     odometry: &mut Odometry,
     channel: ExtraChannel,
@@ -198,14 +199,27 @@ fn push_extra(
     column: usize,
     rows_if_first: Option<usize>,
 ) -> Result<(), DatasetError> {
+    let is_empty = row.bytes(column).is_empty();
+    if channel.may_have_gaps() {
+        let read = odometry.t_s.len() - 1;
+        if is_empty {
+            if let Some(values) = odometry.extra.get_mut(&channel) {
+                values.push(f64::NAN);
+            }
+        } else {
+            let value = row.number(column)?;
+            odometry.extra.entry(channel).or_insert_with(|| vec![f64::NAN; read]).push(value);
+        }
+        return Ok(());
+    }
     if let Some(rows) = rows_if_first
-        && !row.bytes(column).is_empty()
+        && !is_empty
     {
         odometry.extra.insert(channel, exactly(rows));
     }
     match odometry.extra.get_mut(&channel) {
         Some(values) => values.push(row.number(column)?),
-        None if row.bytes(column).is_empty() => {}
+        None if is_empty => {}
         None => {
             let (file, line, column) = (row.file(), row.line(), channel.column());
             return Err(DatasetError::SparseColumn { file, line, column });

@@ -119,7 +119,7 @@ fn odometry(run: &Run, _: &[MarkedPoint], columns: &OptionalColumns, out: &mut O
         }
         for channel in &columns.extra {
             out.write_all(b",")?;
-            number(out, run.odometry.extra.get(channel).map(|values| values[row]))?;
+            number(out, run.odometry.extra.get(channel).map(|values| values[row]).filter(|value| !value.is_nan()))?;
         }
         out.write_all(b"\n")?;
     }

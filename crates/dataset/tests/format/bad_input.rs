@@ -227,10 +227,10 @@ fn missing_and_wrong_columns() {
     fault("displacement.csv", DISPLACEMENT.replace("dx_m", "dx_mm"), "displacement.csv:1: missing column dx_m");
     fault("points.csv", POINTS.replace("point", "mark"), "points.csv:1: missing column point");
     fault("wheel_reference.csv", WHEELS.replace("left_mps", "left"), "wheel_reference.csv:1: missing column left_mps");
-    let extra = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,\na,1,0,0,0.5\nb,0,0,0,1\n";
-    fault("odometry.csv", extra, "odometry.csv:3: column gyro_radps: a value, though the run's first row has none");
-    let gap = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,0.5\na,1,0,0,\nb,0,0,0,\n";
-    fault("odometry.csv", gap, "odometry.csv:3: column gyro_radps: \"\" is not a number");
+    let extra = "run,t_s,left_ticks,right_ticks,cmd_v_mps\na,0,0,0,\na,1,0,0,0.5\nb,0,0,0,1\n";
+    fault("odometry.csv", extra, "odometry.csv:3: column cmd_v_mps: a value, though the run's first row has none");
+    let gap = "run,t_s,left_ticks,right_ticks,cmd_v_mps\na,0,0,0,0.5\na,1,0,0,\nb,0,0,0,\n";
+    fault("odometry.csv", gap, "odometry.csv:3: column cmd_v_mps: \"\" is not a number");
 }
 
 #[test]
@@ -244,6 +244,22 @@ fn unknown_and_redundant_columns_are_warned_of_and_kept_out() {
     assert!(messages[1].contains("column v_mps was left out, because the table also has left_ticks"), "{messages:?}");
     assert_eq!(loaded.dataset.runs[0].odometry.extra.len(), 1);
     assert_eq!(loaded.dataset.runs[1].odometry.extra.len(), 0);
+}
+
+#[test]
+fn a_gyroscope_may_have_gaps_and_keeps_them() {
+    let gaps = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,\na,1,5,0,0.5\na,2,9,0,\nb,0,0,0,\nb,1,1,1,\n";
+    let case = Case::good().with("odometry.csv", gaps);
+    let set = read(case.path()).expect("no fault").dataset;
+    let of = |run: usize| set.runs[run].odometry.extra.values().cloned().collect::<Vec<_>>();
+    assert_eq!(format!("{:?} {:?}", of(0), of(1)), "[[NaN, 0.5, NaN]] []");
+    let again = case.path().join("again");
+    dataset::write(&set, &again, dataset::Existing::Refuse).expect("written");
+    assert_eq!(fs::read_to_string(again.join("odometry.csv")).expect("a table"), gaps);
+    assert!(read(&again).expect("no fault").dataset == set);
+    let wrong = Case::good().with("odometry.csv", gaps.replace("0.5", "fast"));
+    let message = read(wrong.path()).expect_err("no number").to_string();
+    assert!(message.contains("odometry.csv:3: column gyro_radps"), "{message}");
 }
 
 #[test]

@@ -1,0 +1,100 @@
+//! Ctrl-C while results are written: what has its final name is whole, or it is not there.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use crate::support::{everything_in, succeed};
+
+/// The signal of Ctrl-C.
+const SIGINT: i32 = 2;
+/// What a shell has for it, and what a command gives that tidies up first.
+const INTERRUPTED: i32 = 128 + SIGINT;
+
+fn start(here: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_yair"))
+        .current_dir(here)
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("yair starts")
+}
+
+/// Interrupts a command as soon as `is_time`; `None` where it ended before.
+fn interrupted(here: &Path, arguments: &[&str], is_time: impl Fn() -> bool) -> Option<ExitStatus> {
+    let mut child = start(here, arguments);
+    while !is_time() {
+        if let Some(ended) = child.try_wait().expect("it can be asked") {
+            assert!(ended.success(), "{arguments:?}: {ended}");
+            return None;
+        }
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    Some(child.wait().expect("it ends"))
+}
+
+#[track_caller]
+fn is_of_the_signal(ended: ExitStatus) {
+    assert!(ended.signal() == Some(SIGINT) || ended.code() == Some(INTERRUPTED), "{ended}");
+}
+
+/// A folder that is being made has this name, beside the one that it will have.
+fn is_being_written(here: &Path) -> bool {
+    let names = fs::read_dir(here).expect("a folder").filter_map(Result::ok).map(|entry| entry.file_name());
+    names.into_iter().any(|name| name.to_string_lossy().starts_with(".writing-"))
+}
+
+#[test]
+fn an_import_that_is_interrupted_leaves_no_dataset() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    // So many rows that writing them takes tens of milliseconds.
+    let mut table = "t,left_ticks,right_ticks,x,y,theta\n".to_owned();
+    for row in 0..150_000_u32 {
+        let (t_s, ticks, x_m) = (0.02 * f64::from(row), 40 * row, 0.0046 * f64::from(row));
+        writeln!(table, "{t_s:.2},{ticks},{ticks},{x_m:.4},0,0").expect("a text");
+    }
+    fs::write(here.join("log.csv"), table).expect("written");
+    let arguments = ["import", "csv", "log.csv", "--out", "new", "--wheel", "0.15", "--base", "0.3"];
+    let arguments = [&arguments[..], &["--ticks-per-rev", "4096", "--time-unit", "s", "--angle-unit", "rad"]].concat();
+    let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
+    is_of_the_signal(ended);
+    assert!(!here.join("new").exists(), "{:?}", everything_in(here));
+    // What is left of it stops nobody.
+    succeed(here, &arguments);
+    assert!(["dataset.toml", "odometry.csv", "truth.csv"].iter().all(|name| here.join("new").join(name).is_file()));
+}
+
+#[test]
+fn a_diagnosis_that_is_interrupted_leaves_no_folder() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/motion-capture.toml");
+    succeed(here, &["simulate", scenario, "--out", "robot"]);
+    let arguments = ["diagnose", "robot", "--out", "found", "--quiet"];
+    let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
+    is_of_the_signal(ended);
+    assert!(!here.join("found").exists(), "{:?}", everything_in(here));
+}
+
+#[test]
+fn a_sweep_that_is_interrupted_has_no_results_and_goes_on() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/noise-levels.toml");
+    let arguments = ["sweep", scenario, "--trials", "400", "--out", "sweep", "--quiet"];
+    // The state is the first file that a campaign writes.
+    let begun = || here.join("sweep").read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let ended = interrupted(here, &arguments, begun).expect("it is seen at its work");
+    is_of_the_signal(ended);
+    let results = ["sweep.json", "sweep.svg", "report.html"].map(|name| here.join("sweep").join(name));
+    assert!(results.iter().all(|file| !file.exists()), "{:?}", everything_in(here));
+    succeed(here, &[&arguments[..], &["--resume"]].concat());
+    assert!(results.iter().all(|file| file.is_file()), "{:?}", everything_in(here));
+}
