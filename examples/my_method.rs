@@ -13,7 +13,9 @@ use std::error::Error;
 use std::io::Write;
 
 use yair::bench::{SweepOptions, SweepPlan, SweepResult};
-use yair::calib::{self, CalibError, Calibration, Method, NotObservable, Parameter, run_path};
+use yair::calib::{
+    self, CalibError, Calibration, EvaluationOptions, Method, NotObservable, Parameter, evaluate_runs_and_paths,
+};
 use yair::dataset::{Protocol, Session};
 use yair::kinematics::{DriveGeometry, Pose, wrap_to_pi};
 use yair::motion_programs::Schedule;
@@ -52,9 +54,11 @@ impl Method for Tape {
         let nominal = robot.geometry().map_err(|source| CalibError::NotADrive { method: NAME, source })?;
         let (mut counted_m, mut driven_m, mut counted_rad, mut turned_rad) = (0.0, 0.0, 0.0, 0.0);
         let mut runs_used = 0;
-        for (session, run) in sessions.iter().flat_map(|session| session.runs.iter().map(move |run| (session, run))) {
+        let options = EvaluationOptions::default();
+        let paths = |session| evaluate_runs_and_paths(session, None, &options, &mut 0.0);
+        for (run, (_, path)) in sessions.iter().flat_map(|session| session.runs.iter().zip(paths(session))) {
             // Where the instrument saw the robot, and where the counts have it at the same instants.
-            let Some(path) = run_path(session, run, None, &mut 0.0) else { continue };
+            let Some(path) = path else { continue };
             let both = |(seen, counted): (&Pose, &Option<Pose>)| Some((*seen, (*counted)?));
             let mut pairs = path.measured.iter().zip(&path.at_measured).filter_map(both);
             let Some((first, last)) = pairs.next().and_then(|first| Some((first, pairs.next_back()?))) else {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, OnStage, Options, Stage};
+use calib::{CalibrationReport, TrainedOn};
 use clap::Args;
 use dataset::Dataset;
 use indicatif::ProgressBar;
@@ -22,8 +23,8 @@ pub(crate) struct Arguments {
     /// them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Folder for report.html, report.md with its pictures, findings.json, and extended.toml, a scenario of
-    /// the robot as found.
+    /// Folder for report.html, report.md with its pictures, findings.json, calibration.toml, and
+    /// extended.toml, a scenario of the robot as found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take an effect out of the catalogue; may be given several times.
@@ -78,6 +79,13 @@ pub(crate) fn write_diagnosis(
             let text = [reservations(&diagnosis.document), scenario.to_toml()?].concat();
             write_whole(&folder.join(name), text.as_bytes())?;
             diagnosis.document.extended_model = Some(out.join(name).display().to_string());
+        }
+        if let Some(geometry) = &diagnosis.geometry_alone {
+            let name = "calibration.toml";
+            let trained_on = datasets.iter().map(|dataset| TrainedOn::of(&dataset.session())).collect();
+            let report = CalibrationReport { trained_on, ..geometry.clone() };
+            write_whole(&folder.join(name), report.to_toml()?.as_bytes())?;
+            diagnosis.document.calibration_file = Some(out.join(name).display().to_string());
         }
         let Diagnosis { document, residuals, alternatives, .. } = &*diagnosis;
         write_whole(&folder.join("findings.json"), &serde_json::to_vec_pretty(document)?)?;

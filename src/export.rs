@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     /// File to write; standard output when left out. For `tum` a folder, with RUN.tum of every run.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace a file that is already there.
+    /// Replace a file that is already there; export the geometry of an extended model without its effects.
     #[arg(long)]
     force: bool,
     /// A dataset of the robot, for nominal values that the calibration file does not have; c: with absolute
@@ -191,6 +191,9 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         .left_out(format.has_effects)
         .map(|effect| LeftOut { id: effect.id, meaning: effect.meaning, why: why(effect.on_board) })
         .collect();
+    if !format.has_effects && !arguments.force {
+        refuse_misleading(format, &robot, &arguments.source)?;
+    }
     for LeftOut { id, meaning, why } in &left_out {
         let why = why.map_or_else(String::new, |why| format!(": {why}"));
         terminal.remark(&format!("{}: left out: {id} ({meaning}){why}", arguments.source.display()));
@@ -226,6 +229,27 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         runs: Vec::new(),
     })?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a geometry that is right only beside effects of the robot, in a format that cannot express them:
+/// it was fitted beside them, and alone it may drift more than the nominal one.
+fn refuse_misleading(format: &Exporter, robot: &CalibratedRobot, source: &Path) -> Result<(), Failure> {
+    let acts = |of: OnBoard| {
+        matches!(of, OnBoard::Static(_) | OnBoard::State { .. } | OnBoard::Input { .. } | OnBoard::Constant(_))
+    };
+    let beside: Vec<&str> =
+        robot.left_out(format.has_effects).filter(|effect| acts(effect.on_board)).map(|effect| effect.id).collect();
+    if beside.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{}: its geometry is right beside {}, which {} cannot express; export the calibration.toml that `yair diagnose --out` writes beside it, or \
+         `yair export c {0}`; --force writes it all the same",
+        source.display(),
+        beside.join(", "),
+        format.name
+    )
+    .into())
 }
 
 /// Refuses to replace a file, unless that is asked for.

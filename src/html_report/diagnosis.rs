@@ -225,13 +225,22 @@ impl DiagnosisPage<'_> {
         };
         let data = self.given.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" ");
         let corrected = out.with_file_name("corrected");
+        let (exported, about) = match &document.calibration_file {
+            Some(geometry) => (
+                format!("yair export ros2-yaml {geometry}\n"),
+                "The first command writes the parameters for ROS 2 (other robots: yair export --help): the geometry that is best without the effects, which such parameters cannot express. The second writes odometry with the effects as a C header, the third the corrected poses of these runs; the fourth tells how far new runs drift.",
+            ),
+            None => (
+                String::new(),
+                "The records have a fault: mend it before parameters are copied. The first command writes odometry that undoes it as a C header, the second the corrected poses of these runs; the third tells how far new runs drift.",
+            ),
+        };
         let commands = format!(
-            "yair export ros2-yaml {model}\nyair correct {data} --calibration {model} --out {}\nyair evaluate {data} --calibration {model}",
+            "{exported}yair export c {model} --out {}\nyair correct {data} --calibration {model} --out {}\nyair evaluate {data} --calibration {model}",
+            out.with_file_name("odometry.h").display(),
             corrected.display()
         );
-        section
-            .text("The first command writes the parameters for ROS 2 (other robots: yair export --help), the second the corrected poses of these runs, the third tells how far new runs drift.")
-            .with(Block::Code("Commands".to_owned(), commands))
+        section.text(about).with(Block::Code("Commands".to_owned(), commands))
     }
 }
 

@@ -108,7 +108,7 @@ fn an_extended_model_says_what_a_format_leaves_out() {
     let model = include_str!("../../scenarios/motion-capture.toml").replacen("[[protocol]]", effects, 1);
     fs::write(at.join("extended.toml"), model).expect("written");
     let ids = |format: &str| {
-        let found = document(at, &["export", format, "extended.toml"]);
+        let found = document(at, &["export", format, "extended.toml", "--force"]);
         let all = found["left_out"].as_array().expect("a list").clone();
         all.iter().map(|effect| effect["id"].as_str().unwrap_or_default().to_owned()).collect::<Vec<_>>()
     };
@@ -117,7 +117,9 @@ fn an_extended_model_says_what_a_format_leaves_out() {
     let said = succeed(at, &["export", "c", "extended.toml"]).stderr;
     assert!(said.contains("later readings") && said.contains("drift: not known: it needs a dataset"), "{said}");
     assert!(ids("ros2-yaml").contains(&"slip_speed".to_owned()));
-    let said = succeed(at, &["export", "ros2-yaml", "extended.toml"]);
+    let said = refusal(at, &["export", "ros2-yaml", "extended.toml"]);
+    assert!(said.contains("slip_speed") && said.contains("calibration.toml"), "{said}");
+    let said = succeed(at, &["export", "ros2-yaml", "extended.toml", "--force"]);
     assert!(said.stderr.contains("extended.toml: left out: slip_speed ("), "{}", said.stderr);
     assert!(said.stdout.contains("# Left out: slip_speed ("), "{}", said.stdout);
 }

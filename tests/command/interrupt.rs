@@ -14,8 +14,10 @@ const SIGINT: i32 = 2;
 /// What a shell has for it, and what a command gives that tidies up first.
 const INTERRUPTED: i32 = 128 + SIGINT;
 
+/// A shell starts what runs in its background deaf to the signal, and what that starts inherits it.
 fn start(here: &Path, arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_yair"))
+    Command::new("env")
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_yair")])
         .current_dir(here)
         .args(arguments)
         .stdout(Stdio::null())

@@ -1,6 +1,6 @@
 //! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
 
-use effects::{CATALOGUE, Hypothesis, Sparse, hypothesis};
+use effects::{CATALOGUE, Hypothesis, OnBoard, Sparse, hypothesis};
 use model_term::{ModelTerm, TermParameter};
 
 use crate::cause::Cause;
@@ -54,6 +54,15 @@ impl Candidate {
         match self {
             Self::Effect { id, .. } => effects::description(id).is_some_and(|description| description.goes_by_rows),
             Self::Sparse(sparse) => *sparse == Sparse::of_rows(),
+        }
+    }
+
+    /// Whether it is of the outside instrument, and no part of the robot's motion.
+    pub(crate) fn is_of_instrument(&self) -> bool {
+        match self {
+            Self::Effect { id, .. } => effects::description(id)
+                .is_some_and(|description| matches!(description.on_board, OnBoard::OfInstrument)),
+            Self::Sparse(sparse) => sparse.channel.is_of_instrument(),
         }
     }
 

@@ -14,8 +14,7 @@ use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
     CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
-    MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_COMMON_CLOCK_OFFSET_S,
-    MIN_RUNS_PER_ODD_CLOCK,
+    MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_RUNS_PER_ODD_CLOCK,
 };
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -45,8 +44,8 @@ struct OfRun {
     profile: Profile,
 }
 
-/// Looks for offsets.
-pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Clocks {
+/// Looks for offsets; one of all runs counts from `min_common_s` on.
+pub(crate) fn clock_offsets(datasets: &[Dataset], min_common_s: f64) -> Clocks {
     let mut all = Vec::new();
     for (session, dataset) in datasets.iter().enumerate() {
         let Ok(geometry) = dataset.robot.geometry() else { return Clocks::default() };
@@ -82,7 +81,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset]) -> Clocks {
     };
     let mut offsets: Vec<ClockOffset> = odd.iter().map(own).collect();
     let gain: f64 = all.iter().map(|of| of.profile.gain_over(0.0) - of.profile.gain_over(middle_s)).sum();
-    let is_common = middle_s.abs() >= MIN_COMMON_CLOCK_OFFSET_S && gain > MIN_CLOCK_GAIN;
+    let is_common = middle_s.abs() >= min_common_s && gain > MIN_CLOCK_GAIN;
     if is_common {
         let information: f64 = all.iter().map(|of| of.profile.sigma_s.powi(-2)).sum();
         offsets.push(ClockOffset { runs: None, offset_s: middle_s, sigma_s: information.sqrt().recip(), gain });
@@ -200,6 +199,11 @@ mod tests {
     use kinematics::{Increment, Pose};
 
     use super::*;
+    use crate::settings::records::MIN_COMMON_CLOCK_OFFSET_S;
+
+    fn offsets(datasets: &[Dataset]) -> Clocks {
+        clock_offsets(datasets, MIN_COMMON_CLOCK_OFFSET_S)
+    }
 
     /// Runs of twenty seconds that speed up, slow down and turn, whose poses are of so long before their
     /// stamps.
@@ -249,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_run_whose_clock_is_off_is_named_and_left_out() {
-        let found = clock_offsets(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]);
+        let found = offsets(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]);
         let [offset] = &found.offsets[..] else { panic!("one run") };
         assert_eq!(offset.runs.as_deref(), Some(&["run-2".to_owned()][..]));
         // Poses are taken at hundredths of a second.
@@ -259,15 +263,18 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_off_in_all_runs_is_set_right() {
-        let found = clock_offsets(&[driven(&[-0.4; 4])]);
+        let found = offsets(&[driven(&[-0.4; 4])]);
         assert_eq!((found.offsets.len(), found.offsets[0].runs.as_deref()), (1, None));
         assert!((found.offsets[0].offset_s + 0.4).abs() < 0.01, "{}", found.offsets[0].offset_s);
         // Rejects a shift the other way: the records are then off by nothing.
-        let is_none = |datasets: &[Dataset]| clock_offsets(datasets).offsets.is_empty();
+        let is_none = |datasets: &[Dataset]| offsets(datasets).offsets.is_empty();
         assert!(is_none(&found.records.expect("all are off")));
         // What the fit can estimate is said to be there still.
-        let small = clock_offsets(&[driven(&[0.05; 4])]);
+        let small = offsets(&[driven(&[0.05; 4])]);
         assert!(small.offsets.is_empty() && (small.remaining_s - 0.05).abs() < 0.01, "{}", small.remaining_s);
+        // Where a fit fails with it, it is taken off; rejects the same limit for both.
+        let small = clock_offsets(&[driven(&[0.05; 4])], 0.04);
+        assert!((small.offsets[0].offset_s - 0.05).abs() < 0.01, "{}", small.offsets[0].offset_s);
         assert!(is_none(&[driven(&[0.0, 0.3])]), "of two, either is the odd one");
         assert!(is_none(&[driven(&[0.0, 0.3, 0.0, -0.2, 0.0, 0.0])]), "two of six are not odd");
     }
@@ -279,6 +286,6 @@ mod tests {
             let WheelLog::Angles(Wheels { left, right }) = &mut run.odometry.wheels else { unreachable!("angles") };
             std::mem::swap(left, right);
         }
-        assert!(clock_offsets(&[swapped]).offsets.is_empty());
+        assert!(offsets(&[swapped]).offsets.is_empty());
     }
 }

@@ -22,7 +22,9 @@ use crate::mean_structure::{THINNED, mean_structure};
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
-use crate::settings::records::{MAX_REJECTED_FRACTION, MIN_MEASUREMENTS_PER_RUN};
+use crate::settings::records::{
+    MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
+};
 use crate::stage::{OnStage, Step};
 use crate::text;
 use crate::unknown_motion::unknown_motions;
@@ -76,6 +78,9 @@ pub struct Diagnosis {
     pub base: CalibrationReport,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
+    /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
+    /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
+    pub geometry_alone: Option<CalibrationReport>,
 }
 
 /// A model with its terms, to be compared with other records.
@@ -113,9 +118,18 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
+    match stages(datasets, options, MIN_COMMON_CLOCK_OFFSET_S) {
+        // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
+        Err(DiagnoseError::OdometryUncorrelated { .. }) => stages(datasets, options, MIN_REJECTING_CLOCK_OFFSET_S),
+        result => result,
+    }
+}
+
+/// The stages, where an offset of all clocks from `min_common_clock_s` on is taken off before the fit.
+fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> Result<Diagnosis, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
-    let clocks = clock_offsets(datasets);
+    let clocks = clock_offsets(datasets, min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
     let odd = unknown_motions(datasets, clocks.remaining_s);
     let (datasets, anomalies) =
@@ -193,6 +207,8 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
     };
     let base = calibration_of(&AugmentedModel::base(&structure.base));
+    let of_instrument = with_candidates(&structure.base, model, |_, candidate| candidate.is_of_instrument());
+    let geometry_alone = faults.is_empty().then(|| calibration_of(&of_instrument));
     let document = Document {
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
@@ -207,11 +223,12 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
         gain_why_null,
         next_experiment_why_null: next.as_ref().err().cloned(),
         next_experiment: next.ok(),
+        calibration_file: None,
         extended_model: None,
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
     let found = FittedModel::of(model);
-    Ok(Diagnosis { document, extended, residuals, alternatives, base, found })
+    Ok(Diagnosis { document, extended, residuals, alternatives, base, found, geometry_alone })
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
@@ -239,9 +256,19 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) ->
 
 /// The model without the terms that do not carry over to some session or kind of path.
 fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, carry_over: &[CarryOver]) -> AugmentedModel<'a> {
-    let stays = |(_, of): &(_, &CarryOver)| of.carries_over != Some(false);
-    let candidates: Vec<Candidate> =
-        model.candidates.iter().zip(carry_over).filter(stays).map(|(candidate, _)| candidate.clone()).collect();
+    with_candidates(base, model, |index, _| {
+        carry_over.get(index).is_none_or(|carry_over| carry_over.carries_over != Some(false))
+    })
+}
+
+/// The model with some of its candidates alone, refitted.
+fn with_candidates<'a>(
+    base: &ModelFit<'a>,
+    model: &AugmentedModel<'a>,
+    stays: impl Fn(usize, &Candidate) -> bool,
+) -> AugmentedModel<'a> {
+    let of = model.candidates.iter().enumerate().filter(|(index, candidate)| stays(*index, candidate));
+    let candidates: Vec<Candidate> = of.map(|(_, candidate)| candidate.clone()).collect();
     if candidates.len() == model.candidates.len() {
         return model.clone();
     }

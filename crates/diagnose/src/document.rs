@@ -52,6 +52,8 @@ pub struct Document {
     /// Why there is nothing to drive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_experiment_why_null: Option<String>,
+    /// Where the geometry is that suits the data best without any effect of the robot, a calibration file.
+    pub calibration_file: Option<String>,
     /// Where the extended scenario is.
     pub extended_model: Option<String>,
     /// Why there is none.

@@ -1,5 +1,7 @@
 //! What a scenario drives, fitted to its budget, and what that costs.
 
+use std::collections::BTreeMap;
+
 use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 
 use crate::budget::cost;
@@ -38,7 +40,13 @@ impl Scenario {
             Some(budget) => budget.fit(protocols, &self.drive_limits())?,
             None => protocols.to_vec(),
         };
-        Ok(fitted.iter().flat_map(Schedule::programs).collect())
+        let mut programs: Vec<MotionProgram> = Vec::new();
+        for schedule in &fitted {
+            let before = programs.len();
+            programs.extend(schedule.programs());
+            number_on(&mut programs, before);
+        }
+        Ok(programs)
     }
 
     /// How fast the robot drives, and what a person needs for each run.
@@ -49,5 +57,40 @@ impl Scenario {
             acceleration_m_s2: self.robot.acceleration_m_s2,
             handling_s: self.budget.and_then(|budget| budget.handling_s).unwrap_or(0.0),
         }
+    }
+}
+
+/// Ids of the programs from `first` on go on where those of the same kind before them end: two schedules of
+/// circles are no two runs of one id.
+fn number_on(programs: &mut [MotionProgram], first: usize) {
+    let parts =
+        |id: &str| id.rsplit_once('_').and_then(|(kind, run)| Some((kind.to_owned(), run.parse::<u32>().ok()?)));
+    let mut next: BTreeMap<String, u32> = BTreeMap::new();
+    let (before, new) = programs.split_at_mut(first);
+    for (kind, run) in before.iter().filter_map(|program| parts(&program.id)) {
+        let next = next.entry(kind).or_default();
+        *next = (*next).max(run + 1);
+    }
+    for program in new {
+        if let Some((kind, run)) = parts(&program.id)
+            && let Some(offset) = next.get(&kind)
+        {
+            program.id = format!("{kind}_{:03}", offset + run);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_two_schedules_of_one_kind_have_ids_of_their_own() {
+        let mut scenario = Scenario::parse(crate::PAPER, "paper.toml").expect("it is shipped");
+        let circles = |radius_m| Schedule::Circles { radius_m, turns: None, runs_each_way: 1 };
+        scenario.protocols = vec![circles(1.0), Schedule::Spins { turn_rad: 1.0, runs: 1 }, circles(2.0)];
+        scenario.budget = None;
+        let ids: Vec<String> = scenario.programs().into_iter().map(|program| program.id).collect();
+        assert_eq!(ids, ["circle_cw_000", "circle_ccw_001", "spin_000", "circle_cw_001", "circle_ccw_003"]);
     }
 }

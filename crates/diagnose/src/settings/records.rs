@@ -21,6 +21,11 @@ pub(crate) const MIN_CLOCK_OFFSET_S: f64 = 0.08;
 /// Budgeted: a tenth of a second and less is estimated with everything else.
 pub(crate) const MIN_COMMON_CLOCK_OFFSET_S: f64 = 0.15;
 
+/// Seconds. The same where the fit takes many measurements for outliers: the instrument is too precise for
+/// the offset to be estimated with everything else.
+/// Budgeted: three standard deviations of an offset that a few runs determine to five milliseconds.
+pub(crate) const MIN_REJECTING_CLOCK_OFFSET_S: f64 = 0.015;
+
 /// Standard deviations. A run's own clock is off by as many of its estimate at the least.
 /// Budgeted: errors of rounded turns are alike, and the estimate is less certain than it says.
 pub(crate) const MIN_CLOCK_SIGMAS: f64 = 6.0;
