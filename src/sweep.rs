@@ -3,8 +3,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
@@ -13,7 +11,7 @@ use scenario::Scenario;
 use serde::Serialize;
 
 use crate::html_report::write_sweep;
-use crate::terminal::{Failure, Terminal, table};
+use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
 /// Monte-Carlo: bias, spread, coverage and efficiency of every method over a scenario's design.
@@ -66,9 +64,6 @@ const MAX_TRIALS: u64 = 100_000_000;
 /// Exit code when accuracy has moved, as of `yair evaluate --max-drift`.
 const MOVED: u8 = 3;
 
-/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
-const INTERRUPTED: u8 = 130;
-
 /// A sweep's document with what a check adds.
 #[derive(Serialize)]
 struct Document<'a> {
@@ -100,16 +95,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         bench::can_be_written(out, arguments.rows)?;
     }
-    let stop = Arc::new(AtomicBool::new(false));
-    if arguments.out.is_some() {
-        // A second Ctrl-C ends at once.
-        let flag = Arc::clone(&stop);
-        let _ = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED.into());
-            }
-        });
-    }
+    // Without a folder there is nothing to go on with: Ctrl-C ends at once.
+    let stop = terminal.stop_flag(arguments.out.is_some());
     let bar = terminal.progress(0, "trials");
     let started = Instant::now();
     let outcome = plan.campaign(&Campaign {
@@ -129,10 +116,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let out = arguments.out.as_deref();
     match outcome {
         Outcome::Stopped(progress) => {
-            terminal.remark(&format!(
-                "stopped after {} of {} trials; the same command with --resume goes on",
-                progress.done, progress.planned
-            ));
+            let goes_on = if out.is_some() { "; the same command with --resume goes on" } else { "" };
+            terminal.remark(&format!("stopped after {} of {} trials{goes_on}", progress.done, progress.planned));
             Ok(ExitCode::from(INTERRUPTED))
         }
         Outcome::Shard => {

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::error::Error;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anstyle::{AnsiColor, Effects, Style};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
@@ -12,14 +14,34 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::sparse_lines::SparseLines;
+use crate::watch::Watch;
 
 /// Why a subcommand failed: one line for the user.
 pub(crate) type Failure = Box<dyn Error>;
 
-/// The terminal as the user's flags ask for it.
+/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
+pub(crate) const INTERRUPTED: u8 = 130;
+
+/// The terminal as the user's flags ask for it, or what a calling program is told in its place.
 pub(crate) struct Terminal {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
+    kept: Option<Kept>,
+}
+
+/// What is kept for a calling program.
+struct Kept {
+    watch: Arc<Watch>,
+    said: Mutex<Said>,
+}
+
+/// Document, remarks, failure.
+type Said = (Option<String>, Vec<String>, Option<String>);
+
+impl Kept {
+    fn said(&self) -> MutexGuard<'_, Said> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A line above, below and under the header, and none between rows.
@@ -33,7 +55,35 @@ const TABLE_WIDTH: u16 = 100;
 
 impl Terminal {
     pub(crate) const fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet }
+        Self { json, quiet, kept: None }
+    }
+
+    /// Nothing is printed: [`Self::into_kept`] has it.
+    pub(crate) fn kept(watch: Arc<Watch>) -> Self {
+        Self { json: true, quiet: false, kept: Some(Kept { watch, said: Mutex::default() }) }
+    }
+
+    /// The document, the remarks and the failure that were kept.
+    pub(crate) fn into_kept(self) -> Said {
+        self.kept.map(|kept| kept.said.into_inner().unwrap_or_else(PoisonError::into_inner)).unwrap_or_default()
+    }
+
+    /// Set when the command is to stop: by a calling program, or by Ctrl-C where `on_ctrl_c`. A second Ctrl-C
+    /// ends at once.
+    pub(crate) fn stop_flag(&self, on_ctrl_c: bool) -> Arc<AtomicBool> {
+        if let Some(kept) = &self.kept {
+            return kept.watch.stop_flag();
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        if on_ctrl_c {
+            let flag = Arc::clone(&stop);
+            let _ = ctrlc::set_handler(move || {
+                if flag.swap(true, Ordering::Relaxed) {
+                    std::process::exit(INTERRUPTED.into());
+                }
+            });
+        }
+        stop
     }
 
     /// A result for people; not printed beside JSON.
@@ -47,14 +97,20 @@ impl Terminal {
     /// The one JSON document, when it is asked for.
     pub(crate) fn document(&self, document: &impl Serialize) -> Result<(), Failure> {
         if self.json {
-            writeln_to_stdout(&serde_json::to_string_pretty(document)?)?;
+            let text = serde_json::to_string_pretty(document)?;
+            match &self.kept {
+                Some(kept) => kept.said().0 = Some(text),
+                None => writeln_to_stdout(&text)?,
+            }
         }
         Ok(())
     }
 
     /// A remark on standard error; where somebody watches, the word that says how grave it is has a colour.
     pub(crate) fn remark(&self, text: &str) {
-        if !self.quiet {
+        if let Some(kept) = &self.kept {
+            kept.said().1.push(text.to_owned());
+        } else if !self.quiet {
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
                 Some(("warning", rest)) => format!("{WARNING}warning{WARNING:#}: {rest}"),
@@ -67,14 +123,23 @@ impl Terminal {
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
         let message = in_plain_words(&message.replace('\n', "; "));
+        if let Some(kept) = &self.kept {
+            kept.said().2 = Some(message);
+            return;
+        }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
     }
 
     /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and
     /// then; nothing when quiet.
     pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
-        if self.quiet {
-            return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        if self.quiet || self.kept.is_some() {
+            let hidden = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+            let hidden = hidden.with_message(what.to_owned());
+            if let Some(kept) = &self.kept {
+                kept.watch.follow(&hidden);
+            }
+            return hidden;
         }
         let watched = std::io::stderr().is_terminal();
         let (target, template) = if watched {
