@@ -53,6 +53,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
                     "yair sweep scenarios/paper.toml",
                     "yair sweep scenarios/paper.toml --precision 2% --out results",
                     "yair sweep scenarios/paper.toml --shard 1/4 --out shard-1",
+                    "yair sweep scenarios/paper.toml --shard auto --resume --out shard-1",
                 ],
             ),
             ("merge", &["yair merge shard-1 shard-2 --out results"]),

@@ -60,6 +60,7 @@ mod manual;
 mod merge;
 mod plan;
 mod reproduce;
+mod shard;
 mod simulate;
 mod sparse_lines;
 mod sweep;

@@ -1,16 +1,17 @@
-//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N] [--resume] [--rows] [--out DIR]
+//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N|auto] [--resume] [--rows] [--out DIR]
 //! [--summary] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, FolderLock, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::html_report::write_sweep;
+use crate::shard::{ShardChoice, from_environment};
 use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
@@ -31,9 +32,10 @@ pub(crate) struct Arguments {
     /// Seed of every random draw, in place of the scenario's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Run part I of N only; `yair merge` puts the parts together.
-    #[arg(long, value_name = "I/N", requires = "out")]
-    shard: Option<Shard>,
+    /// Run part I of N only; `yair merge` puts the parts together. auto: the part that YAIR_SHARD, a Slurm
+    /// array, or an indexed Job of Kubernetes with YAIR_SHARDS names.
+    #[arg(long, value_name = "I/N|auto", requires = "out")]
+    shard: Option<ShardChoice>,
     /// Go on with the interrupted sweep in the folder of --out.
     #[arg(long, requires = "out")]
     resume: bool,
@@ -92,9 +94,15 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Some(path) if !arguments.update || path.exists() => Some(bench::read_baseline(path)?),
         _ => None,
     };
-    if let Some(out) = &arguments.out {
-        bench::can_be_written(out, arguments.rows)?;
-    }
+    let shard = shard(arguments, terminal)?;
+    // Until the results stand.
+    let _lock = match &arguments.out {
+        Some(out) => {
+            bench::can_be_written(out, arguments.rows)?;
+            Some(locked(out, terminal)?)
+        }
+        None => None,
+    };
     // Without a folder there is nothing to go on with: Ctrl-C ends at once.
     let stop = terminal.stop_flag(arguments.out.is_some());
     let bar = terminal.progress(0, "trials");
@@ -103,7 +111,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         jobs: arguments.jobs.into(),
         folder: arguments.out.as_deref(),
         resume: arguments.resume,
-        shard: arguments.shard.unwrap_or(Shard::WHOLE),
+        shard,
         rows: arguments.rows,
         stop: &stop,
         progress: &|progress| {
@@ -121,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             Ok(ExitCode::from(INTERRUPTED))
         }
         Outcome::Shard => {
-            let (shard, out) = (arguments.shard.unwrap_or(Shard::WHOLE), out.unwrap_or(Path::new(".")));
+            let out = out.unwrap_or(Path::new("."));
             terminal.remark(&format!(
                 "shard {shard} stands in {} after {elapsed_s:.1} s; yair merge puts the shards together",
                 out.display()
@@ -147,6 +155,32 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             conclude(arguments, terminal, &result, check)
         }
     }
+}
+
+/// The part that is asked for.
+fn shard(arguments: &Arguments, terminal: &Terminal) -> Result<Shard, Failure> {
+    match arguments.shard {
+        None => Ok(Shard::WHOLE),
+        Some(ShardChoice::Given(shard)) => Ok(shard),
+        Some(ShardChoice::Auto) => {
+            let (shard, by) =
+                from_environment(|name| std::env::var(name).ok()).map_err(|why| format!("--shard auto: {why}"))?;
+            terminal.remark(&format!("shard {shard}, by {by}"));
+            Ok(shard)
+        }
+    }
+}
+
+/// The folder for this process alone.
+fn locked(out: &Path, terminal: &Terminal) -> Result<FolderLock, Failure> {
+    let lock = FolderLock::take(out)?;
+    if let Some(why) = lock.why_not_held() {
+        terminal.remark(&format!(
+            "warning: {}: it cannot be locked ({why}); see to it that no other process writes there",
+            out.display()
+        ));
+    }
+    Ok(lock)
 }
 
 /// Says what the comparison with the baseline gave, and writes the baseline anew where that is asked for.
