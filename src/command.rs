@@ -24,7 +24,7 @@ pub use crate::watch::{Progress, Watch};
 /// Odometry of differential-drive robots: simulate, calibrate, evaluate, bench.
 #[derive(Parser)]
 #[command(name = "yair", version, about, max_term_width = 100)]
-struct Cli {
+pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     /// Print one JSON document on standard output and nothing else there.

@@ -129,7 +129,7 @@ mod tests {
     use clap::CommandFactory as _;
 
     use super::*;
-    use crate::Cli;
+    use crate::command::Cli;
 
     #[test]
     fn every_subcommand_stands_in_one_group_with_examples_that_parse() {
