@@ -2,7 +2,8 @@
 //!
 //! ```
 //! use std::sync::Arc;
-//! let call = yair::command::call(["yair", "check", "no-such-folder"], &Arc::new(yair::command::Watch::default()));
+//! use yair::command::{Watch, call};
+//! let call = call(["yair", "check", "no-such-folder"], &Arc::new(Watch::default()));
 //! assert_eq!(call.exit_code, 1);
 //! assert!(call.failure.is_some_and(|message| message.contains("no-such-folder")));
 //! ```
@@ -100,9 +101,9 @@ pub fn call(arguments: impl IntoIterator<Item = impl Into<OsString>>, watch: &Ar
             return Call { exit_code, document: None, remarks: Vec::new(), failure };
         }
     };
-    let terminal = Terminal::kept(Arc::clone(watch));
+    let terminal = Terminal::transcript(Arc::clone(watch));
     let exit_code = run(&cli, &arguments, &terminal);
-    let (document, remarks, failure) = terminal.into_kept();
+    let (document, remarks, failure) = terminal.into_transcript();
     Call { exit_code, document, remarks, failure }
 }
 

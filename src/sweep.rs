@@ -1,5 +1,5 @@
-//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N|auto] [--resume] [--rows] [--out DIR]
-//! [--summary] [--check BASELINE [--update]]`
+//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N|auto] [--resume] [--rows]
+//! [--out DIR] [--summary] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

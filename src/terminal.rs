@@ -26,21 +26,21 @@ pub(crate) const INTERRUPTED: u8 = 130;
 pub(crate) struct Terminal {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
-    kept: Option<Kept>,
+    transcript: Option<Transcript>,
 }
 
 /// What is kept for a calling program.
-struct Kept {
+struct Transcript {
     watch: Arc<Watch>,
-    said: Mutex<Said>,
+    printed: Mutex<Printed>,
 }
 
 /// Document, remarks, failure.
-type Said = (Option<String>, Vec<String>, Option<String>);
+type Printed = (Option<String>, Vec<String>, Option<String>);
 
-impl Kept {
-    fn said(&self) -> MutexGuard<'_, Said> {
-        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+impl Transcript {
+    fn printed(&self) -> MutexGuard<'_, Printed> {
+        self.printed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -55,24 +55,26 @@ const TABLE_WIDTH: u16 = 100;
 
 impl Terminal {
     pub(crate) const fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet, kept: None }
+        Self { json, quiet, transcript: None }
     }
 
-    /// Nothing is printed: [`Self::into_kept`] has it.
-    pub(crate) fn kept(watch: Arc<Watch>) -> Self {
-        Self { json: true, quiet: false, kept: Some(Kept { watch, said: Mutex::default() }) }
+    /// Nothing is printed: [`Self::into_transcript`] has it.
+    pub(crate) fn transcript(watch: Arc<Watch>) -> Self {
+        Self { json: true, quiet: false, transcript: Some(Transcript { watch, printed: Mutex::default() }) }
     }
 
     /// The document, the remarks and the failure that were kept.
-    pub(crate) fn into_kept(self) -> Said {
-        self.kept.map(|kept| kept.said.into_inner().unwrap_or_else(PoisonError::into_inner)).unwrap_or_default()
+    pub(crate) fn into_transcript(self) -> Printed {
+        self.transcript
+            .map(|transcript| transcript.printed.into_inner().unwrap_or_else(PoisonError::into_inner))
+            .unwrap_or_default()
     }
 
     /// Set when the command is to stop: by a calling program, or by Ctrl-C where `on_ctrl_c`. A second Ctrl-C
     /// ends at once.
     pub(crate) fn stop_flag(&self, on_ctrl_c: bool) -> Arc<AtomicBool> {
-        if let Some(kept) = &self.kept {
-            return kept.watch.stop_flag();
+        if let Some(transcript) = &self.transcript {
+            return transcript.watch.stop_flag();
         }
         let stop = Arc::new(AtomicBool::new(false));
         if on_ctrl_c {
@@ -98,8 +100,8 @@ impl Terminal {
     pub(crate) fn document(&self, document: &impl Serialize) -> Result<(), Failure> {
         if self.json {
             let text = serde_json::to_string_pretty(document)?;
-            match &self.kept {
-                Some(kept) => kept.said().0 = Some(text),
+            match &self.transcript {
+                Some(transcript) => transcript.printed().0 = Some(text),
                 None => writeln_to_stdout(&text)?,
             }
         }
@@ -108,8 +110,8 @@ impl Terminal {
 
     /// A remark on standard error; where somebody watches, the word that says how grave it is has a colour.
     pub(crate) fn remark(&self, text: &str) {
-        if let Some(kept) = &self.kept {
-            kept.said().1.push(text.to_owned());
+        if let Some(transcript) = &self.transcript {
+            transcript.printed().1.push(text.to_owned());
         } else if !self.quiet {
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
@@ -123,8 +125,8 @@ impl Terminal {
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
         let message = in_plain_words(&message.replace('\n', "; "));
-        if let Some(kept) = &self.kept {
-            kept.said().2 = Some(message);
+        if let Some(transcript) = &self.transcript {
+            transcript.printed().2 = Some(message);
             return;
         }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
@@ -133,11 +135,11 @@ impl Terminal {
     /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and
     /// then; nothing when quiet.
     pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
-        if self.quiet || self.kept.is_some() {
+        if self.quiet || self.transcript.is_some() {
             let hidden = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
             let hidden = hidden.with_message(what.to_owned());
-            if let Some(kept) = &self.kept {
-                kept.watch.follow(&hidden);
+            if let Some(transcript) = &self.transcript {
+                transcript.watch.follow(&hidden);
             }
             return hidden;
         }

@@ -1,5 +1,5 @@
-//! `yair._yair`: the command and its datasets for Python. What a Python user meets is in `yair/`; here is what
-//! only Rust can do: running the command without the interpreter's lock, and columns from and to numpy.
+//! `yair._yair`: the command and its datasets for Python. What a Python user meets is in `package/yair/`;
+//! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to numpy.
 
 mod columns;
 
@@ -15,7 +15,8 @@ use yair::command::{self, Call, Watch};
 /// Time between two looks at Ctrl-C and at the progress. A command that ends is heard at once.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
-/// Stack of the thread that runs a command, bytes: that of a process' main thread on Linux, as the command has it.
+/// Stack of the thread that runs a command, bytes: that of a process' main thread on Linux, as the command
+/// has it.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Exit code, JSON document, remarks, message of the failure.

@@ -71,6 +71,15 @@ class Interrupter:
             os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.fixture
+def answers_ctrl_c():
+    """Python's own handler; a process in the background of a script begins without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("answers_ctrl_c")
 def test_ctrl_c_stops_a_sweep_that_goes_on_to_the_same_bits(scenarios, tmp_path):
     scenario, out = scenarios / "paper.toml", tmp_path / "sweep"
     press = Interrupter()
@@ -82,6 +91,16 @@ def test_ctrl_c_stops_a_sweep_that_goes_on_to_the_same_bits(scenarios, tmp_path)
         yair.sweep(scenario, trials=20_000, out=out)
     resumed = yair.sweep(scenario, trials=20_000, out=out, resume=True)
     assert resumed.json == yair.sweep(scenario, trials=20_000).json
+
+
+@pytest.mark.usefixtures("answers_ctrl_c")
+def test_ctrl_c_leaves_a_diagnosis_at_once(robot):
+    pressed = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+    pressed.start()
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            yair.diagnose(robot)
+    pressed.join()
 
 
 def test_other_threads_run_meanwhile(scenarios):

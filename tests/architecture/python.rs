@@ -21,7 +21,8 @@ fn versions(path: &str) -> BTreeMap<String, Vec<String>> {
     versions
 }
 
-/// The same numbers to the last bit need the same packages and the same profile; so does sharing what is built.
+/// The same numbers to the last bit need the same packages and the same profile; so does sharing what is
+/// built.
 #[test]
 fn python_is_built_of_the_packages_and_by_the_profiles_of_the_workspace() {
     let (ours, theirs) = (versions("Cargo.lock"), versions("python/Cargo.lock"));
