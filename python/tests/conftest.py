@@ -5,7 +5,6 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
 import yair
 
 ROOT = Path(__file__).resolve().parents[2]

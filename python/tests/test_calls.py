@@ -6,7 +6,6 @@ import threading
 
 import pandas as pd
 import pytest
-
 import yair
 
 

@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-
 import yair
 
 
@@ -43,7 +42,9 @@ def test_arrays_are_the_dataset_that_they_come_from(robot):
         pd.testing.assert_frame_equal(made.to_pandas(), odometry, check_exact=True)
         for run in made.runs:
             theirs = truth[truth["run"] == run]
-            assert all(np.array_equal(made.truth(run)[key], theirs[key], equal_nan=True) for key in theirs if key != "run")
+            assert all(
+                np.array_equal(made.truth(run)[key], theirs[key], equal_nan=True) for key in theirs if key != "run"
+            )
 
 
 def test_memory_and_folder_calibrate_to_the_same_bits(robot, tmp_path):

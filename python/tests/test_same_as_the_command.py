@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import pytest
-
 import yair
 
 
@@ -62,7 +61,9 @@ def test_sweep(command, scenarios, tmp_path):
 def test_check_and_plan(command, robot, scenarios):
     assert yair.check(robot).json == document(command, "check", robot)
     scenario = scenarios / "motion-capture.toml"
-    assert yair.plan(scenario, minutes=3, room=(4, 3)).json == document(command, "plan", scenario, "--minutes", "3", "--room", "4,3")
+    assert yair.plan(scenario, minutes=3, room=(4, 3)).json == document(
+        command, "plan", scenario, "--minutes", "3", "--room", "4,3"
+    )
 
 
 def test_correct_and_simulate(command, robot, scenarios, tmp_path):

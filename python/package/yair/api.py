@@ -202,9 +202,7 @@ def sweep(
     Ctrl-C stops it; with `out`, `resume=True` goes on. A shard ("2/4", or "auto" on a cluster) leaves its part
     in `out` for `merge` and returns None.
     """
-    flags = _options(
-        trials=trials, precision=precision, jobs=jobs, seed=seed, shard=shard, resume=resume, out=out
-    )
+    flags = _options(trials=trials, precision=precision, jobs=jobs, seed=seed, shard=shard, resume=resume, out=out)
     text, remarks = call(["sweep", scenario, *flags], progress)
     if text is None:
         return None

@@ -44,7 +44,7 @@ def call(
     shown = None if progress else _in_a_notebook()
     try:
         code, document, remarks, failure = _yair.call(
-            ["yair", *map(os.fspath, arguments)], progress or (shown.show if shown else None)
+            ["yair", *(os.fspath(argument) for argument in arguments)], progress or (shown.show if shown else None)
         )
     finally:
         if shown:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,7 +55,9 @@ def _refuse(row: int, name: str, value: object, expected: str) -> None:
 def _counts(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     wrong = np.flatnonzero(~(np.isfinite(values) & (values == np.round(values)) & (np.abs(values) <= LARGEST_EXACT)))
     if wrong.size:
-        _refuse(int(wrong[0]), name, values[wrong[0]], 'a cumulative count; angles and speeds are wheels="rad" and "mps"')
+        _refuse(
+            int(wrong[0]), name, values[wrong[0]], 'a cumulative count; angles and speeds are wheels="rad" and "mps"'
+        )
     return values
 
 
