@@ -28,6 +28,10 @@ accuracy:
 diagnosis:
     .ci/run diagnosis
 
+# The Python package: its wheel, and its tests against the command; needs Python with venv
+python:
+    .ci/run python
+
 # The library's documentation, warnings as errors
 doc:
     .ci/run doc

@@ -13,7 +13,7 @@ use kinematics::Wheels;
 use scenario::Scenario;
 use serde::Serialize;
 
-use crate::diagnose::write_diagnosis;
+use crate::diagnose_command::write_diagnosis;
 use crate::html_report::drift_percents;
 use crate::simulate::{refuse_filled, write_dataset, write_whole};
 use crate::terminal::{Failure, Terminal};

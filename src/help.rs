@@ -53,6 +53,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
                     "yair sweep scenarios/paper.toml",
                     "yair sweep scenarios/paper.toml --precision 2% --out results",
                     "yair sweep scenarios/paper.toml --shard 1/4 --out shard-1",
+                    "yair sweep scenarios/paper.toml --shard auto --resume --out shard-1",
                 ],
             ),
             ("merge", &["yair merge shard-1 shard-2 --out results"]),
@@ -128,7 +129,7 @@ mod tests {
     use clap::CommandFactory as _;
 
     use super::*;
-    use crate::Cli;
+    use crate::command::Cli;
 
     #[test]
     fn every_subcommand_stands_in_one_group_with_examples_that_parse() {

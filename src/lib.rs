@@ -3,7 +3,8 @@
 //! The rooms are crates of their own, named here as a user meets them: [`kinematics`] (poses, drive, dead
 //! reckoning), [`dataset`] (measured runs, their files and importers, protocols), [`effects`] (what makes
 //! odometry deviate), [`scenario`] (experiments as TOML), [`sim_yair`] (the robot), [`calib`] (the methods)
-//! [`bench`](mod@bench) (Monte Carlo) and [`report`] (pictures).
+//! [`bench`](mod@bench) (Monte Carlo) and [`report`] (pictures). [`command`] is the whole command, for
+//! programs that call it without a process of its own, as the Python package does.
 //!
 //! ```
 //! let text = include_str!("../scenarios/paper.toml");
@@ -33,6 +34,45 @@ pub use report;
 pub use ros_bag;
 pub use scenario;
 pub use sim_yair;
+
+pub mod command;
+
+mod calibrate;
+mod calibration_file;
+mod challenge;
+mod check;
+mod command_line;
+mod compare;
+mod correct;
+mod demo;
+mod diagnosis_page;
+mod evaluate;
+mod export_drift;
+mod export_mcap;
+mod help;
+mod html_report;
+mod import;
+mod import_csv;
+mod import_robot;
+mod import_ros2;
+mod import_tum;
+mod manual;
+mod merge;
+mod plan;
+mod reproduce;
+mod shard;
+mod simulate;
+mod sparse_lines;
+mod sweep;
+mod sweep_summary;
+mod sweep_table;
+mod terminal;
+mod watch;
+// Under other names than their files': the rooms `diagnose` and `export` are named here too.
+#[path = "diagnose.rs"]
+mod diagnose_command;
+#[path = "export.rs"]
+mod export_command;
 
 #[cfg(doctest)]
 mod readmes;

@@ -8,7 +8,7 @@ use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
-use crate::diagnose::shown_on;
+use crate::diagnose_command::shown_on;
 use crate::html_report::write_plan;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, advance, read_datasets, table};

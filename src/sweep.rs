@@ -1,19 +1,18 @@
-//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N] [--resume] [--rows] [--out DIR]
-//! [--summary] [--check BASELINE [--update]]`
+//! `yair sweep SCENARIO [--trials N] [--precision P] [--jobs J] [--shard I/N|auto] [--resume] [--rows]
+//! [--out DIR] [--summary] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, FolderLock, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::html_report::write_sweep;
-use crate::terminal::{Failure, Terminal, table};
+use crate::shard::{ShardChoice, from_environment};
+use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
 /// Monte-Carlo: bias, spread, coverage and efficiency of every method over a scenario's design.
@@ -33,9 +32,10 @@ pub(crate) struct Arguments {
     /// Seed of every random draw, in place of the scenario's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Run part I of N only; `yair merge` puts the parts together.
-    #[arg(long, value_name = "I/N", requires = "out")]
-    shard: Option<Shard>,
+    /// Run part I of N only; `yair merge` puts the parts together. auto: the part that YAIR_SHARD, a Slurm
+    /// array, or an indexed Job of Kubernetes with YAIR_SHARDS names.
+    #[arg(long, value_name = "I/N|auto", requires = "out")]
+    shard: Option<ShardChoice>,
     /// Go on with the interrupted sweep in the folder of --out.
     #[arg(long, requires = "out")]
     resume: bool,
@@ -66,9 +66,6 @@ const MAX_TRIALS: u64 = 100_000_000;
 /// Exit code when accuracy has moved, as of `yair evaluate --max-drift`.
 const MOVED: u8 = 3;
 
-/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
-const INTERRUPTED: u8 = 130;
-
 /// A sweep's document with what a check adds.
 #[derive(Serialize)]
 struct Document<'a> {
@@ -97,26 +94,24 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Some(path) if !arguments.update || path.exists() => Some(bench::read_baseline(path)?),
         _ => None,
     };
-    if let Some(out) = &arguments.out {
-        bench::can_be_written(out, arguments.rows)?;
-    }
-    let stop = Arc::new(AtomicBool::new(false));
-    if arguments.out.is_some() {
-        // A second Ctrl-C ends at once.
-        let flag = Arc::clone(&stop);
-        let _ = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED.into());
-            }
-        });
-    }
+    let shard = shard(arguments, terminal)?;
+    // Until the results stand.
+    let _lock = match &arguments.out {
+        Some(out) => {
+            bench::can_be_written(out, arguments.rows)?;
+            Some(locked(out, terminal)?)
+        }
+        None => None,
+    };
+    // Without a folder there is nothing to go on with: Ctrl-C ends at once.
+    let stop = terminal.stop_flag(arguments.out.is_some());
     let bar = terminal.progress(0, "trials");
     let started = Instant::now();
     let outcome = plan.campaign(&Campaign {
         jobs: arguments.jobs.into(),
         folder: arguments.out.as_deref(),
         resume: arguments.resume,
-        shard: arguments.shard.unwrap_or(Shard::WHOLE),
+        shard,
         rows: arguments.rows,
         stop: &stop,
         progress: &|progress| {
@@ -129,14 +124,12 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let out = arguments.out.as_deref();
     match outcome {
         Outcome::Stopped(progress) => {
-            terminal.remark(&format!(
-                "stopped after {} of {} trials; the same command with --resume goes on",
-                progress.done, progress.planned
-            ));
+            let goes_on = if out.is_some() { "; the same command with --resume goes on" } else { "" };
+            terminal.remark(&format!("stopped after {} of {} trials{goes_on}", progress.done, progress.planned));
             Ok(ExitCode::from(INTERRUPTED))
         }
         Outcome::Shard => {
-            let (shard, out) = (arguments.shard.unwrap_or(Shard::WHOLE), out.unwrap_or(Path::new(".")));
+            let out = out.unwrap_or(Path::new("."));
             terminal.remark(&format!(
                 "shard {shard} stands in {} after {elapsed_s:.1} s; yair merge puts the shards together",
                 out.display()
@@ -162,6 +155,32 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             conclude(arguments, terminal, &result, check)
         }
     }
+}
+
+/// The part that is asked for.
+fn shard(arguments: &Arguments, terminal: &Terminal) -> Result<Shard, Failure> {
+    match arguments.shard {
+        None => Ok(Shard::WHOLE),
+        Some(ShardChoice::Given(shard)) => Ok(shard),
+        Some(ShardChoice::Auto) => {
+            let (shard, by) =
+                from_environment(|name| std::env::var(name).ok()).map_err(|why| format!("--shard auto: {why}"))?;
+            terminal.remark(&format!("shard {shard}, by {by}"));
+            Ok(shard)
+        }
+    }
+}
+
+/// The folder for this process alone.
+fn locked(out: &Path, terminal: &Terminal) -> Result<FolderLock, Failure> {
+    let lock = FolderLock::take(out)?;
+    if let Some(why) = lock.why_not_held() {
+        terminal.remark(&format!(
+            "warning: {}: it cannot be locked ({why}); see to it that no other process writes there",
+            out.display()
+        ));
+    }
+    Ok(lock)
 }
 
 /// Says what the comparison with the baseline gave, and writes the baseline anew where that is asked for.

@@ -5,6 +5,8 @@ use std::error::Error;
 use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anstyle::{AnsiColor, Effects, Style};
@@ -14,14 +16,34 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 use serde::Serialize;
 
 use crate::sparse_lines::SparseLines;
+use crate::watch::Watch;
 
 /// Why a subcommand failed: one line for the user.
 pub(crate) type Failure = Box<dyn Error>;
 
-/// The terminal as the user's flags ask for it.
+/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
+pub(crate) const INTERRUPTED: u8 = 130;
+
+/// The terminal as the user's flags ask for it, or what a calling program is told in its place.
 pub(crate) struct Terminal {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
+    transcript: Option<Transcript>,
+}
+
+/// What is kept for a calling program.
+struct Transcript {
+    watch: Arc<Watch>,
+    printed: Mutex<Printed>,
+}
+
+/// Document, remarks, failure.
+type Printed = (Option<String>, Vec<String>, Option<String>);
+
+impl Transcript {
+    fn printed(&self) -> MutexGuard<'_, Printed> {
+        self.printed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A line above, below and under the header, and none between rows.
@@ -35,7 +57,37 @@ const TABLE_WIDTH: u16 = 100;
 
 impl Terminal {
     pub(crate) const fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet }
+        Self { json, quiet, transcript: None }
+    }
+
+    /// Nothing is printed: [`Self::into_transcript`] has it.
+    pub(crate) fn transcript(watch: Arc<Watch>) -> Self {
+        Self { json: true, quiet: false, transcript: Some(Transcript { watch, printed: Mutex::default() }) }
+    }
+
+    /// The document, the remarks and the failure that were kept.
+    pub(crate) fn into_transcript(self) -> Printed {
+        self.transcript
+            .map(|transcript| transcript.printed.into_inner().unwrap_or_else(PoisonError::into_inner))
+            .unwrap_or_default()
+    }
+
+    /// Set when the command is to stop: by a calling program, or by Ctrl-C where `on_ctrl_c`. A second Ctrl-C
+    /// ends at once.
+    pub(crate) fn stop_flag(&self, on_ctrl_c: bool) -> Arc<AtomicBool> {
+        if let Some(transcript) = &self.transcript {
+            return transcript.watch.stop_flag();
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        if on_ctrl_c {
+            let flag = Arc::clone(&stop);
+            let _ = ctrlc::set_handler(move || {
+                if flag.swap(true, Ordering::Relaxed) {
+                    std::process::exit(INTERRUPTED.into());
+                }
+            });
+        }
+        stop
     }
 
     /// A result for people; not printed beside JSON.
@@ -49,14 +101,20 @@ impl Terminal {
     /// The one JSON document, when it is asked for.
     pub(crate) fn document(&self, document: &impl Serialize) -> Result<(), Failure> {
         if self.json {
-            writeln_to_stdout(&serde_json::to_string_pretty(document)?)?;
+            let text = serde_json::to_string_pretty(document)?;
+            match &self.transcript {
+                Some(transcript) => transcript.printed().0 = Some(text),
+                None => writeln_to_stdout(&text)?,
+            }
         }
         Ok(())
     }
 
     /// A remark on standard error; where somebody watches, the word that says how grave it is has a colour.
     pub(crate) fn remark(&self, text: &str) {
-        if !self.quiet {
+        if let Some(transcript) = &self.transcript {
+            transcript.printed().1.push(text.to_owned());
+        } else if !self.quiet {
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
                 Some(("warning", rest)) => format!("{WARNING}warning{WARNING:#}: {rest}"),
@@ -69,14 +127,18 @@ impl Terminal {
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
         let message = in_plain_words(&message.replace('\n', "; "));
+        if let Some(transcript) = &self.transcript {
+            transcript.printed().2 = Some(message);
+            return;
+        }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
     }
 
     /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and
     /// then; nothing when quiet.
     pub(crate) fn progress(&self, total: u64, what: &str) -> ProgressBar {
-        if self.quiet {
-            return ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        if let Some(hidden) = self.hidden_progress(total, what) {
+            return hidden;
         }
         let template = if std::io::stderr().is_terminal() {
             "{msg} {wide_bar} {human_pos}/{human_len}, {left}"
@@ -86,11 +148,23 @@ impl Terminal {
         bar(total, template).with_message(what.to_owned())
     }
 
+    /// Progress that nobody sees here: when quiet, or where another program follows it.
+    fn hidden_progress(&self, total: u64, what: &str) -> Option<ProgressBar> {
+        (self.quiet || self.transcript.is_some()).then(|| {
+            let hidden = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+            let hidden = hidden.with_message(what.to_owned());
+            if let Some(transcript) = &self.transcript {
+                transcript.watch.follow(&hidden);
+            }
+            hidden
+        })
+    }
+
     /// Progress of a few stages that take long each: what is done now, how much of the whole is done, and the
     /// time left. [`advance`] says so.
     pub(crate) fn stages(&self, what: &'static str) -> ProgressBar {
-        if self.quiet {
-            return ProgressBar::hidden();
+        if let Some(hidden) = self.hidden_progress(PARTS, what) {
+            return hidden;
         }
         let template = if std::io::stderr().is_terminal() {
             "{prefix} {wide_bar} {percent} %, {left}: {msg}"

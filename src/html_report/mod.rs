@@ -22,6 +22,7 @@ use std::path::Path;
 use dataset::Dataset;
 use report_page::{MadeBy, Report};
 
+use crate::command_line;
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
 
@@ -54,7 +55,7 @@ fn made_by(datasets: Vec<String>) -> MadeBy {
             format!("'{}'", argument.replace('\'', "'\\''"))
         }
     };
-    let arguments = std::env::args_os().skip(1).map(|argument| quoted(argument.to_string_lossy().into_owned()));
+    let arguments = command_line::typed().into_iter().map(quoted);
     let command_line = std::iter::once("yair".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ");
     MadeBy { version: env!("CARGO_PKG_VERSION").to_owned(), command_line, datasets }
 }

@@ -13,6 +13,7 @@ mod examples;
 mod file_graph;
 mod files;
 mod packages;
+mod python;
 mod settings;
 #[path = "../support/mod.rs"]
 mod support;

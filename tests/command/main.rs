@@ -4,6 +4,7 @@
 mod accuracy_gate;
 mod bad_input;
 mod bad_logs;
+mod cluster;
 mod compare;
 mod contract;
 mod correct;

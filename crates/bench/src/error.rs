@@ -55,6 +55,12 @@ pub enum BenchError {
          cargo install --path . --locked --features parquet"
     )]
     NoParquet,
+    /// Another process works in the folder.
+    #[error("{path}: another process is running a sweep there; wait for it, or give another folder with --out")]
+    InUse {
+        /// The folder.
+        path: String,
+    },
     /// The folder holds an unfinished campaign that nobody asked to go on with.
     #[error("{path}: an unfinished sweep stands there; go on with --resume, or remove that file")]
     Unfinished {

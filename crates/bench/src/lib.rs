@@ -17,8 +17,8 @@ pub use bound::{FisherInformation, LinearizedInnovation, NoBound};
 pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{
-    AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, EstimatorResult, FALSE_ALARM_BUDGET, Merged,
-    MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan, SweepResult, TRACKED,
+    AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, EstimatorResult, FALSE_ALARM_BUDGET, FolderLock,
+    Merged, MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan, SweepResult, TRACKED,
     can_be_written, compare, merge, read_baseline, write_merged, write_results,
 };
 pub use trial::Trial;

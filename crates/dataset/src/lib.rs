@@ -40,4 +40,4 @@ pub use session::{RunView, Session};
 pub use standstills::moving_pieces;
 pub use unit::Unit;
 pub use warning::Warning;
-pub use write::{Existing, Writer, write};
+pub use write::{Existing, Writer, check_writable, write};

@@ -3,6 +3,7 @@
 mod accuracy;
 mod campaign;
 mod dyadic;
+mod lock;
 mod merge;
 mod page;
 mod plan;
@@ -18,6 +19,7 @@ mod validation;
 
 pub use accuracy::{AccuracyCheck, Comparison, FALSE_ALARM_BUDGET, compare, read_baseline};
 pub use campaign::{Campaign, Outcome, Progress};
+pub use lock::FolderLock;
 pub use merge::{Merged, merge};
 pub use plan::{SweepOptions, SweepPlan, TRACKED};
 pub use result::{Coverage, DriftResult, EstimatorResult, MethodCost, PointResult, Quantile, SweepResult};

@@ -51,6 +51,14 @@ pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), Da
     writer.finish()
 }
 
+/// Could a dataset be written and read back? [`write()`] asks the same before anything is made.
+///
+/// # Errors
+/// [`DatasetError::RunNotWritable`] and [`DatasetError::NotWritable`], as of [`write()`].
+pub fn check_writable(dataset: &Dataset) -> Result<(), DatasetError> {
+    check::check(dataset)
+}
+
 /// Writes a dataset a run at a time, into a temporary sibling until all is there. Dropped before
 /// [`Self::finish`] it leaves nothing.
 #[derive(Debug)]

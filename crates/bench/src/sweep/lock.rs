@@ -1,0 +1,139 @@
+//! A campaign's folder belongs to one process at a time.
+//!
+//! Two that write into one folder would each replace the state of the other, and both would end well. The
+//! lock is the operating system's, on a file in the folder: a process that is killed leaves the file and
+//! loses the lock.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::error::BenchError;
+
+/// The file that is locked.
+const LOCK_FILE: &str = "sweep.lock";
+
+/// Times that the file is opened anew because another process took it away as it ended.
+const MAX_TURNS: usize = 16;
+
+/// The right to write into a folder, until it is dropped.
+#[derive(Debug)]
+pub struct FolderLock {
+    file: Option<File>,
+    path: PathBuf,
+    why_not_held: Option<String>,
+}
+
+impl FolderLock {
+    /// Takes a folder, which is made where it is not there.
+    ///
+    /// # Errors
+    /// [`BenchError::InUse`] when another process has it, [`BenchError::Write`] when the folder cannot be
+    /// written. A file system without locks is no error: [`Self::why_not_held`] tells.
+    pub fn take(folder: &Path) -> Result<Self, BenchError> {
+        let path = folder.join(LOCK_FILE);
+        let unwritable = |error: io::Error| BenchError::Write {
+            path: folder.display().to_string(),
+            why: format!("cannot write results there: {}", error.kind()),
+        };
+        let in_use = || BenchError::InUse { path: folder.display().to_string() };
+        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        for _ in 0..MAX_TURNS {
+            let file = opened(&path).map_err(unwritable)?;
+            match file.try_lock() {
+                Ok(()) if !is_still_at(&file, &path) => {}
+                Ok(()) => {
+                    let why_not_held = why_not_held(&path);
+                    return Ok(Self { file: Some(file), path, why_not_held });
+                }
+                Err(TryLockError::WouldBlock) => return Err(in_use()),
+                Err(TryLockError::Error(error)) => {
+                    return Ok(Self { file: Some(file), path, why_not_held: Some(error.to_string()) });
+                }
+            }
+        }
+        Err(in_use())
+    }
+
+    /// Why the lock keeps nobody out, where it does not: some network file systems know no locks.
+    #[must_use]
+    pub fn why_not_held(&self) -> Option<&str> {
+        self.why_not_held.as_deref()
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // While the lock is still held: who opened this file before sees that it is gone. Elsewhere than on
+        // Unix nobody could see it, and the file stays.
+        if cfg!(unix) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+        drop(self.file.take());
+    }
+}
+
+fn opened(path: &Path) -> io::Result<File> {
+    // For writing, as network file systems ask of who locks.
+    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
+}
+
+/// A lock that a second handle of the same file gets too keeps nobody out.
+fn why_not_held(path: &Path) -> Option<String> {
+    let second = opened(path).and_then(|second| match second.try_lock() {
+        Err(TryLockError::WouldBlock) => Ok(()),
+        Ok(()) => Err(io::Error::other("a second lock of the same file is granted")),
+        Err(TryLockError::Error(error)) => Err(error),
+    });
+    second.err().map(|error| error.to_string())
+}
+
+/// Whether the file at the path is the one that was opened.
+#[cfg(unix)]
+fn is_still_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    match (file.metadata(), std::fs::metadata(path)) {
+        (Ok(ours), Ok(there)) => id(ours) == id(there),
+        _ => false,
+    }
+}
+
+/// Nobody takes the file away.
+#[cfg(not(unix))]
+fn is_still_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_has_one_owner_and_is_clean_afterwards() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let folder = temporary.path().join("new");
+        let first = FolderLock::take(&folder).expect("nobody has it");
+        assert_eq!(first.why_not_held(), None);
+        let refused = FolderLock::take(&folder).expect_err("the first has it");
+        assert!(matches!(refused, BenchError::InUse { .. }), "{refused}");
+        drop(first);
+        assert!(!cfg!(unix) || std::fs::read_dir(&folder).expect("there").next().is_none());
+        // What a killed process leaves is no lock.
+        std::fs::write(folder.join(LOCK_FILE), "").expect("written");
+        drop(FolderLock::take(&folder).expect("nobody has it"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_on_a_file_that_was_taken_away_is_none() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let path = temporary.path().join(LOCK_FILE);
+        let before = opened(&path).expect("made");
+        assert!(is_still_at(&before, &path));
+        std::fs::remove_file(&path).expect("there");
+        assert!(!is_still_at(&before, &path));
+        let after = opened(&path).expect("made");
+        assert!(!is_still_at(&before, &path) && is_still_at(&after, &path));
+    }
+}

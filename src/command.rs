@@ -1,0 +1,157 @@
+//! The whole command: its grammar, and what runs it as a process or inside of another program.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use yair::command::{Watch, call};
+//! let call = call(["yair", "check", "no-such-folder"], &Arc::new(Watch::default()));
+//! assert_eq!(call.exit_code, 1);
+//! assert!(call.failure.is_some_and(|message| message.contains("no-such-folder")));
+//! ```
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use crate::terminal::Terminal;
+use crate::{
+    calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
+    help, import, manual, merge, plan, reproduce, simulate, sweep,
+};
+
+pub use crate::watch::{Progress, Watch};
+
+/// Odometry of differential-drive robots: simulate, calibrate, evaluate, bench.
+#[derive(Parser)]
+#[command(name = "yair", version, about, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Print one JSON document on standard output and nothing else there.
+    #[arg(long, global = true)]
+    json: bool,
+    /// No progress and no remarks.
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Arguments),
+    Simulate(simulate::Arguments),
+    Import(import::Arguments),
+    Check(check::Arguments),
+    Calibrate(calibrate::Arguments),
+    Diagnose(diagnose_command::Arguments),
+    Challenge(challenge::Arguments),
+    Evaluate(evaluate::Arguments),
+    Compare(compare::Arguments),
+    Correct(correct::Arguments),
+    Export(export_command::Arguments),
+    Sweep(sweep::Arguments),
+    Merge(merge::Arguments),
+    Plan(plan::Arguments),
+    Reproduce(reproduce::Arguments),
+    Completions(manual::Completions),
+    Man(manual::Man),
+}
+
+/// Exit code of bad usage, as of `clap`.
+const USAGE: u8 = 2;
+
+/// What a [`call`] gave: what the process would have printed, apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Call {
+    /// 0 success, 1 bad input or failure, 2 bad usage, 3 beyond a limit that was set, 130 interrupted.
+    pub exit_code: u8,
+    /// The JSON document, byte by byte as `--json` prints it.
+    pub document: Option<String>,
+    /// Warnings and remarks, in order.
+    pub remarks: Vec<String>,
+    /// The message of a failure.
+    pub failure: Option<String>,
+}
+
+/// Runs the command as a process does, which prints and answers Ctrl-C, and returns its exit code. The first
+/// argument is the program's name.
+pub fn main(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let cli = match parsed(&arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // As `clap` itself does: a reader that has gone away is no failure.
+            let _ = error.print();
+            return if error.use_stderr() { USAGE } else { 0 };
+        }
+    };
+    let terminal = Terminal::new(cli.json, cli.quiet);
+    run(&cli, &arguments, &terminal)
+}
+
+/// Runs the command inside of another program, with `--json`: nothing is printed, and no signal is handled.
+/// The first argument is the program's name. Another thread may look at `watch` and stop what can be stopped.
+pub fn call(arguments: impl IntoIterator<Item = impl Into<OsString>>, watch: &Arc<Watch>) -> Call {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let cli = match parsed(&arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let text = error.render().to_string();
+            let (exit_code, failure) = (if error.use_stderr() { USAGE } else { 0 }, Some(text.trim_end().to_owned()));
+            return Call { exit_code, document: None, remarks: Vec::new(), failure };
+        }
+    };
+    let terminal = Terminal::transcript(Arc::clone(watch));
+    let exit_code = run(&cli, &arguments, &terminal);
+    let (document, remarks, failure) = terminal.into_transcript();
+    Call { exit_code, document, remarks, failure }
+}
+
+fn grammar() -> clap::Command {
+    help::with_groups_and_examples(Cli::command())
+}
+
+fn parsed(arguments: &[OsString]) -> Result<Cli, clap::Error> {
+    let mut grammar = grammar();
+    let matches = grammar.try_get_matches_from_mut(arguments)?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut grammar))
+}
+
+fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
+    command_line::keep(arguments);
+    let Some(command) = &cli.command else {
+        terminal.remark(help::first_steps());
+        return USAGE;
+    };
+    let outcome = match command {
+        Command::Demo(arguments) => demo::run(arguments, terminal),
+        Command::Simulate(arguments) => simulate::run(arguments, terminal),
+        Command::Import(arguments) => import::run(arguments, terminal),
+        Command::Check(arguments) => check::run(arguments, terminal),
+        Command::Calibrate(arguments) => calibrate::run(arguments, terminal),
+        Command::Diagnose(arguments) => diagnose_command::run(arguments, terminal),
+        Command::Challenge(arguments) => challenge::run(arguments, terminal),
+        Command::Evaluate(arguments) => evaluate::run(arguments, terminal),
+        Command::Compare(arguments) => compare::run(arguments, terminal),
+        Command::Correct(arguments) => correct::run(arguments, terminal),
+        Command::Export(arguments) => export_command::run(arguments, terminal),
+        Command::Sweep(arguments) => sweep::run(arguments, terminal),
+        Command::Merge(arguments) => merge::run(arguments, terminal),
+        Command::Plan(arguments) => plan::run(arguments, terminal),
+        Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+        Command::Completions(arguments) => manual::completions(arguments, grammar()),
+        Command::Man(arguments) => manual::man(arguments, grammar(), terminal),
+    };
+    match outcome {
+        Ok(code) => number(code),
+        Err(failure) => {
+            terminal.failure(&failure.to_string());
+            1
+        }
+    }
+}
+
+/// An exit code as a number, which the standard library tells by comparison alone.
+fn number(code: ExitCode) -> u8 {
+    (0..=u8::MAX).find(|number| ExitCode::from(*number) == code).unwrap_or(1)
+}
