@@ -37,9 +37,12 @@ impl<'a> Decimated<'a> {
         };
         let selections = selections
             .iter()
-            .map(|of| Selection { propagations: of.propagations.iter().zip(&ends).map(of_segment).collect() })
+            .map(|of| Selection {
+                propagations: of.propagations.iter().zip(&ends).map(of_segment).collect(),
+                partial: of.partial.clone(),
+            })
             .collect();
-        let records = Records { segments, unused: records.unused.clone(), ids: records.ids.clone() };
+        let records = Records { segments, ..records.clone() };
         Some(Self { records, selections })
     }
 }

@@ -33,6 +33,8 @@ mod normal_equations;
 mod nuisances;
 mod one_step;
 mod optimizer;
+mod partial_filter;
+mod partial_records;
 mod pass;
 mod pass_options;
 mod path_shape;

@@ -133,7 +133,7 @@ pub(crate) fn fit_from(
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
 ) -> Result<Solution, EstimationError> {
-    if selections.iter().all(|selection| selection.propagations.iter().all(Vec::is_empty)) {
+    if selections.iter().all(Selection::is_empty) {
         return Err(EstimationError::NoMeasurements);
     }
     let mut model = from.model;

@@ -10,6 +10,7 @@ use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
+use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::settings::{
     AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S,
 };
@@ -176,6 +177,10 @@ impl Segment<'_> {
 pub struct Records<'a> {
     /// The segments in the order of sessions, runs and time.
     pub segments: Vec<Segment<'a>>,
+    /// Partial measurements of runs without poses, in the order of sessions, runs and time.
+    pub(crate) partial: Vec<PartialSegment<'a>>,
+    /// Standard deviation of the gyroscope's relative scale, where it is stated.
+    pub(crate) gyro_scale_sigma: Option<f64>,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
@@ -193,12 +198,16 @@ impl<'a> Records<'a> {
 
     /// The same relative to given standard deviations of position, metres, and heading, radians.
     pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
-        let mut records = Self { segments: Vec::new(), unused: Vec::new(), ids: Vec::new() };
+        let mut records = Self::nothing();
+        records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
+        let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
+            let gyro = GyroSettings::of(session);
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             for (position, run) in session.runs.iter().enumerate() {
                 let before = records.segments.len();
+                let mut has_partial = false;
                 if let Some(track) = WheelAngleInterpolator::of(run, session.robot) {
                     let base = Segment {
                         run: (number, position),
@@ -213,9 +222,14 @@ impl<'a> Records<'a> {
                     };
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
+                    if let Some(nominal) = nominal.as_ref().filter(|_| records.segments.len() == before) {
+                        let partial = partial_segments(run, &base, &track, nominal, &gyro);
+                        has_partial = !partial.is_empty();
+                        records.partial.extend(partial);
+                    }
                     session_m += track.distance_m(session.robot);
                 }
-                if records.segments.len() == before {
+                if records.segments.len() == before && !has_partial {
                     records.unused.push((number, position));
                 }
             }
@@ -223,9 +237,39 @@ impl<'a> Records<'a> {
         records
     }
 
+    /// Of no run.
+    pub(crate) fn nothing() -> Self {
+        Self { segments: Vec::new(), partial: Vec::new(), gyro_scale_sigma: None, unused: Vec::new(), ids: Vec::new() }
+    }
+
+    /// Does a gyroscope measure in some run?
+    #[must_use]
+    pub fn has_gyro(&self) -> bool {
+        self.partial.iter().any(PartialSegment::has_gyro)
+    }
+
+    /// Is the scale of the gyroscope stated?
+    #[must_use]
+    pub const fn is_gyro_scale_stated(&self) -> bool {
+        self.gyro_scale_sigma.is_some()
+    }
+
+    /// Has some run no more than partial measurements?
+    #[must_use]
+    pub const fn has_partial(&self) -> bool {
+        !self.partial.is_empty()
+    }
+
+    /// Are partial measurements all that there is?
+    #[must_use]
+    pub const fn is_partial(&self) -> bool {
+        self.segments.is_empty() && self.has_partial()
+    }
+
     /// The records of a part of a run, under the indices of that run.
     pub(crate) fn belonging_to(mut self, run: (usize, usize)) -> Self {
         self.segments.iter_mut().for_each(|segment| segment.run = run);
+        self.partial.iter_mut().for_each(|partial| partial.segment.run = run);
         self
     }
 
@@ -239,7 +283,8 @@ impl<'a> Records<'a> {
     /// How many measurements there are.
     #[must_use]
     pub fn measurements(&self) -> usize {
-        self.segments.iter().map(|segment| segment.measurements.len()).sum()
+        let partial: usize = self.partial.iter().map(|of| of.observations.len()).sum();
+        partial + self.segments.iter().map(|segment| segment.measurements.len()).sum::<usize>()
     }
 
     /// Mean distance that a wheel rolls between measurements, metres, by a model.

@@ -460,3 +460,49 @@ pub(crate) const ONE_STEP_TOLERANCE: f64 = 0.05;
 /// Most scoring steps over everything.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_SCORING_STEPS: usize = 5;
+
+/// Length of the part of a direction that must lie in the unobservable space for it to be named after it, and
+/// of what must be left of it beside those named before.
+/// Convention: within 8° of the space, and more than 18° off the others.
+pub(crate) const MIN_NAMED_DIRECTION: f64 = 0.99;
+/// See [`MIN_NAMED_DIRECTION`].
+pub(crate) const MIN_OWN_DIRECTION: f64 = 0.3;
+
+// Partial measurements: gyroscopes, tape measures and walls.
+
+/// Longest stretch over which a gyroscope's rates are summed into one turn, seconds. Its noise is white, so
+/// that the sum loses nothing but changes of speed within it.
+/// Budgeted: shorter than a robot's motions, which last for seconds.
+pub(crate) const GYRO_WINDOW_S: f64 = 1.0;
+
+/// Standard deviation of a gyroscope's bias at the start of a run, rad/s.
+/// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there are.
+pub(crate) const GYRO_BIAS_SIGMA_RADPS: f64 = 10.0;
+
+/// Random walk of a gyroscope's bias that nothing is stated of, rad/s per √s.
+/// Convention: a bias that strays by 0.01 °/s in a minute, as those of consumer sensors do.
+pub(crate) const BIAS_WALK_RADPS: f64 = 2e-5;
+
+/// Least angle random walk of a gyroscope, rad/√s, where it is taken from the log.
+/// Convention: a hundredth of a tactical gyroscope's; a log of constant rates has none.
+pub(crate) const MIN_GYRO_NOISE_RAD_PER_SQRT_S: f64 = 1e-7;
+
+/// Pairs of rows at standstill from which the noise of a gyroscope is taken.
+/// Budgeted: its standard deviation is then known to 1/√(2·50), a tenth.
+pub(crate) const MIN_STANDING_PAIRS: usize = 50;
+
+/// Standard deviations of a wall's direction, radians, and offset, metres, before it is seen.
+/// Budgeted: all directions, and rooms of any size.
+pub(crate) const WALL_DIRECTION_SIGMA_RAD: f64 = 10.0;
+/// See [`WALL_DIRECTION_SIGMA_RAD`].
+pub(crate) const WALL_OFFSET_SIGMA_M: f64 = 1000.0;
+
+/// Directions from which a wall is sought that only distances speak of, and steps from each.
+/// Budgeted: 15° apart, within the basin of the nearest, and Gauss–Newton steps to 1e-6 of it.
+pub(crate) const WALL_START_DIRECTIONS: u32 = 24;
+/// See [`WALL_START_DIRECTIONS`].
+pub(crate) const WALL_START_STEPS: usize = 10;
+
+/// Distance below which the direction between two places is not known, metres.
+/// Budgeted: far below what a tape measure shows.
+pub(crate) const MIN_DISTANCE_M: f64 = 1e-6;

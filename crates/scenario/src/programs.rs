@@ -1,10 +1,10 @@
 //! What a scenario drives, fitted to its budget, and what that costs.
 
-use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
+use motion_programs::{Cost, DriveLimits, Motion, MotionProgram, Schedule};
 
 use crate::budget::cost;
 use crate::error::NoFit;
-use crate::experiment::Scenario;
+use crate::experiment::{Instrument, Scenario};
 
 impl Scenario {
     /// Everything that is driven, in order: the scenario's own protocols, fitted when there is a budget.
@@ -38,7 +38,15 @@ impl Scenario {
             Some(budget) => budget.fit(protocols, &self.drive_limits())?,
             None => protocols.to_vec(),
         };
-        Ok(fitted.iter().flat_map(Schedule::programs).collect())
+        let mut programs: Vec<MotionProgram> = fitted.iter().flat_map(Schedule::programs).collect();
+        let still_s = self.instruments.iter().find_map(|instrument| match *instrument {
+            Instrument::Gyro { still_s, .. } if still_s > 0.0 => Some(still_s),
+            _ => None,
+        });
+        if let Some(duration_s) = still_s {
+            programs.iter_mut().for_each(|program| program.motions.insert(0, Motion::Pause { duration_s }));
+        }
+        Ok(programs)
     }
 
     /// How fast the robot drives, and what a person needs for each run.

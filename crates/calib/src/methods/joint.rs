@@ -12,12 +12,15 @@
 //! Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
-use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, fit_large};
+use estimation::{
+    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, Records, fit_large,
+};
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
+use crate::settings::MIN_NAMED_COMPONENT;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
     Rejected,
@@ -77,7 +80,7 @@ impl Method for Joint {
     }
 
     fn about(&self) -> &'static str {
-        "any path and any truth (poses, positions, ends, displacements, marks): maximum likelihood of whole runs, noise estimated"
+        "any path and any truth (poses, positions, ends, displacements, marks, gyro, tape, walls): maximum likelihood of whole runs, noise estimated"
     }
 
     /// The paper's runs, with squares for what only shows in corners.
@@ -158,10 +161,32 @@ fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
     fit.unobservable
         .iter()
         .map(|direction| {
-            let (parameter, why) = unobservable(&Vector3::new(direction[0], direction[1], direction[2]));
-            NotObservable { parameter, why }
+            let direction = Vector3::new(direction[0], direction[1], direction[2]);
+            let (parameter, why) = unobservable(&direction);
+            NotObservable { parameter, why: why_not(&fit.records, &direction).unwrap_or(why) }
         })
         .collect()
+}
+
+/// Why a direction is not observable where partial measurements are all there is.
+fn why_not(records: &Records<'_>, direction: &Vector3<f64>) -> Option<&'static str> {
+    if !records.is_partial() {
+        return None;
+    }
+    let of = direction.normalize();
+    let ratio = (of.x - of.y).abs() * std::f64::consts::FRAC_1_SQRT_2;
+    Some(if of.z.abs() > MIN_NAMED_COMPONENT && records.has_gyro() {
+        "the gyro's scale is not known, so that only the ratio of the wheels is: state scale_sigma under [gyro] of \
+         dataset.toml, or come back to the same heading after whole turns (revisit.csv)"
+    } else if of.z.abs() > MIN_NAMED_COMPONENT {
+        "nothing measures a turn: come back to the same heading after whole turns (revisit.csv), or log a gyro"
+    } else if ratio > MIN_NAMED_COMPONENT && records.has_gyro() {
+        "the gyro's bias is not told from the wheels' ratio: stand still for 10 s in every run, or drive at two speeds"
+    } else if ratio > MIN_NAMED_COMPONENT {
+        "nothing measures how straights bend: log a gyro, or headings along a wall (wall.csv)"
+    } else {
+        "nothing measures a length: measure a straight by tape (distance.csv), or distances from a wall (wall.csv)"
+    })
 }
 
 /// Runs without use and runs of which no measurement fitted.

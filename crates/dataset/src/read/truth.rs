@@ -1,10 +1,12 @@
-//! The four tables of an outside instrument: poses, displacements, marked points and wheel speeds.
+//! The tables of an outside instrument: poses, displacements, marked points and wheel speeds, and the list of
+//! all tables that measure something of the robot.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use kinematics::{Point, Wheels};
 
+use super::partial::{DISTANCE, DistanceColumns, REVISIT, RevisitColumns, WALL, WallColumns};
 use crate::error::{DatasetError, shown};
 use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
 use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
@@ -27,7 +29,7 @@ struct Kind {
     find: fn(&Table) -> Result<Box<dyn TruthColumns>, DatasetError>,
 }
 
-const KINDS: [Kind; 4] = [
+const KINDS: [Kind; 7] = [
     Kind {
         file: TRUTH,
         header: "a header like run,t_s,x_m,y_m,theta_rad",
@@ -52,10 +54,28 @@ const KINDS: [Kind; 4] = [
         known: &["t_s", "left_mps", "right_mps"],
         find: |table| Ok(Box::new(WheelReferenceColumns::find(table)?)),
     },
+    Kind {
+        file: REVISIT,
+        header: "a header like run,t0_s,t1_s,sigma_xy_m,sigma_theta_rad",
+        known: RevisitColumns::KNOWN,
+        find: |table| Ok(Box::new(RevisitColumns::find(table)?)),
+    },
+    Kind {
+        file: DISTANCE,
+        header: "a header like run,t0_s,t1_s,distance_m,sigma_m",
+        known: DistanceColumns::KNOWN,
+        find: |table| Ok(Box::new(DistanceColumns::find(table)?)),
+    },
+    Kind {
+        file: WALL,
+        header: "a header like run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad",
+        known: WallColumns::KNOWN,
+        find: |table| Ok(Box::new(WallColumns::find(table)?)),
+    },
 ];
 
 /// Where the columns of one kind of table stand, and what a row becomes.
-trait TruthColumns: std::fmt::Debug {
+pub(super) trait TruthColumns: std::fmt::Debug {
     fn reserve(&self, run: &mut Run, rows: usize);
     fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
 
@@ -74,8 +94,12 @@ pub(super) struct TruthTable {
     columns: Box<dyn TruthColumns>,
 }
 
-/// Opens the truth tables that are there; one at least must be.
-pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<TruthTable>, DatasetError> {
+/// Opens the truth tables that are there; one at least must be, unless a gyroscope stands beside the wheels.
+pub(super) fn open_all(
+    dir: &Path,
+    has_gyro: bool,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<TruthTable>, DatasetError> {
     let mut tables = Vec::new();
     for kind in &KINDS {
         let file = dir.join(kind.file);
@@ -87,7 +111,7 @@ pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Tr
             tables.push(TruthTable { name: kind.file, table, columns });
         }
     }
-    if tables.is_empty() { Err(DatasetError::NoTruth { dir: dir.to_owned() }) } else { Ok(tables) }
+    if tables.is_empty() && !has_gyro { Err(DatasetError::NoTruth { dir: dir.to_owned() }) } else { Ok(tables) }
 }
 
 impl TruthTable {
