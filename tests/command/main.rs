@@ -15,6 +15,7 @@ mod import_csv;
 mod import_ros2;
 mod import_tum;
 mod pages;
+mod partial;
 mod pose_errors;
 mod spoiled_files;
 #[path = "../support/mod.rs"]

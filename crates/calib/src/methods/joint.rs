@@ -20,12 +20,11 @@ use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::settings::MIN_NAMED_COMPONENT;
+use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT};
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
     Rejected,
-    covariance_of_lengths, drive, nominal,
-};
+    covariance_of_lengths, drive, nominal,};
 
 /// The method with the settings of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,10 +159,16 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
 fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
     fit.unobservable
         .iter()
-        .map(|direction| {
+        .flat_map(|direction| {
             let direction = Vector3::new(direction[0], direction[1], direction[2]);
             let (parameter, why) = unobservable(&direction);
-            NotObservable { parameter, why: why_not(&fit.records, &direction).unwrap_or(why) }
+            let why = why_not(&fit.records, &direction).unwrap_or(why);
+            // Both wheels alike, or against each other: neither diameter is known.
+            let of = direction.normalize().abs();
+            let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
+            let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
+            let named = if both { wheels.to_vec() } else { vec![parameter] };
+            named.into_iter().map(move |parameter| NotObservable { parameter, why })
         })
         .collect()
 }
