@@ -9,8 +9,8 @@ use crate::support::{document, refusal, run_in, succeed};
 
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gyro-and-tape.toml");
 
-/// What the scenario hides: wheels 1 % larger, the right one smaller by 0.2 % and the left one larger as much,
-/// a wheelbase 1.5 % wider.
+/// What the scenario hides: wheels 1 % larger, the right one smaller by 0.2 % and the left one larger as
+/// much, a wheelbase 1.5 % wider.
 fn truth(folder: &Path) -> [f64; 3] {
     let text = fs::read_to_string(folder.join("robot.truth.json")).expect("written");
     let truth: Value = serde_json::from_str(&text).expect("JSON");
@@ -40,7 +40,8 @@ fn gyro_tape_and_whole_turns_determine_a_robot_and_each_of_them_is_missed() {
     assert_eq!(determined(folder), [true; 3]);
     for (found, truth) in parameters(folder).iter().zip(truth) {
         let (value, sigma) = (found["value"].as_f64().expect("a value"), found["sigma"].as_f64().expect("a sigma"));
-        // Four standard deviations: one draw in 16 000 is farther off. The wheelbase's is 0.012 % by the sweep.
+        // Four standard deviations: one draw in 16 000 is farther off. The wheelbase's is 0.012 % by the
+        // sweep.
         assert!((value - truth).abs() < 4.0 * sigma, "{value} ± {sigma}, not {truth}");
         assert!(sigma < 3e-4 * truth, "{value} ± {sigma}");
     }

@@ -11,13 +11,13 @@ use kinematics::wrap_to_pi;
 
 use crate::support::real_data::real_data;
 
-/// Standard deviation that headings alone are given, radians: what the full fits estimate of this instrument is
-/// some milliradians.
+/// Standard deviation that headings alone are given, radians: what the full fits estimate of this
+/// instrument is some milliradians.
 const HEADING_SIGMA_RAD: f64 = 5e-3;
 
-/// How far parts may be from the whole, in standard deviations of the difference: 2.2 is the largest of the 36
-/// that the six sessions have, and independent normal ones would be beyond this in 1.2 % of all.
-const MOST_SIGMAS: f64 = 2.5;
+/// How far parts may be from the whole, in standard deviations of the difference: 2.2 is the largest of the
+/// 36 that the six sessions have, and independent normal ones would be beyond this in 1.2 % of all.
+const MAX_SIGMAS: f64 = 2.5;
 
 /// Headings alone are taken so far apart, seconds: their errors last for a second or two.
 const HEADINGS_EVERY_S: f64 = 4.0;
@@ -66,7 +66,7 @@ fn circles_of_june_from_ends_positions_or_headings_agree_with_the_full_calibrati
                 let ((a, sigma_a), (b, sigma_b)) = (combined(&full, by), combined(&part, by));
                 let sigma = sigma_a.hypot(sigma_b);
                 assert!(
-                    (a - b).abs() < MOST_SIGMAS * sigma,
+                    (a - b).abs() < MAX_SIGMAS * sigma,
                     "{} {name} {by:?}: {b} ± {sigma_b}, not {a} ± {sigma_a}",
                     session.display()
                 );

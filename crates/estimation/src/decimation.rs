@@ -6,7 +6,8 @@
 
 use kinematics::Wheels;
 
-use crate::records::{MeasuredPose, Records, Segment};
+use crate::records::Records;
+use crate::segment::{MeasuredPose, Segment};
 use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;

@@ -45,6 +45,7 @@ mod propagation;
 mod records;
 mod resimulation;
 mod rounding;
+mod segment;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -69,7 +70,8 @@ pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_i
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use path_shape::PathShape;
-pub use records::{Records, Segment};
+pub use records::Records;
+pub use segment::Segment;
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

@@ -14,7 +14,8 @@ use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, f
 use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
-use crate::records::{Records, Segment};
+use crate::records::Records;
+use crate::segment::Segment;
 use crate::settings::{
     MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
     MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,

@@ -24,9 +24,15 @@ use crate::thinning::PropagationInterval;
 /// Variances that the wheels' motion depends on.
 const OF_MOTION: [NoiseComponent; 2] = [NoiseComponent::Wheel, NoiseComponent::Turn];
 
-/// Where the parts of the state stand.
-const BIAS: usize = 3;
-const WALLS: usize = 4;
+/// Where the bias stands in the state, after the pose.
+const fn bias_at() -> usize {
+    3
+}
+
+/// Where a wall stands, or what comes after so many walls.
+const fn wall_at(wall: usize) -> usize {
+    bias_at() + 1 + 2 * wall
+}
 
 struct PartialFilter<'f> {
     segment: &'f PartialSegment<'f>,
@@ -77,12 +83,12 @@ pub(crate) fn filter_partial(
 impl<'f> PartialFilter<'f> {
     fn new(segment: &'f PartialSegment<'f>, columns: usize) -> Self {
         let slots = most_at_once(segment);
-        let first_slot = WALLS + 2 * segment.walls.len();
+        let first_slot = wall_at(segment.walls.len());
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
-        covariance[(BIAS, BIAS)] = GYRO_BIAS_SIGMA_RADPS.powi(2);
+        covariance[(bias_at(), bias_at())] = GYRO_BIAS_SIGMA_RADPS.powi(2);
         for (wall, of) in segment.walls.iter().enumerate() {
-            let at = WALLS + 2 * wall;
+            let at = wall_at(wall);
             (state[at], state[at + 1]) = (of.direction_rad, of.offset_m);
             covariance[(at, at)] = WALL_DIRECTION_SIGMA_RAD.powi(2);
             covariance[(at + 1, at + 1)] = WALL_OFFSET_SIGMA_M.powi(2);
@@ -104,7 +110,7 @@ impl<'f> PartialFilter<'f> {
     }
 
     fn slot_at(&self, slot: usize) -> usize {
-        WALLS + 2 * self.segment.walls.len() + 3 * slot
+        wall_at(self.segment.walls.len()) + 3 * slot
     }
 
     /// Where the copy of a place stands in the state.
@@ -232,12 +238,12 @@ impl<'f> PartialFilter<'f> {
                 of.value - distance_m
             }
             Quantity::WallHeading(wall) => {
-                let wall = WALLS + 2 * wall;
+                let wall = wall_at(wall);
                 (by[to + 2], by[wall]) = (1.0, -1.0);
                 wrap_to_pi(of.value - (at(to, 2) - self.state[wall]))
             }
             Quantity::WallDistance(wall) => {
-                let wall = WALLS + 2 * wall;
+                let wall = wall_at(wall);
                 let (sin, cos) = sin_cos(self.state[wall]);
                 // n = (−sin, cos); offset − n·p.
                 (by[to], by[to + 1]) = (sin, -cos);
@@ -249,8 +255,8 @@ impl<'f> PartialFilter<'f> {
                 // In one place both are the same: the robot stands.
                 by[to + 2] += scale;
                 by[from + 2] -= scale;
-                by[BIAS] = dt_s;
-                of.value - scale * (at(to, 2) - at(from, 2)) - self.state[BIAS] * dt_s
+                by[bias_at()] = dt_s;
+                of.value - scale * (at(to, 2) - at(from, 2)) - self.state[bias_at()] * dt_s
             }
         };
         (off, by)
@@ -258,7 +264,7 @@ impl<'f> PartialFilter<'f> {
 
     fn update(&mut self, of: &Observation, model: &Model, columns: usize, sums: &mut Sums<'_>) {
         if let Quantity::GyroTurn { dt_s } = of.quantity {
-            self.covariance[(BIAS, BIAS)] += self.segment.bias_walk * dt_s;
+            self.covariance[(bias_at(), bias_at())] += self.segment.bias_walk * dt_s;
         }
         let (v, row) = self.predicted(of, model);
         let ph = &self.covariance * &row;

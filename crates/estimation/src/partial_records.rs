@@ -10,7 +10,7 @@ use dataset::{ExtraChannel, GyroNoise, Run, RunView, Session};
 use kinematics::{Pose, Wheels};
 
 use crate::model::Model;
-use crate::records::{Segment, Start};
+use crate::segment::{Segment, Start};
 use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S, WALL_START_DIRECTIONS, WALL_START_STEPS};
 use crate::wheel_angles::WheelAngleInterpolator;
 
@@ -343,8 +343,8 @@ fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool
 }
 
 /// Angle random walk of a gyroscope, rad/√s: half of the mean square of how its mean rate changes from row to
-/// row while the wheels stand. Where they hardly do, the same of how far it strays from the wheels from window
-/// to window, by the median, which holds the wheels' noise too.
+/// row while the wheels stand. Where they hardly do, the same of how far it strays from the wheels from
+/// window to window, by the median, which holds the wheels' noise too.
 fn noise_from_log(session: &Session<'_>) -> Option<f64> {
     let instantaneous = session.truth_noise.gyro.is_instantaneous;
     let nominal = Model::of(&session.robot.geometry().ok()?, 0);

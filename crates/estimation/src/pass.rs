@@ -16,7 +16,8 @@ use crate::partial_filter::filter_partial;
 use crate::pass_options::PassOptions;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
-use crate::records::{Records, Segment, Start};
+use crate::records::Records;
+use crate::segment::{Segment, Start};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
 

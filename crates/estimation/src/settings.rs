@@ -461,11 +461,13 @@ pub(crate) const ONE_STEP_TOLERANCE: f64 = 0.05;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_SCORING_STEPS: usize = 5;
 
-/// Length of the part of a direction that must lie in the unobservable space for it to be named after it, and
-/// of what must be left of it beside those named before.
-/// Convention: within 8° of the space, and more than 18° off the others.
+/// Length of the part of a unit direction that must lie in the unobservable space for the space to be named
+/// after it.
+/// Convention: within 8° of the space.
 pub(crate) const MIN_NAMED_DIRECTION: f64 = 0.99;
-/// See [`MIN_NAMED_DIRECTION`].
+
+/// Length of what must be left of a unit direction beside those that the unobservable space is named after.
+/// Convention: more than 18° off them.
 pub(crate) const MIN_OWN_DIRECTION: f64 = 0.3;
 
 // Partial measurements: gyroscopes, tape measures and walls.
@@ -491,16 +493,20 @@ pub(crate) const MIN_GYRO_NOISE_RAD_PER_SQRT_S: f64 = 1e-7;
 /// Budgeted: its standard deviation is then known to 1/√(2·50), a tenth.
 pub(crate) const MIN_STANDING_PAIRS: usize = 50;
 
-/// Standard deviations of a wall's direction, radians, and offset, metres, before it is seen.
-/// Budgeted: all directions, and rooms of any size.
+/// Standard deviation of a wall's direction before it is seen, radians.
+/// Budgeted: all directions.
 pub(crate) const WALL_DIRECTION_SIGMA_RAD: f64 = 10.0;
-/// See [`WALL_DIRECTION_SIGMA_RAD`].
+
+/// Standard deviation of a wall's distance from a run's start before it is seen, metres.
+/// Budgeted: rooms of any size.
 pub(crate) const WALL_OFFSET_SIGMA_M: f64 = 1000.0;
 
-/// Directions from which a wall is sought that only distances speak of, and steps from each.
-/// Budgeted: 15° apart, within the basin of the nearest, and Gauss–Newton steps to 1e-6 of it.
+/// Number of directions from which a wall is sought that only distances speak of.
+/// Budgeted: 15° apart, within the basin of the nearest.
 pub(crate) const WALL_START_DIRECTIONS: u32 = 24;
-/// See [`WALL_START_DIRECTIONS`].
+
+/// Number of Gauss–Newton steps from each of these directions.
+/// Budgeted: from 15° off to 1e-6 of the nearest minimum.
 pub(crate) const WALL_START_STEPS: usize = 10;
 
 /// Distance below which the direction between two places is not known, metres.

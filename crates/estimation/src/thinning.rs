@@ -15,7 +15,8 @@ use crate::covariances::Covariances;
 use crate::model::Model;
 use crate::noise::NoiseComponent;
 use crate::partial_records::{PartialSegment, Place};
-use crate::records::{Records, Segment, Start};
+use crate::records::Records;
+use crate::segment::{Segment, Start};
 use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
 
 /// How measurements are thinned.

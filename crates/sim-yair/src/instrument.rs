@@ -1,5 +1,5 @@
-//! The instruments: the paper's floor grid, motion capture, a tachometer beside each wheel, a gyroscope, a tape
-//! measure, and marks of where a run began.
+//! The instruments: the paper's floor grid, motion capture, a tachometer beside each wheel, a gyroscope, a
+//! tape measure, and marks of where a run began.
 
 use dataset::{ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, WheelSpeed};
 use effects::{Address, Stream, StreamName};
@@ -26,7 +26,8 @@ pub(crate) struct Observer {
     gyro_row: Option<(f64, f64, f64)>,
 }
 
-/// A tape is laid between places that are farther apart than this, metres; a robot is back where it is nearer.
+/// A tape is laid between places that are farther apart than this, metres; a robot is back where it is
+/// nearer.
 const TAPE_FROM_M: f64 = 0.3;
 
 impl Observer {
@@ -137,8 +138,8 @@ impl Observer {
         run.odometry.extra.entry(ExtraChannel::GyroYawRate).or_default().push(rate_radps);
     }
 
-    /// The robot stands: what a tape says of the way from the last standstill, and marks of the way back to
-    /// the run's start.
+    /// The robot stands: the tape from the last standstill, and the marks of the run's start where it is back
+    /// there.
     pub(crate) fn stands(&mut self, t_s: f64, pose: Pose, run: &mut Run) {
         let Some([(first_s, first), (before_s, before)]) = self.stood else {
             self.stood = Some([(t_s, pose); 2]);

@@ -3,6 +3,7 @@
 //! All headers are read before any table, so that a wrong file among large ones is named at once.
 
 mod blocks;
+mod columns;
 mod grouped;
 mod manifest;
 mod odometry;
@@ -18,9 +19,10 @@ use crate::error::{DatasetError, shown};
 use crate::record::{Dataset, ExtraChannel, Run};
 use crate::table::RunIndex;
 use crate::warning::Warning;
+use columns::PointIndex;
 use manifest::Manifest;
 use odometry::OdometryTable;
-use truth::{PointIndex, TruthTable};
+use truth::TruthTable;
 
 pub use blocks::Blocks;
 pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};

@@ -1,9 +1,9 @@
 //! The tables of partial measurements: revisits, distances and walls.
 
-use super::truth::{PointIndex, TruthColumns};
+use super::columns::{PointIndex, TruthColumns};
+use super::manifest::why_no_id;
 use crate::error::DatasetError;
 use crate::partial::{Revisit, TapeDistance, WallReading};
-use crate::read::why_no_id;
 use crate::record::Run;
 use crate::table::{Row, Table};
 

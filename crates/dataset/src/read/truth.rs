@@ -1,14 +1,14 @@
 //! The tables of an outside instrument: poses, displacements, marked points and wheel speeds, and the list of
 //! all tables that measure something of the robot.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use kinematics::{Point, Wheels};
 
+use super::columns::{PointIndex, TruthColumns};
 use super::partial::{DISTANCE, DistanceColumns, REVISIT, RevisitColumns, WALL, WallColumns};
 use crate::error::{DatasetError, shown};
-use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
+use crate::record::{Displacement, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
 use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
@@ -16,9 +16,6 @@ pub(crate) const TRUTH: &str = "truth.csv";
 pub(crate) const DISPLACEMENT: &str = "displacement.csv";
 pub(crate) const POINTS: &str = "points.csv";
 pub(crate) const WHEEL_REFERENCE: &str = "wheel_reference.csv";
-
-/// Marked points that an error lists.
-const LISTED_POINTS: usize = 20;
 
 /// One kind of table: adding one is one line in [`KINDS`] and its columns.
 #[derive(Debug)]
@@ -73,18 +70,6 @@ const KINDS: [Kind; 7] = [
         find: |table| Ok(Box::new(WallColumns::find(table)?)),
     },
 ];
-
-/// Where the columns of one kind of table stand, and what a row becomes.
-pub(super) trait TruthColumns: std::fmt::Debug {
-    fn reserve(&self, run: &mut Run, rows: usize);
-    fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
-
-    /// The instants' column, where a row speaks of one instant and stands for itself: only then can a run be
-    /// cut between two of them.
-    fn instant(&self) -> Option<usize> {
-        None
-    }
-}
 
 /// An open truth table.
 #[derive(Debug)]
@@ -170,26 +155,6 @@ impl TruthTable {
             previous_s = Some(t_s);
             if t_s < from_s || t_s > to_s { Ok(()) } else { columns.push(row, run, points) }
         })
-    }
-}
-
-/// Which marked point an id speaks of.
-#[derive(Debug)]
-pub(super) struct PointIndex {
-    by_id: HashMap<Box<[u8]>, usize>,
-    known: String,
-}
-
-impl PointIndex {
-    pub(super) fn new(points: &[MarkedPoint]) -> Self {
-        let by_id = points.iter().map(|point| point.id.as_bytes().into()).zip(0..).collect();
-        let mut known: Vec<_> = points.iter().take(LISTED_POINTS).map(|point| shown(point.id.as_bytes())).collect();
-        if points.len() > LISTED_POINTS {
-            known.push("…".to_owned());
-        } else if points.is_empty() {
-            known.push("none".to_owned());
-        }
-        Self { by_id, known: known.join(", ") }
     }
 }
 

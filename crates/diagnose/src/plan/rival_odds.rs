@@ -1,5 +1,5 @@
-//! What normal equations say of causes: sizes under each, and how far off one cause's prediction stays when another
-//! may do its best.
+//! What normal equations say of causes: sizes under each, and how far off one cause's prediction stays when
+//! another may do its best.
 //!
 //! With Î the information of old and planned runs together, n what is free beside and b another name's
 //! sizes: a's size s leaves λ = sᵀ(Î_aa − Î_a,nb Î_nb,nb⁻¹ Î_nb,a)s, the noncentrality of the test of b
@@ -76,7 +76,8 @@ impl Frame {
         })
     }
 
-    /// Estimates of some columns from normal equations, as steps from the model in force, and their covariance.
+    /// Estimates of some columns from normal equations, as steps from the model in force, and their
+    /// covariance.
     pub(crate) fn estimate(
         &self,
         equations: &NormalEquations,
@@ -226,8 +227,8 @@ pub(super) mod tests {
     use super::*;
     use crate::statistics::p_of_z;
 
-    /// Normal equations of measurements whose derivatives by the columns are the rows of `slopes`, each with unit
-    /// variance, and of measured values.
+    /// Normal equations of measurements whose derivatives by the columns are the rows of `slopes`, each
+    /// with unit variance, and of measured values.
     pub(in crate::plan) fn normal_equations(slopes: &DMatrix<f64>, values: &DVector<f64>) -> NormalEquations {
         NormalEquations {
             run: (0, 0),

@@ -149,8 +149,8 @@ fn a_revisit_with_all_its_parts_is_a_displacement() {
     (model.m_per_rad, model.separation_m) = (M_PER_RAD.map(|of| 1.0002 * of), 1.0002 * SEPARATION_M);
     let [revisits, displacements] = [as_revisits, as_displacements].map(|of| equations(&of, &model, &noise));
     assert_eq!(revisits.count, displacements.count);
-    // Seen from a pose without errors both are the same arithmetic but for the order of the components: axes of
-    // the end here, of the start there.
+    // Seen from a pose without errors both are the same arithmetic but for the order of the components:
+    // axes of the end here, of the start there.
     assert!((revisits.chi_square / displacements.chi_square - 1.0).abs() < 1e-4, "{revisits:?} {displacements:?}");
     assert!((revisits.log_det - displacements.log_det).abs() < 1e-4);
     for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {

@@ -134,8 +134,8 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
     }
 }
 
-/// What tapes, walls, returns and a gyroscope tell of a run. A gyroscope of unknown scale tells the ratio of the
-/// wheels where the robot hardly turns, and nothing of how far it turns else.
+/// What tapes, walls, returns and a gyroscope tell of a run. A gyroscope of unknown scale tells the ratio
+/// of the wheels where the robot hardly turns, and nothing of how far it turns else.
 fn add_partial(
     run: &RunLog,
     m_per_rad: Wheels<f64>,
