@@ -18,6 +18,7 @@ mod import_tum;
 #[cfg(unix)]
 mod interrupt;
 mod pages;
+mod partial;
 mod pose_errors;
 mod spoiled_files;
 #[path = "../support/mod.rs"]

@@ -7,6 +7,7 @@ mod cramer_rao;
 mod joint;
 mod khepera_logs;
 mod one_step;
+mod partial_optiodom;
 mod published_optiodom;
 #[path = "../support/mod.rs"]
 mod support;

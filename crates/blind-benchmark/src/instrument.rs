@@ -132,7 +132,11 @@ impl InstrumentModel {
     /// What the dataset says of its noise.
     pub(crate) fn stated(&self) -> TruthNoise {
         let known = |sigma: f64| (self.stated > 0.0).then_some(self.stated * sigma);
-        TruthNoise { sigma_xy_m: known(self.sigma_xy_m), sigma_theta_rad: known(self.sigma_theta_rad) }
+        TruthNoise {
+            sigma_xy_m: known(self.sigma_xy_m),
+            sigma_theta_rad: known(self.sigma_theta_rad),
+            ..TruthNoise::default()
+        }
     }
 
     /// Variances of position and heading that independent errors of the same weight would have: those of

@@ -250,3 +250,8 @@ pub(crate) const DELTA_TOLERANCE: f64 = 0.1;
 /// Most pairs of one run.
 /// Budgeted: 160 MB.
 pub(crate) const MAX_PAIRS: usize = 10_000_000;
+
+/// Length of the part of an unobservable direction along the separation, or the wheels' ratio, above which it
+/// is named after that.
+/// Convention: within 26° of it.
+pub(crate) const MIN_NAMED_COMPONENT: f64 = 0.9;

@@ -250,9 +250,9 @@ impl Trajectory {
         let distance_m = |pair: &[(f64, Pose)]| pair[1].1.position().distance_m(pair[0].1.position());
         let length_m = log.windows(2).map(distance_m).fold(0.0, |length_m, step_m| length_m + step_m);
         let moved = match measured.first() {
-            None if run.run().truth.is_empty() => {
-                Err("no absolute truth: displacements and wheel speeds give no drift from the start pose")
-            }
+            None if run.run().truth.is_empty() => Err(
+                "no absolute truth: displacements, wheel speeds, a gyro and partial measurements give no drift from the start pose",
+            ),
             None => Err("position-only truth gives no start heading"),
             Some(_) => moved,
         };

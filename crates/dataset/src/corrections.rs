@@ -91,6 +91,25 @@ impl Corrections {
             (reading.room.x_m, reading.room.y_m) = place(reading.room.x_m, reading.room.y_m);
         }
         run.wheel_reference.iter_mut().for_each(|speed| speed.t_s = time(speed.t_s));
+        self.partial(run);
+    }
+
+    /// What a tape or a wall says is of the robot and no frame: times and lengths are corrected alone.
+    fn partial(&self, run: &mut Run) {
+        let time = |t_s: &mut f64| *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s;
+        let length = |length_m: &mut f64| *length_m *= self.truth_length_factor;
+        for of in &mut run.revisits {
+            [&mut of.t0_s, &mut of.t1_s].into_iter().for_each(time);
+            [&mut of.dx_m, &mut of.dy_m].into_iter().flatten().for_each(length);
+        }
+        for of in &mut run.distances {
+            [&mut of.t0_s, &mut of.t1_s].into_iter().for_each(time);
+            length(&mut of.distance_m);
+        }
+        for of in &mut run.walls {
+            time(&mut of.t_s);
+            of.distance_m.iter_mut().for_each(length);
+        }
     }
 
     fn wheels(&self, t_s: &[f64], wheels: &mut WheelLog) {

@@ -42,9 +42,9 @@ pub enum DatasetError {
         /// What it should hold.
         expected: &'static str,
     },
-    /// None of the four tables of an outside instrument is there.
+    /// No table of an instrument is there, and no gyroscope stands beside the wheels.
     #[error(
-        "{dir}: no truth; expected at least one of truth.csv, displacement.csv, points.csv and wheel_reference.csv beside odometry.csv"
+        "{dir}: no truth; expected at least one of truth.csv, displacement.csv, points.csv and wheel_reference.csv beside odometry.csv, or revisit.csv, distance.csv, wall.csv, or gyro_radps in it"
     )]
     NoTruth {
         /// The dataset's folder.

@@ -13,6 +13,7 @@ mod fingerprint;
 pub mod import;
 mod imported;
 mod name_units;
+mod partial;
 mod prefetch;
 mod read;
 mod record;
@@ -28,6 +29,7 @@ mod write;
 pub use column_names::Quantity;
 pub use counter::{suspected_spike, suspected_wrap, wrap_warnings};
 pub use error::DatasetError;
+pub use partial::{GyroNoise, Revisit, TapeDistance, WallReading};
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use record::{

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::partial::{GyroNoise, Revisit, TapeDistance, WallReading};
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -88,6 +89,8 @@ pub struct TruthNoise {
     pub sigma_xy_m: Option<f64>,
     /// Of the heading, radians.
     pub sigma_theta_rad: Option<f64>,
+    /// The gyroscope.
+    pub gyro: GyroNoise,
 }
 
 /// A point marked on the robot, in the body frame.
@@ -116,6 +119,12 @@ pub struct Run {
     pub point_readings: Vec<PointReading>,
     /// A tachometer's wheel speeds (`wheel_reference.csv`).
     pub wheel_reference: Vec<WheelSpeed>,
+    /// Where the robot stood again, seen from where it had stood (`revisit.csv`).
+    pub revisits: Vec<Revisit>,
+    /// Distances between two places, by tape measure (`distance.csv`).
+    pub distances: Vec<TapeDistance>,
+    /// Distances from and headings along walls (`wall.csv`).
+    pub walls: Vec<WallReading>,
     /// Spans over which the counts do not tell how the robot moved, in time order. No part of the format:
     /// who examines the records sets them, and nothing is compared across them.
     pub unknown_motion: Vec<UnknownMotion>,

@@ -16,7 +16,7 @@ use crate::optimizer::Solution;
 use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::{CarriedState, Propagator};
-use crate::records::{MeasuredPose, Segment};
+use crate::segment::{MeasuredPose, Segment};
 use crate::settings::{MAX_DECIMATION_NONCENTRALITY, MIN_NOISE_SIGMA};
 use crate::wheel_angles::WheelInterval;
 

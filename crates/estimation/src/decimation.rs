@@ -6,7 +6,8 @@
 
 use kinematics::Wheels;
 
-use crate::records::{MeasuredPose, Records, Segment};
+use crate::records::Records;
+use crate::segment::{MeasuredPose, Segment};
 use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;
@@ -37,9 +38,12 @@ impl<'a> Decimated<'a> {
         };
         let selections = selections
             .iter()
-            .map(|of| Selection { propagations: of.propagations.iter().zip(&ends).map(of_segment).collect() })
+            .map(|of| Selection {
+                propagations: of.propagations.iter().zip(&ends).map(of_segment).collect(),
+                partial: of.partial.clone(),
+            })
             .collect();
-        let records = Records { segments, unused: records.unused.clone(), ids: records.ids.clone() };
+        let records = Records { segments, ..records.clone() };
         Some(Self { records, selections })
     }
 }

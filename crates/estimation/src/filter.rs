@@ -18,8 +18,8 @@ use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
-use crate::records::{MeasuredPose, Segment, Start};
 use crate::rounding::Rounding;
+use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 

@@ -33,6 +33,8 @@ mod normal_equations;
 mod nuisances;
 mod one_step;
 mod optimizer;
+mod partial_filter;
+mod partial_records;
 mod pass;
 mod pass_options;
 mod path_shape;
@@ -43,6 +45,7 @@ mod propagation;
 mod records;
 mod resimulation;
 mod rounding;
+mod segment;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -67,7 +70,8 @@ pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_i
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use path_shape::PathShape;
-pub use records::{Records, Segment};
+pub use records::Records;
+pub use segment::Segment;
 pub use settings::{LARGE_ROWS, RIDGE, RISE_95, WHITENESS_Z};
 pub use thinning::{Selection, Thinning};
 pub use wheel_angles::WheelAngleInterpolator;

@@ -11,7 +11,7 @@ use model_term::ModelTerm;
 
 use crate::model::Model;
 use crate::propagation::Propagator;
-use crate::records::{Segment, Start};
+use crate::segment::{Segment, Start};
 use crate::settings::TIME_TOLERANCE_S;
 use crate::wheel_angles::WheelAngleInterpolator;
 

@@ -25,13 +25,15 @@ pub enum Column {
     SensorTheta,
     /// Latency of the measurements' time stamps, seconds.
     Latency,
+    /// Relative scale of a gyroscope: it shows (1 + scale) times the turn.
+    GyroScale,
     /// A parameter of a further term, by its index among all of them.
     Term(usize),
 }
 
 impl Column {
     /// The columns that every pass carries, before those of further terms.
-    pub const BASE: [Self; 7] = [
+    pub const BASE: [Self; 8] = [
         Self::LeftWheel,
         Self::RightWheel,
         Self::Separation,
@@ -39,6 +41,7 @@ impl Column {
         Self::SensorY,
         Self::SensorTheta,
         Self::Latency,
+        Self::GyroScale,
     ];
 
     /// The drive's geometry parameters.
@@ -58,6 +61,7 @@ impl Column {
             Self::SensorY => 4,
             Self::SensorTheta => 5,
             Self::Latency => 6,
+            Self::GyroScale => 7,
             Self::Term(number) => Self::BASE.len() + number,
         }
     }
@@ -122,6 +126,8 @@ pub struct Model {
     pub body_from_sensor: Pose,
     /// Latency of the measurements' time stamps, seconds, where it is common to all.
     pub latency_s: f64,
+    /// Relative scale of the gyroscope.
+    pub gyro_scale: f64,
     /// Instruments that sessions or runs have for themselves.
     pub own: Option<GroupExtrinsics>,
     /// Values of the further terms' parameters, in their units.
@@ -137,6 +143,7 @@ impl Model {
             separation_m: geometry.wheel_separation_m(),
             body_from_sensor: Pose::IDENTITY,
             latency_s: 0.0,
+            gyro_scale: 0.0,
             own: None,
             term_values: vec![0.0; term_parameters],
         }
@@ -194,6 +201,7 @@ impl Model {
             Column::SensorY => self.body_from_sensor.y_m += by,
             Column::SensorTheta => self.body_from_sensor.theta_rad += by,
             Column::Latency => self.latency_s += by,
+            Column::GyroScale => self.gyro_scale += by,
             Column::Term(number) => self.term_values[number] += by,
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dataset::Session;
 use model_term::ModelTerm;
-use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
 use crate::error::EstimationError;
 use crate::model::{Column, Model};
@@ -14,10 +14,12 @@ use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, f
 use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
-use crate::records::{Records, Segment};
+use crate::records::Records;
+use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_RUNS_TO_HOLD_OUT,
-    MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES, WHITENESS_Z,
+    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
+    THINNING_PHASES, WHITENESS_Z,
 };
 use crate::thinning::{Selection, Thinning};
 
@@ -65,12 +67,16 @@ impl<'a> ModelFit<'a> {
         displacements_in_series: bool,
     ) -> Self {
         let records = Records::of(sessions);
+        let mut columns = Column::GEOMETRY.to_vec();
+        if records.has_gyro() {
+            columns.push(Column::GyroScale);
+        }
         let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
         Self {
             selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
             thinning: Thinning::NONE,
             solution: Solution::nothing(&nominal, &prior),
-            columns: Column::GEOMETRY.to_vec(),
+            columns,
             unobservable: Vec::new(),
             records: Arc::new(records),
             start: nominal.clone(),
@@ -374,7 +380,18 @@ impl ModelFit<'_> {
             return Some(&free * inverse * free.transpose());
         }
         let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
-        Some(&free * ClusterRobust::of(&inverse, clusters).covariance * free.transpose())
+        let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
+        if let Some((sigma, scale)) = self.records.gyro_scale_sigma.zip(self.at(Column::GyroScale)) {
+            // What was stated of the scale did not come from the runs, and does not scatter over them.
+            let by_scale = &inverse * free.row(scale).transpose() / sigma;
+            robust += &by_scale * by_scale.transpose();
+        }
+        Some(&free * robust * free.transpose())
+    }
+
+    /// Where a column stands among the free ones.
+    fn at(&self, column: Column) -> Option<usize> {
+        self.columns.iter().position(|of| *of == column)
     }
 
     /// An orthonormal basis of the directions of the free columns that are observable.
@@ -402,10 +419,32 @@ impl ModelFit<'_> {
 /// determine.
 pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
-    (0..3)
+    let directions: Vec<Vector3<f64>> = (0..3)
         .filter(|&k| eigenvalues[k] < MAX_OBSERVABLE_SIGMA.powi(-2))
-        .map(|k| DVector::from_column_slice(eigenvectors.column(k).as_slice()))
-        .collect()
+        .map(|k| eigenvectors.column(k).into_owned())
+        .collect();
+    named_apart(&directions).into_iter().map(|of| DVector::from_column_slice(of.as_slice())).collect()
+}
+
+/// The same space, by the separation alone, or the wheels' common scale, where these lie in it: eigenvectors
+/// that are equally unobservable are any mixture.
+fn named_apart(directions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    if directions.len() < 2 {
+        return directions.to_vec();
+    }
+    let within = |of: &Vector3<f64>| directions.iter().map(|direction| direction * direction.dot(of)).sum();
+    let named = [Vector3::z(), Vector3::new(1.0, 1.0, 0.0).normalize(), Vector3::new(1.0, -1.0, 0.0).normalize()];
+    let mut apart: Vec<Vector3<f64>> = Vec::new();
+    for of in named.iter().chain(directions) {
+        let inside: Vector3<f64> = within(of);
+        let rest = apart.iter().fold(inside, |rest, before| rest - before * before.dot(&rest));
+        // What is no direction of its own any more is left out; the named ones only where they are inside.
+        let is_own = rest.norm() > if directions.contains(of) { MIN_OWN_DIRECTION } else { MIN_NAMED_DIRECTION };
+        if is_own && apart.len() < directions.len() {
+            apart.push(rest.normalize());
+        }
+    }
+    if apart.len() == directions.len() { apart } else { directions.to_vec() }
 }
 
 /// Information on the three geometry parameters with the other columns eliminated.

@@ -122,7 +122,7 @@ pub fn fit_large(
     let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
     // The subsamples are needed no more.
-    let mut found = first.with_records(Records { segments: Vec::new(), unused: Vec::new(), ids });
+    let mut found = first.with_records(Records { ids, ..Records::nothing() });
     let mut passes = 0;
     loop {
         passes += 1;
@@ -259,7 +259,7 @@ impl ModelFit<'_> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
         let records = Records::relative_to(&sessions, self.prior.measurement_sigma()).belonging_to(run);
-        if records.segments.is_empty() {
+        if records.segments.is_empty() && !records.has_partial() {
             return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);

@@ -12,7 +12,8 @@ use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::CachedPropagation;
-use crate::records::{Records, Segment, Start};
+use crate::records::Records;
+use crate::segment::{Segment, Start};
 use crate::settings::{
     ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
     HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
@@ -133,7 +134,7 @@ pub(crate) fn fit_from(
     terms: &mut [Box<dyn ModelTerm>],
     options: &FitOptions,
 ) -> Result<Solution, EstimationError> {
-    if selections.iter().all(|selection| selection.propagations.iter().all(Vec::is_empty)) {
+    if selections.iter().all(Selection::is_empty) {
         return Err(EstimationError::NoMeasurements);
     }
     let mut model = from.model;

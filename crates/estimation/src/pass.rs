@@ -12,10 +12,12 @@ use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::normal_equations::NormalEquations;
+use crate::partial_filter::filter_partial;
 use crate::pass_options::PassOptions;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
-use crate::records::{Records, Segment, Start};
+use crate::records::Records;
+use crate::segment::{Segment, Start};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
 
@@ -185,11 +187,44 @@ pub(crate) fn pass(
             result.samples.push(samples);
         }
     }
+    for selection in selections {
+        add_partial(&mut result, (records, selection, weight), (model, noise), &products, terms);
+    }
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
     if let Some(own) = &model.own {
         result.own = own.eliminate(&mut result.runs, model);
     }
     result
+}
+
+/// Adds the partial measurements to the normal equations of their runs, and what is known of the gyroscope's
+/// scale to that of the first run which has one.
+fn add_partial(
+    result: &mut Pass,
+    (records, selection, weight): (&Records<'_>, &Selection, f64),
+    (model, noise): (&Model, &Noise),
+    products: &Products,
+    terms: &mut [Box<dyn ModelTerm>],
+) {
+    let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+    let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
+    for (partial, propagations) in records.partial.iter().zip(&selection.partial) {
+        let Some(propagations) = propagations else { continue };
+        let (equations, score) = filter_partial(partial, propagations, model, noise, products, terms);
+        let run = partial.segment.run;
+        let at = result.runs.partition_point(|of| of.run < run);
+        if result.runs.get(at).is_none_or(|of| of.run != run) {
+            result.runs.insert(at, NormalEquations::new(run, columns));
+        }
+        result.runs[at].add(&equations, weight);
+        result.noise.add(&score, weight);
+        if let Some(precision) = prior.take_if(|_| partial.has_gyro()) {
+            let scale = Column::GyroScale.index();
+            result.runs[at].information[(scale, scale)] += weight * precision;
+            result.runs[at].gradient[scale] += weight * precision * model.gyro_scale;
+            result.runs[at].chi_square += weight * precision * model.gyro_scale.powi(2);
+        }
+    }
 }
 
 /// The segments of each run, which are consecutive.

@@ -3,7 +3,7 @@
 use kinematics::{Increment, Wheels};
 
 use crate::model::Model;
-use crate::records::Segment;
+use crate::segment::Segment;
 
 /// How far a robot went and how it turned.
 #[derive(Debug, Clone, Copy, PartialEq)]

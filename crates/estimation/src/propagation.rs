@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use crate::derivatives::Derivatives;
 use crate::kinematic_samples::{KinematicSample, KinematicSampler};
 use crate::model::Model;
-use crate::records::Segment;
+use crate::segment::Segment;
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 

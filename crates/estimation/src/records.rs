@@ -5,177 +5,25 @@
 //! a segment of its own, which starts at the origin of its own frame. Displacements of a run go on from each
 //! other: the heading in the room and the state of terms are carried from one to the next.
 
-use dataset::{Run, RunInfo, Session, TruthSample};
-use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
+use dataset::{Run, Session, TruthSample};
+use kinematics::{Increment, Pose};
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
-use crate::settings::{
-    AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S,
-};
+use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
+use crate::segment::{MeasuredPose, Segment, Start};
+use crate::settings::{AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
-
-/// A pose that the instrument measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MeasuredPose {
-    pub(crate) t_s: f64,
-    pub(crate) x_m: f64,
-    pub(crate) y_m: f64,
-    pub(crate) theta_rad: Option<f64>,
-    /// Number of intervals of the segment before it.
-    pub(crate) after: usize,
-    /// Variances of position and heading, over those of a measurement that states none of its own.
-    pub(crate) variance_factor: [f64; 2],
-}
-
-/// Where a segment starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Start {
-    /// At its first measurement, with that measurement's errors.
-    MeasuredPose,
-    /// With the instrument at the origin of its own frame.
-    Origin,
-}
-
-/// Counts and measurements without a gap.
-#[derive(Debug, Clone)]
-pub struct Segment<'a> {
-    /// Which run: session and run in the order given.
-    pub run: (usize, usize),
-    /// The run.
-    pub info: &'a RunInfo,
-    pub(crate) start: Start,
-    /// It starts where the segment before it ended: a displacement after a displacement.
-    pub(crate) continues: bool,
-    pub(crate) intervals: Vec<WheelInterval>,
-    pub(crate) measurements: Vec<MeasuredPose>,
-    /// Angle of each wheel at the first interval, by its counter, radians.
-    pub(crate) wheel_rad: Wheels<f64>,
-    /// What a count of each wheel stands for, radians; 0 where angles are not rounded.
-    pub(crate) quantum_rad: Wheels<f64>,
-    /// Distance driven in the session before, metres, by nominal values.
-    pub(crate) session_m: f64,
-}
-
-impl Segment<'_> {
-    /// Is it a displacement, which measures a motion between two instants instead of a pose?
-    #[must_use]
-    pub fn is_displacement(&self) -> bool {
-        self.start == Start::Origin
-    }
-
-    /// Are this segment and the next of one series, in which errors may be autocorrelated? Displacements of
-    /// one run are; poses of two segments have a gap between them.
-    pub(crate) fn is_in_series_with(&self, next: &Self) -> bool {
-        self.is_displacement() && next.is_displacement() && self.run == next.run
-    }
-
-    /// For each measurement the time of the one before, seconds, and how far each wheel turned since,
-    /// radians; no turn for a first measurement.
-    #[must_use]
-    pub fn since_previous_measurement(&self) -> Vec<(f64, Wheels<f64>)> {
-        let start_s = match self.start {
-            Start::MeasuredPose => self.measurements.first().map(|measurement| measurement.t_s),
-            Start::Origin => self.intervals.first().map(|interval| interval.t_s),
-        };
-        let (mut before_s, mut after) = (start_s.unwrap_or(0.0), 0);
-        let of = |measurement: &MeasuredPose| {
-            let turned = self.intervals[after..measurement.after].iter();
-            let turned = turned.fold(Wheels::both(0.0), |sum, interval| sum.zip_with(interval.wheel_rad, |a, b| a + b));
-            let since = (before_s, turned);
-            (before_s, after) = (measurement.t_s, measurement.after);
-            since
-        };
-        self.measurements.iter().map(of).collect()
-    }
-
-    /// For each measurement, whether a wheel changed its speed since the measurement before, or within
-    /// `SPEED_CHANGE_WINDOW_S` where that is longer, by more than `SPEED_CHANGE_RATIO` of the fastest
-    /// speed in the segment.
-    #[must_use]
-    pub fn changes_of_speed(&self) -> Vec<bool> {
-        let speed = |interval: &WheelInterval| {
-            interval.wheel_rad.map(|rad| if interval.dt_s > 0.0 { rad / interval.dt_s } else { 0.0 })
-        };
-        let fastest = self.intervals.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
-        let changes = |(measurement, (before_s, _)): (&MeasuredPose, (f64, Wheels<f64>))| {
-            let from_s = (measurement.t_s - SPEED_CHANGE_WINDOW_S).min(before_s);
-            let near = self.intervals[..measurement.after]
-                .iter()
-                .rev()
-                .take_while(|interval| interval.t_s + interval.dt_s > from_s);
-            let (mut low, mut high) = (Wheels::both(f64::INFINITY), Wheels::both(f64::NEG_INFINITY));
-            for of in near.map(speed) {
-                low = low.zip_with(of, f64::min);
-                high = high.zip_with(of, f64::max);
-            }
-            let change = high.zip_with(low, |high, low| high - low);
-            change.left.max(change.right) > SPEED_CHANGE_RATIO * fastest
-        };
-        self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
-    }
-
-    /// Rates of the wheels at an instant near the end of some intervals, rad/s; beyond the first and the
-    /// last, those there.
-    pub(crate) fn rate_at(&self, after: usize, t_s: f64) -> Wheels<f64> {
-        let mut at = after.min(self.intervals.len());
-        while at > 0 && self.intervals[at - 1].t_s > t_s {
-            at -= 1;
-        }
-        while at < self.intervals.len() && self.intervals[at].t_s + TIME_TOLERANCE_S < t_s {
-            at += 1;
-        }
-        let interval = match at {
-            0 => match self.intervals.first() {
-                Some(first) => return first.rate_at_ends_rad_s[0],
-                None => return Wheels::both(0.0),
-            },
-            _ => &self.intervals[at - 1],
-        };
-        let [start, end] = interval.rate_at_ends_rad_s;
-        let share = if interval.dt_s > 0.0 { ((t_s - interval.t_s) / interval.dt_s).clamp(0.0, 1.0) } else { 1.0 };
-        start.zip_with(end, |start, end| start + share * (end - start))
-    }
-
-    /// The first measured pose with its time and the number of intervals before it, and the time and pose of
-    /// the last; `None` where a heading is missing.
-    #[allow(clippy::type_complexity)]
-    pub(crate) fn ends(&self) -> Option<(Pose, (f64, usize), (f64, Pose))> {
-        let pose =
-            |measurement: &MeasuredPose| Some(Pose::new(measurement.x_m, measurement.y_m, measurement.theta_rad?));
-        let last = self.measurements.last()?;
-        let (start, first) = match self.start {
-            Start::MeasuredPose => {
-                let first = self.measurements.first()?;
-                (pose(first)?, (first.t_s, first.after))
-            }
-            Start::Origin => (Pose::IDENTITY, (self.intervals.first()?.t_s, 0)),
-        };
-        Some((start, first, (last.t_s, pose(last)?)))
-    }
-
-    fn end_error(&self, model: &Model) -> Option<(f64, f64)> {
-        let body_from_sensor = model.instrument(self.run).body_from_sensor;
-        let pose = |measurement: &MeasuredPose| {
-            Some(Pose::new(measurement.x_m, measurement.y_m, measurement.theta_rad?) * body_from_sensor.inverse())
-        };
-        let start = match self.start {
-            Start::MeasuredPose => pose(self.measurements.first()?)?,
-            Start::Origin => body_from_sensor.inverse(),
-        };
-        let end = pose(self.measurements.last()?)?;
-        let dead_reckoned =
-            self.intervals.iter().fold(start, |pose, interval| pose * model.increment(interval.wheel_rad).arc());
-        let off_rad = wrap_to_pi(dead_reckoned.theta_rad - end.theta_rad).abs();
-        Some((dead_reckoned.position().distance_m(end.position()), off_rad))
-    }
-}
 
 /// All that sessions hold for the likelihood.
 #[derive(Debug, Clone)]
 pub struct Records<'a> {
     /// The segments in the order of sessions, runs and time.
     pub segments: Vec<Segment<'a>>,
+    /// Partial measurements of runs without poses, in the order of sessions, runs and time.
+    pub(crate) partial: Vec<PartialSegment<'a>>,
+    /// Standard deviation of the gyroscope's relative scale, where it is stated.
+    pub(crate) gyro_scale_sigma: Option<f64>,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
@@ -193,12 +41,16 @@ impl<'a> Records<'a> {
 
     /// The same relative to given standard deviations of position, metres, and heading, radians.
     pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
-        let mut records = Self { segments: Vec::new(), unused: Vec::new(), ids: Vec::new() };
+        let mut records = Self::nothing();
+        records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
+        let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
+            let gyro = GyroSettings::of(session);
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             for (position, run) in session.runs.iter().enumerate() {
                 let before = records.segments.len();
+                let mut has_partial = false;
                 if let Some(track) = WheelAngleInterpolator::of(run, session.robot) {
                     let base = Segment {
                         run: (number, position),
@@ -213,9 +65,14 @@ impl<'a> Records<'a> {
                     };
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
+                    if let Some(nominal) = nominal.as_ref().filter(|_| records.segments.len() == before) {
+                        let partial = partial_segments(run, &base, &track, nominal, &gyro);
+                        has_partial = !partial.is_empty();
+                        records.partial.extend(partial);
+                    }
                     session_m += track.distance_m(session.robot);
                 }
-                if records.segments.len() == before {
+                if records.segments.len() == before && !has_partial {
                     records.unused.push((number, position));
                 }
             }
@@ -223,9 +80,39 @@ impl<'a> Records<'a> {
         records
     }
 
+    /// Of no run.
+    pub(crate) fn nothing() -> Self {
+        Self { segments: Vec::new(), partial: Vec::new(), gyro_scale_sigma: None, unused: Vec::new(), ids: Vec::new() }
+    }
+
+    /// Does a gyroscope measure in some run?
+    #[must_use]
+    pub fn has_gyro(&self) -> bool {
+        self.partial.iter().any(PartialSegment::has_gyro)
+    }
+
+    /// Is the scale of the gyroscope stated?
+    #[must_use]
+    pub const fn is_gyro_scale_stated(&self) -> bool {
+        self.gyro_scale_sigma.is_some()
+    }
+
+    /// Has some run no more than partial measurements?
+    #[must_use]
+    pub const fn has_partial(&self) -> bool {
+        !self.partial.is_empty()
+    }
+
+    /// Are partial measurements all that there is?
+    #[must_use]
+    pub const fn is_partial(&self) -> bool {
+        self.segments.is_empty() && self.has_partial()
+    }
+
     /// The records of a part of a run, under the indices of that run.
     pub(crate) fn belonging_to(mut self, run: (usize, usize)) -> Self {
         self.segments.iter_mut().for_each(|segment| segment.run = run);
+        self.partial.iter_mut().for_each(|partial| partial.segment.run = run);
         self
     }
 
@@ -239,7 +126,8 @@ impl<'a> Records<'a> {
     /// How many measurements there are.
     #[must_use]
     pub fn measurements(&self) -> usize {
-        self.segments.iter().map(|segment| segment.measurements.len()).sum()
+        let partial: usize = self.partial.iter().map(|of| of.observations.len()).sum();
+        partial + self.segments.iter().map(|segment| segment.measurements.len()).sum::<usize>()
     }
 
     /// Mean distance that a wheel rolls between measurements, metres, by a model.

@@ -17,8 +17,8 @@ use crate::model::Instrument;
 use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
 use crate::propagation::{CarriedState, Propagator};
-use crate::records::{Segment, Start};
 use crate::rounding::PoseVariance;
+use crate::segment::{Segment, Start};
 use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
 
 impl ModelFit<'_> {

@@ -48,7 +48,7 @@ pub(crate) struct PoseVariance {
 
 impl PoseVariance {
     /// Of variances of the wheels' turns, rad².
-    fn of(variance_rad2: Wheels<f64>, model: &Model) -> Self {
+    pub(crate) fn of(variance_rad2: Wheels<f64>, model: &Model) -> Self {
         let variance_m2 = variance_rad2.zip_with(model.m_per_rad, |rad2, m_per_rad| rad2 * m_per_rad * m_per_rad);
         let (Wheels { left, right }, separation_m) = (variance_m2, model.separation_m);
         Self {
@@ -70,7 +70,7 @@ impl PoseVariance {
     }
 
     /// Q in the room, for a heading.
-    fn in_room(&self, theta_rad: f64) -> Matrix3<f64> {
+    pub(crate) fn in_room(&self, theta_rad: f64) -> Matrix3<f64> {
         let (sin, cos) = sin_cos(theta_rad);
         let (along, with) = (self.along_m2, self.covariance_m_rad);
         Matrix3::new(

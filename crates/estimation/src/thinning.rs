@@ -14,7 +14,9 @@ use nalgebra::Vector3;
 use crate::covariances::Covariances;
 use crate::model::Model;
 use crate::noise::NoiseComponent;
-use crate::records::{Records, Segment, Start};
+use crate::partial_records::{PartialSegment, Place};
+use crate::records::Records;
+use crate::segment::{Segment, Start};
 use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
 
 /// How measurements are thinned.
@@ -48,15 +50,20 @@ pub(crate) struct PropagationInterval {
 pub struct Selection {
     /// For each segment its propagation intervals; without any, the segment has no part in the phase.
     pub(crate) propagations: Vec<Vec<PropagationInterval>>,
+    /// For each partial segment its propagation intervals, which lead from place to place; `None` where it
+    /// has no part in the phase.
+    pub(crate) partial: Vec<Option<Vec<PropagationInterval>>>,
 }
 
 impl Selection {
     /// The selections of all phases; propagation noise is that of the `nominal` drive.
     #[must_use]
     pub fn of(records: &Records<'_>, thinning: Thinning, nominal: &Model) -> Vec<Self> {
+        let partial: Vec<_> = records.partial.iter().map(|of| Some(between_places(of, nominal))).collect();
         let offset = |phase: usize| phase as f64 / thinning.phases as f64;
         (0..thinning.phases)
             .map(|phase| Self {
+                partial: partial.clone(),
                 propagations: records
                     .segments
                     .chunk_by(Segment::is_in_series_with)
@@ -88,7 +95,14 @@ impl Selection {
                 }
             }
         }
-        Self { propagations }
+        // A run's partial measurements hang together: all stand in its first block.
+        let partial = if block == 0 { self.partial.clone() } else { vec![None; self.partial.len()] };
+        Self { propagations, partial }
+    }
+
+    /// Does it take no measurement?
+    pub(crate) fn is_empty(&self) -> bool {
+        self.propagations.iter().all(Vec::is_empty) && self.partial.iter().all(Option::is_none)
     }
 
     /// Whether integrating the propagations takes longer than all else in a pass, so that caching them is
@@ -198,6 +212,20 @@ fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<
             propagation
         })
         .collect()
+}
+
+/// The motions from place to place.
+fn between_places(partial: &PartialSegment<'_>, nominal: &Model) -> Vec<PropagationInterval> {
+    let between = |(number, pair): (usize, &[Place])| {
+        let intervals = pair[0].after..pair[1].after;
+        PropagationInterval {
+            noise: noise(&partial.segment, intervals.clone(), nominal),
+            intervals,
+            from: number,
+            measurement: number + 1,
+        }
+    };
+    partial.places.windows(2).enumerate().map(between).collect()
 }
 
 /// Covariance of a propagation interval's motion for unit noises, by the nominal drive: the geometry must not

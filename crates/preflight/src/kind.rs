@@ -54,7 +54,7 @@ pub(crate) enum Kind {
     /// All turns go one way.
     OneWayTurns { left: bool },
     /// Parameters that these runs do not determine.
-    NotDetermined { parameters: Vec<&'static str>, turns: bool },
+    NotDetermined { parameters: Vec<&'static str>, turns: bool, partial: bool },
 }
 
 /// How positions of the instrument are mirrored.

@@ -1,7 +1,9 @@
 //! A run as the checks see it: wheel angles over time without impossible rows, and what the instrument saw.
 
-use dataset::{Displacement, NominalRobot, Protocol, RunView, TruthSample, WheelLog};
+use dataset::{Displacement, ExtraChannel, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
 use kinematics::{Side, Wheels};
+
+use crate::settings::GYRO_TURN_SIGMA_RAD;
 
 /// A run's records in one form.
 #[derive(Debug, Clone)]
@@ -20,6 +22,52 @@ pub(crate) struct RunLog {
     /// Poses or positions.
     pub(crate) truth: Vec<TruthSample>,
     pub(crate) displacements: Vec<Displacement>,
+    /// What tapes, walls, returns and a gyroscope say of the motion between two instants.
+    pub(crate) partial: Vec<PartialRow>,
+}
+
+/// What is measured of the motion between two instants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Its length.
+    Length,
+    /// Its turn.
+    Turn,
+    /// Its turn, times the scale of a gyroscope.
+    GyroTurn,
+}
+
+/// A partial measurement and its standard deviation, metres or radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PartialRow {
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
+    pub(crate) part: Part,
+    pub(crate) sigma: f64,
+}
+
+/// The partial measurements of a run; two readings of a wall are one of the motion between them.
+fn partial(run: &Run) -> Vec<PartialRow> {
+    let row = |from_s: f64, to_s: f64, part: Part, sigma: f64| PartialRow { from_s, to_s, part, sigma };
+    let mut rows: Vec<PartialRow> =
+        run.distances.iter().map(|of| row(of.t0_s, of.t1_s, Part::Length, of.sigma_m)).collect();
+    for of in &run.revisits {
+        let sigma = of.dtheta_rad.and(of.sigma_theta_rad);
+        rows.extend(sigma.map(|sigma| row(of.t0_s, of.t1_s, Part::Turn, sigma)));
+    }
+    for (number, of) in run.walls.iter().enumerate() {
+        let Some(before) = run.walls[..number].iter().rev().find(|before| before.wall == of.wall) else { continue };
+        let sigmas = [(before.sigma_rad, of.sigma_rad, Part::Turn), (before.sigma_m, of.sigma_m, Part::Length)];
+        for (a, b, part) in sigmas {
+            rows.extend(a.zip(b).map(|(a, b)| row(before.t_s, of.t_s, part, a.hypot(b))));
+        }
+    }
+    let has_gyro = run.odometry.extra.contains_key(&ExtraChannel::GyroYawRate);
+    if let (true, [from_s, .., to_s]) = (has_gyro, &run.odometry.t_s[..]) {
+        // A minute of a consumer gyroscope whose bias was seen.
+        rows.push(row(*from_s, *to_s, Part::GyroTurn, GYRO_TURN_SIGMA_RAD));
+    }
+    rows
 }
 
 impl RunLog {
@@ -55,7 +103,13 @@ impl RunLog {
             has_rates: matches!(odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }),
             truth,
             displacements: run.run().displacements.clone(),
+            partial: partial(run.run()),
         })
+    }
+
+    /// Does nothing but partial measurements see it?
+    pub(crate) fn is_seen_in_part(&self) -> bool {
+        self.truth.is_empty() && self.displacements.is_empty() && !self.partial.is_empty()
     }
 
     /// The wheels' angles if rates are of the instant.

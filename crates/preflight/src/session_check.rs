@@ -15,6 +15,8 @@ use crate::windows::{Measured, Reading, windows};
 pub(crate) struct SessionCheck {
     pub(crate) name: String,
     pub(crate) robot: NominalRobot,
+    /// Relative standard deviation of the gyroscope's scale, where it is stated.
+    pub(crate) gyro_scale_sigma: Option<f64>,
     pub(crate) runs: Vec<RunLog>,
     pub(crate) problems: Vec<Problem>,
     pub(crate) matched: Option<Matched>,
@@ -38,7 +40,8 @@ impl SessionCheck {
         let session = dataset.session();
         let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, &dataset.robot)).collect();
         let name = session.name.to_owned();
-        Self { name, robot: dataset.robot, runs, problems: Vec::new(), matched: None }
+        let gyro_scale_sigma = dataset.truth_noise.gyro.scale_sigma;
+        Self { name, robot: dataset.robot, gyro_scale_sigma, runs, problems: Vec::new(), matched: None }
     }
 
     pub(crate) fn m_per_rad(&self) -> Wheels<f64> {

@@ -232,3 +232,11 @@ pub(crate) const MIN_TURNING_RAD: f64 = 5.0;
 /// Share of the turning that goes one way, from which on it all does.
 /// Budgeted: corrections of a path's heading are a twentieth of its turns.
 pub(crate) const ONE_WAY: f64 = 0.95;
+
+/// Radians. What a gyroscope's turn over a run is off by beside its scale.
+/// Convention: an angle random walk of 1 mrad/√s, coarse for a consumer gyroscope, over two minutes.
+pub(crate) const GYRO_TURN_SIGMA_RAD: f64 = 0.01;
+
+/// Radians. Turn of a run below which a gyroscope tells the ratio of the wheels whatever its scale.
+/// Convention: a scale that is off by 5 % then errs by the standard deviation of its turn.
+pub(crate) const MAX_STRAIGHT_TURN_RAD: f64 = 0.2;

@@ -168,7 +168,11 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             "all turns go {}; drive both ways round, or unequal wheels and a wrong wheel separation look alike",
             if *left { "left" } else { "right" }
         ),
-        Kind::NotDetermined { parameters, turns } => {
+        Kind::NotDetermined { parameters, partial: true, .. } => format!(
+            "these runs do not determine {}: the gyro, tapes, walls and returns leave it open; measure lengths (distance.csv), whole turns (revisit.csv) or headings (wall.csv), or state scale_sigma under [gyro]",
+            parameters.join(", ")
+        ),
+        Kind::NotDetermined { parameters, turns, .. } => {
             let why = if *turns { "no distance is driven straight" } else { "the robot hardly turns" };
             let what = if *turns { "drive straights of some metres too" } else { "drive turns both ways too" };
             format!("these runs do not determine {}: {why}; {what}", parameters.join(", "))

@@ -130,6 +130,35 @@ pub enum Instrument {
         /// Standard deviation of each sample, m/s.
         sigma_m_s: f64,
     },
+    /// A gyroscope on the robot: the mean yaw rate over each row's interval (`gyro_radps` of `odometry.csv`).
+    Gyro {
+        /// Angle random walk, rad/√s.
+        noise_rad_per_sqrt_s: f64,
+        /// Bias at the start of each run, rad/s.
+        bias_radps: f64,
+        /// Random walk of the bias, rad/s per √s.
+        bias_walk_radps_per_sqrt_s: f64,
+        /// Relative error of its scale.
+        scale: f64,
+        /// Standard deviation of its scale that the dataset states; 0 = none is stated.
+        scale_sigma: f64,
+        /// How long the robot stands before each run, seconds, which shows the bias.
+        still_s: f64,
+    },
+    /// A tape measure: the distance between the places where the robot stands, one after the other
+    /// (`distance.csv`).
+    Tape {
+        /// Standard deviation of each distance, metres.
+        sigma_m: f64,
+    },
+    /// Marks of where a run began: the pose of the robot that has come back to it, seen from there
+    /// (`revisit.csv`).
+    Revisit {
+        /// Standard deviation of each coordinate, metres; 0 = not measured.
+        sigma_xy_m: f64,
+        /// Standard deviation of the heading, radians; 0 = not measured.
+        sigma_theta_rad: f64,
+    },
 }
 
 impl Scenario {
@@ -240,6 +269,27 @@ impl Scenario {
                 Instrument::Tachometer { rate_hz, sigma_m_s } => {
                     interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
                     not_negative("instrument.sigma_m_s", sigma_m_s)?;
+                }
+                Instrument::Gyro {
+                    noise_rad_per_sqrt_s,
+                    bias_radps,
+                    bias_walk_radps_per_sqrt_s,
+                    scale,
+                    scale_sigma,
+                    still_s,
+                } => {
+                    not_negative("instrument.noise_rad_per_sqrt_s", noise_rad_per_sqrt_s)?;
+                    finite("instrument.bias_radps", bias_radps)?;
+                    not_negative("instrument.bias_walk_radps_per_sqrt_s", bias_walk_radps_per_sqrt_s)?;
+                    range("instrument.scale", scale, (-0.5..=0.5).contains(&scale), "from -0.5 to 0.5")?;
+                    not_negative("instrument.scale_sigma", scale_sigma)?;
+                    range("instrument.still_s", still_s, (0.0..=1e3).contains(&still_s), "from 0 to 1000 s")?;
+                }
+                Instrument::Tape { sigma_m } => positive("instrument.sigma_m", sigma_m)?,
+                Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
+                    not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
+                    not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
+                    positive("instrument.sigma_xy_m + instrument.sigma_theta_rad", sigma_xy_m + sigma_theta_rad)?;
                 }
             }
         }

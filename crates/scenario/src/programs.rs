@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
+use motion_programs::{Cost, DriveLimits, Motion, MotionProgram, Schedule};
 
 use crate::budget::cost;
 use crate::error::NoFit;
-use crate::experiment::Scenario;
+use crate::experiment::{Instrument, Scenario};
 
 impl Scenario {
     /// Everything that is driven, in order: the scenario's own protocols, fitted when there is a budget.
@@ -45,6 +45,13 @@ impl Scenario {
             let before = programs.len();
             programs.extend(schedule.programs());
             number_on(&mut programs, before);
+        }
+        let still_s = self.instruments.iter().find_map(|instrument| match *instrument {
+            Instrument::Gyro { still_s, .. } if still_s > 0.0 => Some(still_s),
+            _ => None,
+        });
+        if let Some(duration_s) = still_s {
+            programs.iter_mut().for_each(|program| program.motions.insert(0, Motion::Pause { duration_s }));
         }
         Ok(programs)
     }

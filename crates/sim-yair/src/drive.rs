@@ -124,6 +124,10 @@ impl<'a> Drive<'a> {
             }
         }
         self.write_standing_row();
+        let (t_s, pose) = (self.body.t_s, self.world_from_body());
+        for observer in &mut *self.observers {
+            observer.stands(t_s, pose, self.run);
+        }
     }
 
     #[inline]
@@ -256,6 +260,10 @@ impl<'a> Drive<'a> {
         if let WheelLog::Ticks(ticks) = &mut self.run.odometry.wheels {
             ticks.left.push(readout.ticks.left);
             ticks.right.push(readout.ticks.right);
+        }
+        let theta_rad = self.world_from_body().theta_rad;
+        for observer in &mut *self.observers {
+            observer.row(due_s, theta_rad, self.run);
         }
     }
 }

@@ -1,9 +1,13 @@
-//! The outside instruments: the paper's floor grid, motion capture, and a tachometer beside each wheel.
+//! The instruments: the paper's floor grid, motion capture, a tachometer beside each wheel, a gyroscope, a
+//! tape measure, and marks of where a run began.
 
-use dataset::{MarkedPoint, PointReading, Run, TruthSample, WheelSpeed};
+use dataset::{ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, WheelSpeed};
 use effects::{Address, Stream, StreamName};
-use kinematics::{Frame, Point, Pose, Wheels};
+use kinematics::{Frame, Point, Pose, Wheels, wrap_to_pi};
 use scenario::Instrument;
+
+/// Standstills closer than this are one, seconds.
+const SAME_INSTANT_S: f64 = 1e-9;
 
 const READING: StreamName = StreamName::new("instrument reading");
 
@@ -16,13 +20,29 @@ pub(crate) struct Observer {
     samples: u32,
     /// What each wheel's contact had gone at the last measurement, metres.
     ground_m: Wheels<f64>,
+    /// Where the robot stood at the run's start and last, and when, seconds.
+    stood: Option<[(f64, Pose); 2]>,
+    /// The gyroscope's last row: its instant, seconds, the true heading, radians, and the bias, rad/s.
+    gyro_row: Option<(f64, f64, f64)>,
 }
+
+/// A tape is laid between places that are farther apart than this, metres; a robot is back where it is
+/// nearer.
+const TAPE_FROM_M: f64 = 0.3;
 
 impl Observer {
     /// The instrument at a position in the scenario's list, in the run of an address.
     pub(crate) fn new(instrument: Instrument, position: u64, address: &Address) -> Self {
         let name = READING.nth(position);
-        Self { instrument, name, stream: address.stream(name), samples: 0, ground_m: Wheels::both(0.0) }
+        Self {
+            instrument,
+            name,
+            stream: address.stream(name),
+            samples: 0,
+            ground_m: Wheels::both(0.0),
+            stood: None,
+            gyro_row: None,
+        }
     }
 
     pub(crate) const fn instrument(&self) -> &Instrument {
@@ -35,12 +55,16 @@ impl Observer {
         self.stream = stream(self.name);
         self.samples = 0;
         self.ground_m = Wheels::both(0.0);
+        (self.stood, self.gyro_row) = (None, None);
     }
 
     /// When the instrument next measures by itself, seconds; the floor grid never does.
     pub(crate) fn next_measurement_s(&self) -> f64 {
         match self.instrument {
-            Instrument::FloorGrid { .. } => f64::INFINITY,
+            Instrument::FloorGrid { .. }
+            | Instrument::Gyro { .. }
+            | Instrument::Tape { .. }
+            | Instrument::Revisit { .. } => f64::INFINITY,
             Instrument::MotionCapture { rate_hz, .. } | Instrument::Tachometer { rate_hz, .. } => {
                 f64::from(self.samples) / rate_hz
             }
@@ -85,6 +109,76 @@ impl Observer {
             world_from_marker.y_m + sigma_xy_m * stream.normal(),
             Some(world_from_marker.theta_rad + sigma_theta_rad * stream.normal()),
         ));
+    }
+
+    /// Does the instrument need every row or standstill of a run to be driven?
+    pub(crate) const fn follows_run(&self) -> bool {
+        matches!(self.instrument, Instrument::Gyro { .. } | Instrument::Tape { .. } | Instrument::Revisit { .. })
+    }
+
+    /// A row of the log at an instant and true heading: the gyroscope's mean rate since the row before.
+    pub(crate) fn row(&mut self, t_s: f64, theta_rad: f64, run: &mut Run) {
+        let Instrument::Gyro { noise_rad_per_sqrt_s, bias_radps, bias_walk_radps_per_sqrt_s, scale, .. } =
+            self.instrument
+        else {
+            return;
+        };
+        let [noise, walk] = self.stream.normals();
+        let (rate_radps, bias_radps) = match self.gyro_row {
+            Some((before_s, before_rad, before_radps)) if t_s > before_s => {
+                let dt_s = t_s - before_s;
+                let turned_radps = (1.0 + scale) * (theta_rad - before_rad) / dt_s;
+                let bias_radps = before_radps + bias_walk_radps_per_sqrt_s * dt_s.sqrt() * walk;
+                (turned_radps + bias_radps + noise_rad_per_sqrt_s / dt_s.sqrt() * noise, bias_radps)
+            }
+            // The first row has no interval before it.
+            _ => (bias_radps, bias_radps),
+        };
+        self.gyro_row = Some((t_s, theta_rad, bias_radps));
+        run.odometry.extra.entry(ExtraChannel::GyroYawRate).or_default().push(rate_radps);
+    }
+
+    /// The robot stands: the tape from the last standstill, and the marks of the run's start where it is back
+    /// there.
+    pub(crate) fn stands(&mut self, t_s: f64, pose: Pose, run: &mut Run) {
+        let Some([(first_s, first), (before_s, before)]) = self.stood else {
+            self.stood = Some([(t_s, pose); 2]);
+            return;
+        };
+        if t_s <= before_s + SAME_INSTANT_S {
+            return;
+        }
+        self.stood = Some([(first_s, first), (t_s, pose)]);
+        match self.instrument {
+            Instrument::Tape { sigma_m } => {
+                let distance_m = before.position().distance_m(pose.position());
+                if distance_m > TAPE_FROM_M {
+                    let distance_m = distance_m + sigma_m * self.stream.normal();
+                    run.distances.push(TapeDistance { t0_s: before_s, t1_s: t_s, distance_m, sigma_m });
+                }
+            }
+            Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
+                let moved = first.to(pose);
+                let turned_rad = (pose.theta_rad - first.theta_rad).abs();
+                if moved.x_m.hypot(moved.y_m) > TAPE_FROM_M || turned_rad < 1.0 {
+                    return;
+                }
+                let [dx, dy] = self.stream.normals();
+                let dtheta = self.stream.normal();
+                let measured = |sigma: f64, value: f64| (sigma > 0.0).then_some(value);
+                run.revisits.push(Revisit {
+                    t0_s: first_s,
+                    t1_s: t_s,
+                    dx_m: measured(sigma_xy_m, moved.x_m + sigma_xy_m * dx),
+                    dy_m: measured(sigma_xy_m, moved.y_m + sigma_xy_m * dy),
+                    // Nobody counts whole turns who looks at a mark.
+                    dtheta_rad: measured(sigma_theta_rad, wrap_to_pi(moved.theta_rad) + sigma_theta_rad * dtheta),
+                    sigma_xy_m: measured(sigma_xy_m, sigma_xy_m),
+                    sigma_theta_rad: measured(sigma_theta_rad, sigma_theta_rad),
+                });
+            }
+            _ => {}
+        }
     }
 
     /// A reading of the standing robot's marks on the floor grid.

@@ -1,6 +1,6 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
-use dataset::{MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
+use dataset::{GyroNoise, MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
 use effects::{Address, EffectError, Forward, RunStart, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use motion_programs::{MotionProgram, Platform};
@@ -189,7 +189,8 @@ impl SimulatedRobot {
             |command: &_| planned_segments.then(|| self.setup.profile.segments(command, |_| Wheels::both(1.0)));
         let planned = |motion| PlannedMotion::new(motion, &self.robot, &self.nominal_geometry, segments);
         let motions: Vec<_> = program.motions.iter().map(planned).collect();
-        let undisturbed = self.setup.log_interval_s.is_none() && !self.observers.iter().any(Observer::free_running);
+        let undisturbed = self.setup.log_interval_s.is_none()
+            && !self.observers.iter().any(|of| of.free_running() || of.follows_run());
         let precomputed_run = if planned_segments && undisturbed && self.effects.leave_clocks_alone() {
             PrecomputedRun::new(&motions)
         } else {
@@ -289,8 +290,18 @@ impl Platform for SimulatedRobot {
                     (reading_sigma_m.hypot(resolution_m / 12_f64.sqrt()), 0.0)
                 }
                 Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => (sigma_xy_m, sigma_theta_rad),
-                // It sees no pose.
-                Instrument::Tachometer { .. } => (0.0, 0.0),
+                Instrument::Gyro { noise_rad_per_sqrt_s, bias_walk_radps_per_sqrt_s, scale_sigma, .. } => {
+                    let known = |sigma: f64| (sigma > 0.0).then_some(sigma);
+                    noise.gyro = GyroNoise {
+                        scale_sigma: known(scale_sigma),
+                        noise_rad_per_sqrt_s: known(noise_rad_per_sqrt_s),
+                        bias_walk_radps_per_sqrt_s: known(bias_walk_radps_per_sqrt_s),
+                        is_instantaneous: false,
+                    };
+                    (0.0, 0.0)
+                }
+                // They see no pose, or state their precision with each measurement.
+                Instrument::Tachometer { .. } | Instrument::Tape { .. } | Instrument::Revisit { .. } => (0.0, 0.0),
             };
             let known = |sigma: f64| (sigma > 0.0).then_some(sigma);
             noise.sigma_xy_m = noise.sigma_xy_m.or(known(xy_m));
@@ -328,4 +339,7 @@ fn empty(run: &mut Run, program: &MotionProgram) {
     run.displacements.clear();
     run.point_readings.clear();
     run.wheel_reference.clear();
+    run.revisits.clear();
+    run.distances.clear();
+    run.walls.clear();
 }

@@ -23,6 +23,9 @@ pub enum NoBound {
     /// A tachometer measures the wheels, and the bound takes measurements of the pose alone.
     #[error("a tachometer's wheel speeds are no pose measurement: leave the instrument out for a bound")]
     WheelSpeeds,
+    /// Partial measurements have no bound here yet.
+    #[error("a gyro, a tape measure and revisits have no closed bound here")]
+    PartialMeasurements,
     /// The floor grid reads fewer than two distinct points.
     #[error("the robot's marked points give no heading: two of them must differ")]
     NoHeading,

@@ -138,6 +138,9 @@ impl PoseInstrument {
                 Ok(Self { rate_hz: Some(rate_hz), covariance })
             }
             Instrument::Tachometer { .. } => Err(NoBound::WheelSpeeds),
+            Instrument::Gyro { .. } | Instrument::Tape { .. } | Instrument::Revisit { .. } => {
+                Err(NoBound::PartialMeasurements)
+            }
         }
     }
 

@@ -12,17 +12,19 @@
 //! Reid & Firth 2011 (composite likelihood).
 
 use dataset::{Blocks, DatasetError, Session, Warning};
-use estimation::{Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, fit_large};
+use estimation::{
+    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, Records, fit_large,
+};
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
+use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT};
 use crate::estimate::{
-    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
+    CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
     Rejected,
-    covariance_of_lengths, drive, nominal,
-};
+    covariance_of_lengths, drive, nominal,};
 
 /// The method with the settings of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +79,7 @@ impl Method for Joint {
     }
 
     fn about(&self) -> &'static str {
-        "any path and any truth (poses, positions, ends, displacements, marks): maximum likelihood of whole runs, noise estimated"
+        "any path and any truth (poses, positions, ends, displacements, marks, gyro, tape, walls): maximum likelihood of whole runs, noise estimated"
     }
 
     /// The paper's runs, with squares for what only shows in corners.
@@ -157,11 +159,39 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
 fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
     fit.unobservable
         .iter()
-        .map(|direction| {
-            let (parameter, why) = unobservable(&Vector3::new(direction[0], direction[1], direction[2]));
-            NotObservable { parameter, why }
+        .flat_map(|direction| {
+            let direction = Vector3::new(direction[0], direction[1], direction[2]);
+            let (parameter, why) = unobservable(&direction);
+            let why = why_not(&fit.records, &direction).unwrap_or(why);
+            // Both wheels alike, or against each other: neither diameter is known.
+            let of = direction.normalize().abs();
+            let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
+            let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
+            let named = if both { wheels.to_vec() } else { vec![parameter] };
+            named.into_iter().map(move |parameter| NotObservable { parameter, why })
         })
         .collect()
+}
+
+/// Why a direction is not observable where partial measurements are all there is.
+fn why_not(records: &Records<'_>, direction: &Vector3<f64>) -> Option<&'static str> {
+    if !records.is_partial() {
+        return None;
+    }
+    let of = direction.normalize();
+    let ratio = (of.x - of.y).abs() * std::f64::consts::FRAC_1_SQRT_2;
+    Some(if of.z.abs() > MIN_NAMED_COMPONENT && records.has_gyro() {
+        "the gyro's scale is not known, so that only the ratio of the wheels is: state scale_sigma under [gyro] of \
+         dataset.toml, or come back to the same heading after whole turns (revisit.csv)"
+    } else if of.z.abs() > MIN_NAMED_COMPONENT {
+        "nothing measures a turn: come back to the same heading after whole turns (revisit.csv), or log a gyro"
+    } else if ratio > MIN_NAMED_COMPONENT && records.has_gyro() {
+        "the gyro's bias is not told from the wheels' ratio: stand still for 10 s in every run, or drive at two speeds"
+    } else if ratio > MIN_NAMED_COMPONENT {
+        "nothing measures how straights bend: log a gyro, or headings along a wall (wall.csv)"
+    } else {
+        "nothing measures a length: measure a straight by tape (distance.csv), or distances from a wall (wall.csv)"
+    })
 }
 
 /// Runs without use and runs of which no measurement fitted.

@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use super::truth::{PointIndex, TruthTable};
+use super::columns::PointIndex;
+use super::truth::TruthTable;
 use super::{Opened, has_truth, odometry, without_truth};
 use crate::corrections::Corrections;
 use crate::error::DatasetError;

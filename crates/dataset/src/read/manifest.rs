@@ -12,6 +12,7 @@ use toml::{Spanned, Value};
 use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
+use crate::partial::GyroNoise;
 use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
 use crate::table::open_file;
 
@@ -46,6 +47,8 @@ struct ManifestToml {
     robot: Spanned<RobotToml>,
     #[serde(default)]
     truth: TruthToml,
+    #[serde(default)]
+    gyro: GyroToml,
     corrections: Option<Spanned<Corrections>>,
     #[serde(default)]
     run: Vec<Spanned<RunToml>>,
@@ -69,6 +72,25 @@ struct RobotToml {
 struct TruthToml {
     sigma_xy_m: Option<Spanned<f64>>,
     sigma_theta_rad: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct GyroToml {
+    scale_sigma: Option<Spanned<f64>>,
+    noise_rad_per_sqrt_s: Option<Spanned<f64>>,
+    bias_walk_radps_per_sqrt_s: Option<Spanned<f64>>,
+    sampling: Option<GyroSampling>,
+}
+
+/// What the rate of a row is.
+#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+enum GyroSampling {
+    /// The mean over the interval that ends at the row.
+    IntervalEnd,
+    /// The rate at the row's instant.
+    Instantaneous,
 }
 
 type RunToml = BTreeMap<Spanned<String>, Spanned<Value>>;
@@ -153,6 +175,13 @@ impl Source<'_> {
         let truth_noise = TruthNoise {
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,
             sigma_theta_rad: self.sigma("sigma_theta_rad", toml.truth.sigma_theta_rad)?,
+            gyro: GyroNoise {
+                scale_sigma: self.sigma("scale_sigma", toml.gyro.scale_sigma)?,
+                noise_rad_per_sqrt_s: self.sigma("noise_rad_per_sqrt_s", toml.gyro.noise_rad_per_sqrt_s)?,
+                bias_walk_radps_per_sqrt_s: self
+                    .sigma("bias_walk_radps_per_sqrt_s", toml.gyro.bias_walk_radps_per_sqrt_s)?,
+                is_instantaneous: toml.gyro.sampling == Some(GyroSampling::Instantaneous),
+            },
         };
         let corrections = toml.corrections.map_or(Ok(Corrections::default()), |found| self.corrections(found))?;
         if toml.run.is_empty() {

@@ -3,9 +3,11 @@
 //! All headers are read before any table, so that a wrong file among large ones is named at once.
 
 mod blocks;
+mod columns;
 mod grouped;
 mod manifest;
 mod odometry;
+mod partial;
 mod run_by_run;
 mod truth;
 
@@ -14,16 +16,18 @@ use std::path::{Path, PathBuf};
 use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
-use crate::record::{Dataset, Run};
+use crate::record::{Dataset, ExtraChannel, Run};
 use crate::table::RunIndex;
 use crate::warning::Warning;
+use columns::PointIndex;
 use manifest::Manifest;
 use odometry::OdometryTable;
-use truth::{PointIndex, TruthTable};
+use truth::TruthTable;
 
 pub use blocks::Blocks;
 pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};
 pub(crate) use odometry::wheel_columns;
+pub(crate) use partial::{DISTANCE, REVISIT, WALL};
 pub use run_by_run::RunByRun;
 pub(crate) use truth::{DISPLACEMENT, POINTS, TRUTH, WHEEL_REFERENCE};
 
@@ -121,7 +125,7 @@ impl Opened {
         for (key, value_m, _) in lengths.into_iter().filter(|(_, value_m, largest_m)| value_m > largest_m) {
             warnings.push(Warning::NotMetres { file: manifest_file.clone(), key, value_m });
         }
-        let truths = truth::open_all(dir, &mut warnings)?;
+        let truths = truth::open_all(dir, odometry.has_gyro(), &mut warnings)?;
 
         let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
         let runs = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();
@@ -130,10 +134,14 @@ impl Opened {
     }
 }
 
-/// Whether an outside instrument saw anything of a run.
-pub(crate) const fn has_truth(run: &Run) -> bool {
+/// Whether an instrument beside the wheels saw anything of a run.
+pub(crate) fn has_truth(run: &Run) -> bool {
     !(run.truth.is_empty()
         && run.displacements.is_empty()
         && run.point_readings.is_empty()
-        && run.wheel_reference.is_empty())
+        && run.wheel_reference.is_empty()
+        && run.revisits.is_empty()
+        && run.distances.is_empty()
+        && run.walls.is_empty()
+        && !run.odometry.extra.contains_key(&ExtraChannel::GyroYawRate))
 }

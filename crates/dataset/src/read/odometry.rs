@@ -108,6 +108,11 @@ impl OdometryTable {
         Ok(Self { table, columns: Columns { t_s, form, wheels, extra } })
     }
 
+    /// Has it a column of a gyroscope?
+    pub(super) fn has_gyro(&self) -> bool {
+        self.columns.extra.iter().any(|(channel, _)| *channel == ExtraChannel::GyroYawRate)
+    }
+
     pub(super) fn has_ticks(&self) -> bool {
         self.columns.form == Form::Ticks
     }

@@ -1,12 +1,14 @@
-//! The four tables of an outside instrument: poses, displacements, marked points and wheel speeds.
+//! The tables of an outside instrument: poses, displacements, marked points and wheel speeds, and the list of
+//! all tables that measure something of the robot.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use kinematics::{Point, Wheels};
 
+use super::columns::{PointIndex, TruthColumns};
+use super::partial::{DISTANCE, DistanceColumns, REVISIT, RevisitColumns, WALL, WallColumns};
 use crate::error::{DatasetError, shown};
-use crate::record::{Displacement, MarkedPoint, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
+use crate::record::{Displacement, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
 use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
 
@@ -14,9 +16,6 @@ pub(crate) const TRUTH: &str = "truth.csv";
 pub(crate) const DISPLACEMENT: &str = "displacement.csv";
 pub(crate) const POINTS: &str = "points.csv";
 pub(crate) const WHEEL_REFERENCE: &str = "wheel_reference.csv";
-
-/// Marked points that an error lists.
-const LISTED_POINTS: usize = 20;
 
 /// One kind of table: adding one is one line in [`KINDS`] and its columns.
 #[derive(Debug)]
@@ -27,7 +26,7 @@ struct Kind {
     find: fn(&Table) -> Result<Box<dyn TruthColumns>, DatasetError>,
 }
 
-const KINDS: [Kind; 4] = [
+const KINDS: [Kind; 7] = [
     Kind {
         file: TRUTH,
         header: "a header like run,t_s,x_m,y_m,theta_rad",
@@ -52,19 +51,25 @@ const KINDS: [Kind; 4] = [
         known: &["t_s", "left_mps", "right_mps"],
         find: |table| Ok(Box::new(WheelReferenceColumns::find(table)?)),
     },
+    Kind {
+        file: REVISIT,
+        header: "a header like run,t0_s,t1_s,sigma_xy_m,sigma_theta_rad",
+        known: RevisitColumns::KNOWN,
+        find: |table| Ok(Box::new(RevisitColumns::find(table)?)),
+    },
+    Kind {
+        file: DISTANCE,
+        header: "a header like run,t0_s,t1_s,distance_m,sigma_m",
+        known: DistanceColumns::KNOWN,
+        find: |table| Ok(Box::new(DistanceColumns::find(table)?)),
+    },
+    Kind {
+        file: WALL,
+        header: "a header like run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad",
+        known: WallColumns::KNOWN,
+        find: |table| Ok(Box::new(WallColumns::find(table)?)),
+    },
 ];
-
-/// Where the columns of one kind of table stand, and what a row becomes.
-trait TruthColumns: std::fmt::Debug {
-    fn reserve(&self, run: &mut Run, rows: usize);
-    fn push(&self, row: &Row<'_>, run: &mut Run, points: &PointIndex) -> Result<(), DatasetError>;
-
-    /// The instants' column, where a row speaks of one instant and stands for itself: only then can a run be
-    /// cut between two of them.
-    fn instant(&self) -> Option<usize> {
-        None
-    }
-}
 
 /// An open truth table.
 #[derive(Debug)]
@@ -74,8 +79,12 @@ pub(super) struct TruthTable {
     columns: Box<dyn TruthColumns>,
 }
 
-/// Opens the truth tables that are there; one at least must be.
-pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<TruthTable>, DatasetError> {
+/// Opens the truth tables that are there; one at least must be, unless a gyroscope stands beside the wheels.
+pub(super) fn open_all(
+    dir: &Path,
+    has_gyro: bool,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<TruthTable>, DatasetError> {
     let mut tables = Vec::new();
     for kind in &KINDS {
         let file = dir.join(kind.file);
@@ -87,7 +96,7 @@ pub(super) fn open_all(dir: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Tr
             tables.push(TruthTable { name: kind.file, table, columns });
         }
     }
-    if tables.is_empty() { Err(DatasetError::NoTruth { dir: dir.to_owned() }) } else { Ok(tables) }
+    if tables.is_empty() && !has_gyro { Err(DatasetError::NoTruth { dir: dir.to_owned() }) } else { Ok(tables) }
 }
 
 impl TruthTable {
@@ -146,26 +155,6 @@ impl TruthTable {
             previous_s = Some(t_s);
             if t_s < from_s || t_s > to_s { Ok(()) } else { columns.push(row, run, points) }
         })
-    }
-}
-
-/// Which marked point an id speaks of.
-#[derive(Debug)]
-pub(super) struct PointIndex {
-    by_id: HashMap<Box<[u8]>, usize>,
-    known: String,
-}
-
-impl PointIndex {
-    pub(super) fn new(points: &[MarkedPoint]) -> Self {
-        let by_id = points.iter().map(|point| point.id.as_bytes().into()).zip(0..).collect();
-        let mut known: Vec<_> = points.iter().take(LISTED_POINTS).map(|point| shown(point.id.as_bytes())).collect();
-        if points.len() > LISTED_POINTS {
-            known.push("…".to_owned());
-        } else if points.is_empty() {
-            known.push("none".to_owned());
-        }
-        Self { by_id, known: known.join(", ") }
     }
 }
 

@@ -335,7 +335,7 @@ impl Row<'_> {
         self.fields.get(self.line.bytes, column)
     }
 
-    fn text(&self, column: usize) -> Result<&str, DatasetError> {
+    pub(crate) fn text(&self, column: usize) -> Result<&str, DatasetError> {
         std::str::from_utf8(self.bytes(column))
             .map_err(|_| DatasetError::NotUtf8 { file: self.file(), line: self.line() })
     }

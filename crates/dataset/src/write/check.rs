@@ -81,6 +81,10 @@ fn check_robot(dataset: &Dataset) -> Check {
     }
     sigma("sigma_xy_m", dataset.truth_noise.sigma_xy_m)?;
     sigma("sigma_theta_rad", dataset.truth_noise.sigma_theta_rad)?;
+    let gyro = dataset.truth_noise.gyro;
+    sigma("scale_sigma", gyro.scale_sigma)?;
+    sigma("noise_rad_per_sqrt_s", gyro.noise_rad_per_sqrt_s)?;
+    sigma("bias_walk_radps_per_sqrt_s", gyro.bias_walk_radps_per_sqrt_s)?;
     let mut ids = BTreeSet::new();
     for point in &dataset.points {
         id("point", &point.id)?;
@@ -110,6 +114,7 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
         all_finite("displacement", [step.t1_s, step.dx_m, step.dy_m, step.dtheta_rad])?;
         ensure(step.t0_s < step.t1_s, || format!("a displacement from {} s to {} s", step.t0_s, step.t1_s))?;
     }
+    check_partial(run)?;
     increasing("wheel_reference", run.wheel_reference.iter().map(|speed| speed.t_s))?;
     let speeds = run.wheel_reference.iter().flat_map(|speed| [speed.speed_m_s.left, speed.speed_m_s.right]);
     all_finite("wheel_reference", speeds)?;
@@ -122,6 +127,45 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
     }
     let instants = run.point_readings.chunk_by(|a, b| a.t_s == b.t_s).map(|instant| instant[0].t_s);
     increasing("points", instants)
+}
+
+/// Partial measurements, each with its standard deviation.
+fn check_partial(run: &Run) -> Check {
+    let between = |what: &str, t0_s: f64, t1_s: f64| {
+        all_finite(what, [t0_s, t1_s])?;
+        ensure(t0_s < t1_s, || format!("a {what} from {t0_s} s to {t1_s} s"))
+    };
+    let measured = |what: &str, value: Option<f64>, sigma: Option<f64>| match (value, sigma) {
+        (None, _) => Ok(false),
+        (Some(value), Some(sigma)) => finite(what, value).and_then(|()| positive(what, sigma)).map(|()| true),
+        (Some(value), None) => Err(format!("{what} = {value} without a standard deviation")),
+    };
+    for of in &run.revisits {
+        between("revisit", of.t0_s, of.t1_s)?;
+        let any = measured("dx_m", of.dx_m, of.sigma_xy_m)?
+            | measured("dy_m", of.dy_m, of.sigma_xy_m)?
+            | measured("dtheta_rad", of.dtheta_rad, of.sigma_theta_rad)?;
+        ensure(any, || format!("a revisit at {} s that measures nothing", of.t1_s))?;
+    }
+    for of in &run.distances {
+        between("distance", of.t0_s, of.t1_s)?;
+        positive("distance_m", of.distance_m)?;
+        positive("sigma_m", of.sigma_m)?;
+    }
+    for of in &run.walls {
+        id("wall", &of.wall)?;
+        finite("t_s", of.t_s)?;
+        let any =
+            measured("distance_m", of.distance_m, of.sigma_m)? | measured("heading_rad", of.heading_rad, of.sigma_rad)?;
+        ensure(any, || format!("a wall reading at {} s that measures nothing", of.t_s))?;
+    }
+    let in_order = |times_s: &[f64]| times_s.is_sorted();
+    let times: [(&str, Vec<f64>); 3] = [
+        ("revisits", run.revisits.iter().map(|of| of.t0_s).collect()),
+        ("distances", run.distances.iter().map(|of| of.t0_s).collect()),
+        ("walls", run.walls.iter().map(|of| of.t_s).collect()),
+    ];
+    times.iter().try_for_each(|(what, times_s)| ensure(in_order(times_s), || format!("{what} out of time order")))
 }
 
 fn check_info(info: &RunInfo) -> Check {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::partial::GyroNoise;
 use crate::read::FORMAT;
 use crate::record::{Dataset, NominalRobot, Protocol, ProtocolSettings, Provenance, RunInfo};
 
@@ -20,6 +21,8 @@ struct ManifestOut<'a> {
     notes: Option<&'a str>,
     robot: &'a NominalRobot,
     truth: TruthOut,
+    #[serde(skip_serializing_if = "GyroOut::is_empty")]
+    gyro: GyroOut,
     run: Vec<RunOut<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     point: Vec<PointOut<'a>>,
@@ -31,6 +34,36 @@ struct TruthOut {
     sigma_xy_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sigma_theta_rad: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct GyroOut {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale_sigma: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise_rad_per_sqrt_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_walk_radps_per_sqrt_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sampling: Option<&'static str>,
+}
+
+impl GyroOut {
+    fn of(gyro: GyroNoise) -> Self {
+        Self {
+            scale_sigma: gyro.scale_sigma,
+            noise_rad_per_sqrt_s: gyro.noise_rad_per_sqrt_s,
+            bias_walk_radps_per_sqrt_s: gyro.bias_walk_radps_per_sqrt_s,
+            sampling: gyro.is_instantaneous.then_some("instantaneous"),
+        }
+    }
+
+    const fn is_empty(&self) -> bool {
+        self.scale_sigma.is_none()
+            && self.noise_rad_per_sqrt_s.is_none()
+            && self.bias_walk_radps_per_sqrt_s.is_none()
+            && self.sampling.is_none()
+    }
 }
 
 #[derive(Serialize)]
@@ -79,6 +112,7 @@ pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, tom
             sigma_xy_m: dataset.truth_noise.sigma_xy_m,
             sigma_theta_rad: dataset.truth_noise.sigma_theta_rad,
         },
+        gyro: GyroOut::of(dataset.truth_noise.gyro),
         run: runs.iter().map(RunOut::new).collect(),
         point: dataset
             .points

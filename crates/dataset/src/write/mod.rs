@@ -17,11 +17,13 @@ use tables::{OptionalColumns, Out, TABLES};
 use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
-use crate::read::{DISPLACEMENT, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, TRUTH, WHEEL_REFERENCE};
+use crate::read::{
+    DISPLACEMENT, DISTANCE, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE,
+};
 use crate::record::{Dataset, Run, RunInfo, WheelLog};
 
 /// Every file that a dataset may have; what [`Existing::ReplaceDataset`] may delete.
-const FILES: [&str; 6] = [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE];
+const FILES: [&str; 9] = [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE, REVISIT, DISTANCE, WALL];
 
 /// What to do with something that stands where a dataset is to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

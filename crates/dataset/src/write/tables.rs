@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
-use crate::read::{DISPLACEMENT, ODOMETRY, POINTS, TRUTH, WHEEL_REFERENCE, wheel_columns};
+use crate::read::{DISPLACEMENT, DISTANCE, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE, wheel_columns};
 use crate::record::{ExtraChannel, MarkedPoint, Run, WheelLog};
 use crate::table::quoted_where_needed;
 
@@ -70,7 +70,7 @@ pub(super) struct TableKind {
     pub(super) rows: fn(&Run, &[MarkedPoint], &OptionalColumns, &mut Out) -> io::Result<()>,
 }
 
-pub(super) const TABLES: [TableKind; 5] = [
+pub(super) const TABLES: [TableKind; 8] = [
     TableKind { file: ODOMETRY, has: |_| true, header: odometry_header, rows: odometry },
     TableKind { file: TRUTH, has: |run| !run.truth.is_empty(), header: truth_header, rows: truth },
     TableKind {
@@ -90,6 +90,24 @@ pub(super) const TABLES: [TableKind; 5] = [
         has: |run| !run.wheel_reference.is_empty(),
         header: |_, _| "run,t_s,left_mps,right_mps".to_owned(),
         rows: wheel_reference,
+    },
+    TableKind {
+        file: REVISIT,
+        has: |run| !run.revisits.is_empty(),
+        header: |_, _| "run,t0_s,t1_s,dx_m,dy_m,dtheta_rad,sigma_xy_m,sigma_theta_rad".to_owned(),
+        rows: revisits,
+    },
+    TableKind {
+        file: DISTANCE,
+        has: |run| !run.distances.is_empty(),
+        header: |_, _| "run,t0_s,t1_s,distance_m,sigma_m".to_owned(),
+        rows: distances,
+    },
+    TableKind {
+        file: WALL,
+        has: |run| !run.walls.is_empty(),
+        header: |_, _| "run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad".to_owned(),
+        rows: walls,
     },
 ];
 
@@ -181,6 +199,47 @@ fn wheel_reference(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut 
     for speed in &run.wheel_reference {
         out.write_all(id.as_bytes())?;
         numbers(out, [speed.t_s, speed.speed_m_s.left, speed.speed_m_s.right])?;
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+/// Numbers that may be missing, each behind a comma.
+fn optional<const N: usize>(out: &mut impl Write, values: [Option<f64>; N]) -> io::Result<()> {
+    values.into_iter().try_for_each(|value| {
+        out.write_all(b",")?;
+        number(out, value)
+    })
+}
+
+fn revisits(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
+    let id = quoted_where_needed(&run.info.id);
+    for of in &run.revisits {
+        out.write_all(id.as_bytes())?;
+        numbers(out, [of.t0_s, of.t1_s])?;
+        optional(out, [of.dx_m, of.dy_m, of.dtheta_rad, of.sigma_xy_m, of.sigma_theta_rad])?;
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+fn distances(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
+    let id = quoted_where_needed(&run.info.id);
+    for of in &run.distances {
+        out.write_all(id.as_bytes())?;
+        numbers(out, [of.t0_s, of.t1_s, of.distance_m, of.sigma_m])?;
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+fn walls(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
+    let id = quoted_where_needed(&run.info.id);
+    for of in &run.walls {
+        out.write_all(id.as_bytes())?;
+        numbers(out, [of.t_s])?;
+        write!(out, ",{}", quoted_where_needed(&of.wall))?;
+        optional(out, [of.distance_m, of.heading_rad, of.sigma_m, of.sigma_rad])?;
         out.write_all(b"\n")?;
     }
     Ok(())

@@ -7,7 +7,7 @@ use std::path::Path;
 use dataset::{DatasetError, Warning, read};
 use kinematics::Side;
 
-const TOML: &str = "\
+pub(crate) const TOML: &str = "\
 format = 1
 [robot]
 left_wheel_diameter_m = 0.1
@@ -33,31 +33,31 @@ const POINTS: &str = "run,t_s,point,x_m,y_m\na,0,left,0,0.25\na,1,left,0.5,0.25\
 const WHEELS: &str = "run,t_s,left_mps,right_mps\na,0,0.1,0.1\na,1,0.1,0.1\n";
 
 /// A good dataset in which some files have other content, or are absent.
-struct Case(tempfile::TempDir);
+pub(crate) struct Case(tempfile::TempDir);
 
 impl Case {
-    fn good() -> Self {
+    pub(crate) fn good() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
             .with("dataset.toml", TOML)
             .with("odometry.csv", ODOMETRY)
             .with("truth.csv", TRUTH)
     }
 
-    fn with(self, file: &str, content: impl AsRef<[u8]>) -> Self {
+    pub(crate) fn with(self, file: &str, content: impl AsRef<[u8]>) -> Self {
         fs::write(self.path().join(file), content).expect("written");
         self
     }
 
-    fn without(self, file: &str) -> Self {
+    pub(crate) fn without(self, file: &str) -> Self {
         fs::remove_file(self.path().join(file)).expect("removed");
         self
     }
 
-    fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.0.path()
     }
 
-    fn error(&self) -> DatasetError {
+    pub(crate) fn error(&self) -> DatasetError {
         read(self.path()).expect_err("a fault was planted")
     }
 

@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod blocks;
+mod partial;
 mod real_data;
 mod round_trip;
 #[path = "../../../../tests/support/real_data.rs"]

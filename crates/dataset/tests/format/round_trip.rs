@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use dataset::{
     Dataset, Displacement, Existing, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, Run, RunByRun, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
-    read, write,
+    ProtocolSettings, Provenance, Revisit, Run, RunByRun, RunInfo, TapeDistance, TruthNoise, TruthSample, TruthSigma,
+    WallReading, WheelLog, WheelSpeed, read, write,
 };
 use kinematics::{Point, Wheels};
 use proptest::collection::{btree_map, vec};
@@ -138,6 +138,43 @@ fn wheel_reference() -> impl Strategy<Value = Vec<WheelSpeed>> {
     })
 }
 
+fn partial() -> impl Strategy<Value = (Vec<Revisit>, Vec<TapeDistance>, Vec<WallReading>)> {
+    let revisit = (times(2), option::of(number()), option::of(number()), number(), positive(), positive());
+    let distance = (times(2), positive(), positive());
+    let wall = || (id(), number(), option::of(number()), positive(), positive());
+    (vec(revisit, 0..3), vec(distance, 0..3), (0_usize..4).prop_flat_map(move |rows| (times(rows), vec(wall(), rows))))
+        .prop_map(|(revisits, distances, (walls_s, walls))| {
+            let revisits = revisits.into_iter().map(|(t, dx_m, dy_m, dtheta_rad, sigma_m, sigma_rad)| Revisit {
+                t0_s: t[0],
+                t1_s: t[1],
+                dx_m,
+                dy_m,
+                dtheta_rad: Some(dtheta_rad),
+                sigma_xy_m: dx_m.or(dy_m).map(|_| sigma_m),
+                sigma_theta_rad: Some(sigma_rad),
+            });
+            let distances = distances.into_iter().map(|(t, distance_m, sigma_m)| TapeDistance {
+                t0_s: t[0],
+                t1_s: t[1],
+                distance_m,
+                sigma_m,
+            });
+            let walls =
+                walls_s.into_iter().zip(walls).map(|(t_s, (wall, distance_m, heading_rad, m, rad))| WallReading {
+                    t_s,
+                    wall,
+                    distance_m: Some(distance_m),
+                    heading_rad,
+                    sigma_m: Some(m),
+                    sigma_rad: heading_rad.map(|_| rad),
+                });
+            let (mut revisits, mut distances): (Vec<_>, Vec<_>) = (revisits.collect(), distances.collect());
+            revisits.sort_by(|a, b| a.t0_s.total_cmp(&b.t0_s));
+            distances.sort_by(|a, b| a.t0_s.total_cmp(&b.t0_s));
+            (revisits, distances, walls.collect())
+        })
+}
+
 fn info() -> impl Strategy<Value = RunInfo> {
     use Protocol::{CircleCcw, CircleCw, Free, Path, Spin, SquareCcw, SquareCw, Straight};
     let protocols = vec![Straight, Spin, SquareCw, SquareCcw, CircleCw, CircleCcw, Path, Free];
@@ -158,19 +195,28 @@ fn covariates() -> impl Strategy<Value = BTreeMap<String, f64>> {
 }
 
 fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
-    (info(), odometry(form), truth(), displacements(), point_readings(points), wheel_reference())
-        .prop_filter("a run needs some truth", |(_, _, (truth, _), steps, readings, speeds)| {
+    let seen = (truth(), displacements(), point_readings(points), wheel_reference());
+    (info(), odometry(form), seen, partial())
+        .prop_filter("a run needs some truth", |(_, _, ((truth, _), steps, readings, speeds), partial)| {
+            let (revisits, distances, walls) = partial;
             !(truth.is_empty() && steps.is_empty() && readings.is_empty() && speeds.is_empty())
+                || !(revisits.is_empty() && distances.is_empty() && walls.is_empty())
         })
-        .prop_map(|(info, odometry, (truth, truth_sigma), displacements, point_readings, wheel_reference)| Run {
-            info,
-            odometry,
-            truth,
-            truth_sigma,
-            displacements,
-            point_readings,
-            wheel_reference,
-            unknown_motion: Vec::new(),
+        .prop_map(|(info, odometry, seen, (revisits, distances, walls))| {
+            let ((truth, truth_sigma), displacements, point_readings, wheel_reference) = seen;
+            Run {
+                info,
+                odometry,
+                truth,
+                truth_sigma,
+                displacements,
+                point_readings,
+                wheel_reference,
+                revisits,
+                distances,
+                walls,
+                unknown_motion: Vec::new(),
+            }
         })
 }
 
@@ -196,7 +242,7 @@ fn datasets() -> impl Strategy<Value = Dataset> {
                         ticks_per_rev: Some(ticks_per_rev),
                         counter_bits: None,
                     },
-                    truth_noise: TruthNoise { sigma_xy_m: noise.0, sigma_theta_rad: noise.1 },
+                    truth_noise: TruthNoise { sigma_xy_m: noise.0, sigma_theta_rad: noise.1, ..TruthNoise::default() },
                     points: points.clone(),
                     runs,
                 }

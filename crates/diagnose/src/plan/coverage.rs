@@ -395,7 +395,10 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
             let moment: f64 = marks.iter().map(|mark| (mark.x_m - x_m).powi(2) + (mark.y_m - y_m).powi(2)).sum();
             Some((of_mark_m / n.sqrt(), of_mark_m / moment.sqrt()))
         }
-        Instrument::Tachometer { .. } => None,
+        Instrument::Tachometer { .. }
+        | Instrument::Gyro { .. }
+        | Instrument::Tape { .. }
+        | Instrument::Revisit { .. } => None,
     })?;
     let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
     Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)) })

@@ -12,7 +12,9 @@ use super::manoeuvres::{Manoeuvre, Part};
 use crate::candidate::Candidate;
 use crate::model_comparison::log_odds_margin;
 use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
-use crate::settings::plan::{DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M};
+use crate::settings::plan::{
+    DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, GYRO_SCALE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M,
+};
 
 /// How sure it must be that causes are discriminated. The log of the odds is normal with mean λ/2 and
 /// variance λ.
@@ -58,6 +60,8 @@ impl Frame {
             Column::LeftWheel | Column::RightWheel | Column::Separation => GEOMETRY_PRIOR_SIGMA,
             Column::SensorX | Column::SensorY => LEVER_PRIOR_SIGMA_M,
             Column::SensorTheta => SENSOR_HEADING_PRIOR_SIGMA_RAD,
+            // Plans are of the instrument that sees poses.
+            Column::GyroScale => GYRO_SCALE_PRIOR_SIGMA,
             Column::Latency | Column::Term(_) => LATENCY_PRIOR_SIGMA_S,
         });
         let of_terms = terms.iter().flat_map(Candidate::parameters).map(|parameter| parameter.prior_sigma);

@@ -106,6 +106,10 @@ pub(crate) const LEVER_PRIOR_SIGMA_M: f64 = 0.2;
 /// Tuned: by hand; no record of what on.
 pub(crate) const LATENCY_PRIOR_SIGMA_S: f64 = 0.2;
 
+/// Number. Prior standard deviation of a gyroscope's relative scale.
+/// Published: the tolerance of 3 % in data sheets of consumer gyroscopes (MPU-6050).
+pub(crate) const GYRO_SCALE_PRIOR_SIGMA: f64 = 0.03;
+
 /// Number. Steps of the search for the design point over a quarter of a circle.
 /// Tuned: by hand; no record of what on.
 pub(crate) const DESIGN_POINT_STEPS: u32 = 32;

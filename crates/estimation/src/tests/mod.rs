@@ -10,6 +10,7 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
+mod partial;
 mod path_shape;
 mod rounding;
 mod selection;
@@ -177,6 +178,7 @@ const MODEL: Model = Model {
     body_from_sensor: Pose::new(0.032, -0.019, 0.103),
     own: None,
     latency_s: 0.003,
+    gyro_scale: 0.0,
     term_values: Vec::new(),
 };
 
@@ -201,7 +203,9 @@ fn cost(pass: &Pass) -> f64 {
 }
 
 fn columns() -> Vec<Column> {
-    Column::BASE.into_iter().chain([Column::Term(0), Column::Term(1)]).collect()
+    // There is no gyroscope.
+    let base = Column::BASE.into_iter().filter(|column| *column != Column::GyroScale);
+    base.chain([Column::Term(0), Column::Term(1)]).collect()
 }
 
 /// The gradient is the mean's alone: that the filter's own headings turn its covariances is left out.
@@ -213,8 +217,12 @@ fn the_gradient_is_that_of_the_cost() {
     let headings = [0.0, 0.0];
     let found =
         run(&dataset, &model(), &NOISE, &headings, PassOptions { gate: OutlierGate::Off, ..PassOptions::default() });
-    let gradient = found.runs.iter().fold(nalgebra::DVector::zeros(9), |sum, run| sum + &run.gradient);
-    let information = found.runs.iter().fold(nalgebra::DMatrix::zeros(9, 9), |sum, run| sum + &run.information);
+    let gradient =
+        found.runs.iter().fold(nalgebra::DVector::zeros(Column::BASE.len() + 2), |sum, run| sum + &run.gradient);
+    let information =
+        found.runs.iter().fold(nalgebra::DMatrix::zeros(Column::BASE.len() + 2, Column::BASE.len() + 2), |sum, run| {
+            sum + &run.information
+        });
     for column in columns() {
         let k = column.index();
         let h = 1e-3 / f64::sqrt(information[(k, k)]);
@@ -290,6 +298,7 @@ const CENTRED_MODEL: Model = Model {
     body_from_sensor: Pose::IDENTITY,
     own: None,
     latency_s: 0.0,
+    gyro_scale: 0.0,
     term_values: Vec::new(),
 };
 
@@ -364,7 +373,8 @@ fn a_block_of_a_run_knows_the_phases_of_its_wheels() {
     // The products of the phase with all but the latency, which goes by rates on both sides of the cut: to
     // rounding. Rejects phases that begin with the run's in each block.
     let phase = Column::Term(0).index();
-    for column in (0..=phase).filter(|column| *column != Column::Latency.index()) {
+    let others = [Column::Latency, Column::GyroScale].map(Column::index);
+    for column in (0..=phase).filter(|column| !others.contains(column)) {
         let [whole, cut] = [&blocks[1], &alone[0]].map(|of| of.information[(phase, column)]);
         assert!((whole / cut - 1.0).abs() < 1e-9, "{column}: {whole} {cut}");
     }

@@ -10,9 +10,9 @@ use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
-use crate::run_log::RunLog;
+use crate::run_log::{Part, RunLog};
 use crate::session_check::SessionCheck;
-use crate::settings::{DETERMINED_SIGMA, INSTANTS, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::settings::{DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
 use crate::windows::Measured;
 
 const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
@@ -61,7 +61,8 @@ pub(crate) fn determined(sessions: &[SessionCheck], problems: &mut Vec<Problem>)
     let missing: Vec<&'static str> = PARAMETERS.into_iter().filter(|name| !determined[name]).collect();
     let is_wrong = problems.iter().any(|problem| problem.severity == Severity::Error);
     if !missing.is_empty() && !is_wrong {
-        let kind = Kind::NotDetermined { parameters: missing, turns: turn > distance };
+        let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
+        let kind = Kind::NotDetermined { parameters: missing, turns: turn > distance, partial };
         problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
     }
     determined
@@ -125,9 +126,39 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
     let Ok(geometry) = session.robot.geometry() else { return };
     for run in &session.runs {
         add_ends(run, &geometry, &mut row);
+        add_partial(run, m_per_rad, separation_m, session.gyro_scale_sigma, &mut row);
         if !has_windows {
             let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
             *distance += 0.5 * (turned.left + turned.right);
+        }
+    }
+}
+
+/// What tapes, walls, returns and a gyroscope tell of a run. A gyroscope of unknown scale tells the ratio
+/// of the wheels where the robot hardly turns, and nothing of how far it turns else.
+fn add_partial(
+    run: &RunLog,
+    m_per_rad: Wheels<f64>,
+    separation_m: f64,
+    gyro_scale_sigma: Option<f64>,
+    row: &mut impl FnMut([f64; 3], f64),
+) {
+    let at = |t_s: f64| run.t_s.partition_point(|row_s| *row_s <= t_s).saturating_sub(1);
+    for of in &run.partial {
+        let (from, to) = (at(of.from_s), at(of.to_s));
+        let turned = Wheels {
+            left: run.wheels.left[to] - run.wheels.left[from],
+            right: run.wheels.right[to] - run.wheels.right[from],
+        };
+        let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
+        let turn_rad = (travel_m.right - travel_m.left) / separation_m;
+        let by_turn = [-travel_m.left / separation_m, travel_m.right / separation_m, -turn_rad];
+        match (of.part, gyro_scale_sigma) {
+            (Part::Length, _) => row([0.5 * travel_m.left, 0.5 * travel_m.right, 0.0], of.sigma),
+            (Part::Turn, _) => row(by_turn, of.sigma),
+            (Part::GyroTurn, Some(scale)) => row(by_turn, of.sigma.hypot(scale * turn_rad)),
+            (Part::GyroTurn, None) if turn_rad.abs() < MAX_STRAIGHT_TURN_RAD => row(by_turn, of.sigma),
+            (Part::GyroTurn, None) => {}
         }
     }
 }

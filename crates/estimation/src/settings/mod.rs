@@ -4,6 +4,13 @@
 //! `Budgeted:` is a share of an error, of time or of memory that is allowed. `Tuned:` is found by trial, on
 //! what it says. `Convention:` is customary. `Published:` names author, year and equation.
 
+mod partial;
+
+pub(crate) use partial::{
+    BIAS_WALK_RADPS, GYRO_BIAS_SIGMA_RADPS, GYRO_WINDOW_S, MIN_DISTANCE_M, MIN_GYRO_NOISE_RAD_PER_SQRT_S,
+    MIN_STANDING_PAIRS, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M, WALL_START_DIRECTIONS, WALL_START_STEPS,
+};
+
 // Numbers of arithmetic.
 
 /// Instants that differ by less, seconds, are the same: files round times.
@@ -460,3 +467,12 @@ pub(crate) const ONE_STEP_TOLERANCE: f64 = 0.05;
 /// Most scoring steps over everything.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_SCORING_STEPS: usize = 5;
+
+/// Length of the part of a unit direction that must lie in the unobservable space for the space to be named
+/// after it.
+/// Convention: within 8° of the space.
+pub(crate) const MIN_NAMED_DIRECTION: f64 = 0.99;
+
+/// Length of what must be left of a unit direction beside those that the unobservable space is named after.
+/// Convention: more than 18° off them.
+pub(crate) const MIN_OWN_DIRECTION: f64 = 0.3;

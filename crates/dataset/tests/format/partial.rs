@@ -1,0 +1,48 @@
+//! Partial measurements and a gyroscope, read and refused.
+
+use dataset::read;
+
+use crate::bad_input::{Case, TOML};
+
+/// What a tape, a wall or a place that is come back to says, and the faults of it.
+#[test]
+fn partial_measurements_are_read_and_their_faults_named() {
+    let revisit =
+        |row: &str| Case::good().with("revisit.csv", format!("run,t0_s,t1_s,sigma_xy_m,sigma_theta_rad\n{row}\n"));
+    let read_back = read(revisit("a,0,0.1,,0.01").path()).expect("readable").dataset;
+    let of = read_back.runs[0].revisits[0];
+    assert_eq!((of.dx_m, of.dy_m, of.dtheta_rad), (None, None, Some(0.0)));
+    assert_eq!((of.sigma_xy_m, of.sigma_theta_rad), (None, Some(0.01)));
+    let message = |case: Case| case.error().to_string();
+    assert!(message(revisit("a,0,0.1,,")).contains("revisit.csv:2: the row measures nothing"));
+    assert!(message(revisit("a,0,0.1,0,0.1")).contains("revisit.csv:2: sigma_xy_m = 0; expected a positive"));
+    assert!(message(revisit("a,0.1,0.1,0.1,0.1")).contains("expected an end after its start"));
+    let tape = |row: &str| Case::good().with("distance.csv", format!("run,t0_s,t1_s,distance_m,sigma_m\n{row}\n"));
+    assert_eq!(read(tape("b,0,0.1,1.5,0.002").path()).expect("readable").dataset.runs[1].distances[0].distance_m, 1.5);
+    assert!(message(tape("b,0,0.1,1.5,")).contains("sigma_m"));
+    assert!(message(tape("b,0,0.1,0,0.002")).contains("a return is one of revisit.csv"));
+    let wall = |row: &str| {
+        Case::good().with("wall.csv", format!("run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad\n{row}\n"))
+    };
+    let walls = read(wall("a,0,north,1.5,,0.01,\na,0.1,north,,0.2,,0.01").path()).expect("readable").dataset;
+    assert_eq!(walls.runs[0].walls[1].heading_rad, Some(0.2));
+    assert_eq!(walls.runs[0].walls[0].heading_rad, None);
+    assert!(message(wall("a,0,north,1.5,,,0.01")).contains("the row measures nothing"));
+    assert!(message(wall("a,0,north,1.5,0,1,1\na,0,north,1.5,0,1,1")).contains("a second row at 0 s"));
+}
+
+/// A gyroscope is truth enough; what is known of it stands in the manifest.
+#[test]
+fn a_gyroscope_stands_for_a_truth() {
+    let odometry = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,0\na,0.1,10,12,0.1\nb,0,5,5,0\nb,0.1,7,7,0\n";
+    let with = |gyro: &str| {
+        let toml = TOML.replace("[truth]", &format!("[gyro]\n{gyro}\n[truth]"));
+        Case::good().with("odometry.csv", odometry).with("dataset.toml", toml).without("truth.csv")
+    };
+    let gyro = read(with("scale_sigma = 0.01\nsampling = \"instantaneous\"").path()).expect("readable");
+    let gyro = gyro.dataset.truth_noise.gyro;
+    assert_eq!((gyro.scale_sigma, gyro.is_instantaneous, gyro.noise_rad_per_sqrt_s), (Some(0.01), true, None));
+    assert_eq!(read(with("scale_sigma = 0").path()).expect("readable").dataset.truth_noise.gyro.scale_sigma, None);
+    assert!(with("sampling = \"mean\"").error().to_string().contains("interval_end"));
+    assert!(Case::good().without("truth.csv").error().to_string().contains("gyro_radps"));
+}

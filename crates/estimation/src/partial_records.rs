@@ -1,0 +1,379 @@
+//! Runs as partial measurements: what a gyroscope, a tape measure, a wall or a place that is come back to
+//! says of the robot at one instant or at two.
+//!
+//! Every such measurement is a scalar function of where the robot stood at its instants, with a variance of
+//! its own. All of a run stand in one segment, since the wheels' errors are common to them.
+
+use std::collections::BTreeMap;
+
+use dataset::{ExtraChannel, GyroNoise, Run, RunView, Session};
+use kinematics::{Pose, Wheels};
+
+use crate::model::Model;
+use crate::segment::{Segment, Start};
+use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S, WALL_START_DIRECTIONS, WALL_START_STEPS};
+use crate::wheel_angles::WheelAngleInterpolator;
+
+/// Where the robot stood at an instant that a measurement is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    /// Number of intervals of the segment before it.
+    pub(crate) after: usize,
+    /// Variances of the wheels' turns beyond rounding, where it lies within a row, rad².
+    pub(crate) interpolated_rad2: Wheels<f64>,
+    /// Index of the last observation that needs it.
+    pub(crate) last_use: usize,
+}
+
+/// What an observation is a function of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Quantity {
+    /// A coordinate of the pose at the end seen from that at the start: 0 ahead, 1 to the left, 2 the turn.
+    Displacement(usize),
+    /// The straight distance between both places.
+    Distance,
+    /// The distance from a wall, by its index.
+    WallDistance(usize),
+    /// The heading along a wall, by its index.
+    WallHeading(usize),
+    /// The turn between both places by a gyroscope, with its bias over this time.
+    GyroTurn {
+        /// Length of the window, seconds.
+        dt_s: f64,
+    },
+}
+
+/// A scalar that was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Observation {
+    /// Indices of its places; equal where it is of one instant, or the robot stood.
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    pub(crate) quantity: Quantity,
+    pub(crate) value: f64,
+    pub(crate) variance: f64,
+}
+
+/// A wall by its direction and its distance from the segment's start: points p of it have n·p = `offset_m`, n
+/// to the left of its direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Wall {
+    pub(crate) direction_rad: f64,
+    pub(crate) offset_m: f64,
+}
+
+/// The partial measurements of a run, without a gap of its log between them.
+#[derive(Debug, Clone)]
+pub(crate) struct PartialSegment<'a> {
+    /// The wheels' intervals; it has no measurements of poses.
+    pub(crate) segment: Segment<'a>,
+    /// In the order of time.
+    pub(crate) places: Vec<Place>,
+    /// In the order of the places where they end.
+    pub(crate) observations: Vec<Observation>,
+    /// Where the filter begins with the walls.
+    pub(crate) walls: Vec<Wall>,
+    /// Variance of the gyroscope's bias per second, (rad/s)²/s.
+    pub(crate) bias_walk: f64,
+}
+
+impl PartialSegment<'_> {
+    /// Does a gyroscope measure in it?
+    pub(crate) fn has_gyro(&self) -> bool {
+        self.observations.iter().any(|of| matches!(of.quantity, Quantity::GyroTurn { .. }))
+    }
+}
+
+/// A measurement with its instants, before places are found.
+struct Timed {
+    from_s: f64,
+    to_s: f64,
+    quantity: Quantity,
+    value: f64,
+    variance: f64,
+}
+
+/// A part of a log without gaps: the places that measurements are of, and at which instants.
+struct Stretch<'a> {
+    segment: Segment<'a>,
+    /// Instants, with the index of their place.
+    placed: Vec<(f64, usize)>,
+    places: Vec<Place>,
+}
+
+/// The partial measurements of a run. A run with poses or displacements gives none: these hold the wheels'
+/// errors as well, and a likelihood that counts them twice would be too sure.
+pub(crate) fn partial_segments<'a>(
+    run: &RunView<'a>,
+    base: &Segment<'a>,
+    track: &WheelAngleInterpolator<'_>,
+    nominal: &Model,
+    gyro: &GyroSettings,
+) -> Vec<PartialSegment<'a>> {
+    let (mut timed, walls) = tape_and_walls(run.run());
+    timed.extend(gyro.windows(run, track));
+    if timed.is_empty() {
+        return Vec::new();
+    }
+    let mut instants: Vec<f64> = timed.iter().flat_map(|of| [of.from_s, of.to_s]).collect();
+    instants.sort_by(f64::total_cmp);
+    instants.dedup_by(|later, before| *later - *before <= TIME_TOLERANCE_S);
+    let mut cursor = track.cursor();
+    let mut parts: Vec<Stretch<'a>> = Vec::new();
+    for t_s in instants {
+        if let Some(Stretch { segment, placed, places }) = parts.last_mut()
+            && let Some((before_s, place)) = placed.last().copied()
+        {
+            let first = segment.intervals.len();
+            if !run.run().is_motion_unknown(before_s, t_s) && cursor.intervals(before_s, t_s, &mut segment.intervals) {
+                if segment.intervals[first..].iter().all(|interval| interval.stands) {
+                    // The robot stands: it is the same place, with the same rounding of the counts.
+                    placed.push((t_s, place));
+                } else {
+                    let interpolated_rad2 =
+                        segment.intervals.last().map_or(Wheels::both(0.0), |last| last.interpolated_rad2[1]);
+                    placed.push((t_s, places.len()));
+                    places.push(Place { after: segment.intervals.len(), interpolated_rad2, last_use: 0 });
+                }
+                continue;
+            }
+        }
+        if let Some(turned_rad) = cursor.angle_rad(t_s) {
+            let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
+            let segment = Segment { wheel_rad, start: Start::Origin, ..base.clone() };
+            let place = Place { after: 0, interpolated_rad2: Wheels::both(0.0), last_use: 0 };
+            parts.push(Stretch { segment, placed: vec![(t_s, 0)], places: vec![place] });
+        }
+    }
+    let of_part = |Stretch { segment, placed, mut places }: Stretch<'a>| {
+        let place_at = |t_s: f64| {
+            let at = placed.partition_point(|(placed_s, _)| *placed_s < t_s - TIME_TOLERANCE_S);
+            placed.get(at).filter(|(placed_s, _)| (placed_s - t_s).abs() <= TIME_TOLERANCE_S).map(|(_, place)| *place)
+        };
+        let mut observations: Vec<Observation> = timed
+            .iter()
+            .filter_map(|of| {
+                let (from, to) = (place_at(of.from_s)?, place_at(of.to_s)?);
+                Some(Observation { from, to, quantity: of.quantity, value: of.value, variance: of.variance })
+            })
+            .collect();
+        // Between equals the order of the files.
+        observations.sort_by_key(|of| of.to);
+        for (number, of) in observations.iter().enumerate() {
+            places[of.from].last_use = number;
+            places[of.to].last_use = number;
+        }
+        let walls = start_walls(&segment, &places, &observations, walls, nominal);
+        let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(crate::settings::BIAS_WALK_RADPS).powi(2);
+        PartialSegment { segment, places, observations, walls, bias_walk }
+    };
+    parts.into_iter().map(of_part).filter(|of| !of.observations.is_empty()).collect()
+}
+
+/// What tape measures and walls say, and how many walls there are.
+fn tape_and_walls(run: &Run) -> (Vec<Timed>, usize) {
+    let mut timed = Vec::new();
+    for of in &run.revisits {
+        let components = [(of.dx_m, of.sigma_xy_m), (of.dy_m, of.sigma_xy_m), (of.dtheta_rad, of.sigma_theta_rad)];
+        for (component, (value, sigma)) in components.into_iter().enumerate() {
+            timed.extend(value.zip(sigma).map(|(value, sigma)| Timed {
+                from_s: of.t0_s,
+                to_s: of.t1_s,
+                quantity: Quantity::Displacement(component),
+                value,
+                variance: sigma * sigma,
+            }));
+        }
+    }
+    timed.extend(run.distances.iter().map(|of| Timed {
+        from_s: of.t0_s,
+        to_s: of.t1_s,
+        quantity: Quantity::Distance,
+        value: of.distance_m,
+        variance: of.sigma_m * of.sigma_m,
+    }));
+    let mut walls: BTreeMap<&str, usize> = BTreeMap::new();
+    for of in &run.walls {
+        let known = walls.len();
+        let wall = *walls.entry(&of.wall).or_insert(known);
+        let at = |quantity: Quantity, (value, sigma): (f64, f64)| Timed {
+            from_s: of.t_s,
+            to_s: of.t_s,
+            quantity,
+            value,
+            variance: sigma * sigma,
+        };
+        timed.extend(of.heading_rad.zip(of.sigma_rad).map(|measured| at(Quantity::WallHeading(wall), measured)));
+        timed.extend(of.distance_m.zip(of.sigma_m).map(|measured| at(Quantity::WallDistance(wall), measured)));
+    }
+    (timed, walls.len())
+}
+
+/// The walls by the nominal drive: their directions from a heading where one was measured, else from the
+/// distances alone, by least squares from several directions.
+fn start_walls(
+    segment: &Segment<'_>,
+    places: &[Place],
+    observations: &[Observation],
+    walls: usize,
+    nominal: &Model,
+) -> Vec<Wall> {
+    let (mut pose, mut after) = (Pose::IDENTITY, 0);
+    let mut poses = Vec::with_capacity(places.len());
+    for place in places {
+        for interval in &segment.intervals[after..place.after] {
+            pose = pose * nominal.increment(interval.wheel_rad).arc();
+        }
+        after = place.after;
+        poses.push(pose);
+    }
+    let of_wall = |wall: usize| {
+        let distances: Vec<(Pose, f64)> = observations
+            .iter()
+            .filter(|of| of.quantity == Quantity::WallDistance(wall))
+            .map(|of| (poses[of.to], of.value))
+            .collect();
+        let heading = observations.iter().find(|of| of.quantity == Quantity::WallHeading(wall));
+        let direction = heading.map(|of| poses[of.to].theta_rad - of.value);
+        match direction {
+            Some(direction_rad) => fitted_offset(direction_rad, &distances).0,
+            None => (0..WALL_START_DIRECTIONS)
+                .map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(WALL_START_DIRECTIONS))
+                .map(|direction_rad| turned_to_fit(direction_rad, &distances))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .map_or(Wall { direction_rad: 0.0, offset_m: 0.0 }, |(wall, _)| wall),
+        }
+    };
+    (0..walls).map(of_wall).collect()
+}
+
+/// The wall of a direction that fits distances from it best, and the sum of the squares that are left, m².
+fn fitted_offset(direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
+    let (sin, cos) = direction_rad.sin_cos();
+    let offsets_m = || distances.iter().map(|(pose, distance_m)| distance_m - sin * pose.x_m + cos * pose.y_m);
+    let offset_m = offsets_m().sum::<f64>() / distances.len().max(1) as f64;
+    (Wall { direction_rad, offset_m }, offsets_m().map(|of| (of - offset_m).powi(2)).sum())
+}
+
+/// The same with the direction turned by Newton steps on the variance of the offsets.
+fn turned_to_fit(mut direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
+    for _ in 0..WALL_START_STEPS {
+        let (wall, _) = fitted_offset(direction_rad, distances);
+        let (sin, cos) = direction_rad.sin_cos();
+        let slope_m = |pose: &Pose| -cos * pose.x_m - sin * pose.y_m;
+        let mean_m = distances.iter().map(|(pose, _)| slope_m(pose)).sum::<f64>() / distances.len().max(1) as f64;
+        let (mut gradient, mut curvature) = (0.0, 0.0);
+        for (pose, distance_m) in distances {
+            let off_m = distance_m - sin * pose.x_m + cos * pose.y_m - wall.offset_m;
+            gradient += off_m * (slope_m(pose) - mean_m);
+            curvature += (slope_m(pose) - mean_m).powi(2);
+        }
+        if curvature <= 0.0 {
+            break;
+        }
+        direction_rad -= gradient / curvature;
+    }
+    fitted_offset(direction_rad, distances)
+}
+
+/// A session's gyroscope.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GyroSettings {
+    stated: GyroNoise,
+    /// Angle random walk, rad/√s; `None` where nothing tells it.
+    noise_rad_per_sqrt_s: Option<f64>,
+}
+
+/// A gyroscope's turn over some rows.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    from_s: f64,
+    to_s: f64,
+    turn_rad: f64,
+    stands: bool,
+    rows: usize,
+}
+
+impl GyroSettings {
+    /// Of a session; what is not stated of its noise comes from its standstills, or from how far it strays
+    /// from the wheels.
+    pub(crate) fn of(session: &Session<'_>) -> Self {
+        let stated = session.truth_noise.gyro;
+        let noise_rad_per_sqrt_s = stated.noise_rad_per_sqrt_s.or_else(|| noise_from_log(session));
+        Self { stated, noise_rad_per_sqrt_s }
+    }
+
+    /// The turns of the run by the gyroscope.
+    fn windows(&self, run: &RunView<'_>, track: &WheelAngleInterpolator<'_>) -> Vec<Timed> {
+        let Some(noise) = self.noise_rad_per_sqrt_s else { return Vec::new() };
+        let timed = |window: Window| {
+            let dt_s = window.to_s - window.from_s;
+            Timed {
+                from_s: window.from_s,
+                to_s: window.to_s,
+                quantity: Quantity::GyroTurn { dt_s },
+                value: window.turn_rad,
+                variance: noise * noise * dt_s,
+            }
+        };
+        windows(run.run(), track, self.stated.is_instantaneous, GYRO_WINDOW_S).into_iter().map(timed).collect()
+    }
+}
+
+/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn.
+fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool, longest_s: f64) -> Vec<Window> {
+    let Some(rates) = run.odometry.extra.get(&ExtraChannel::GyroYawRate) else { return Vec::new() };
+    let (t_s, turns) = (&run.odometry.t_s, track.turns());
+    let mut windows: Vec<Window> = Vec::new();
+    for row in 1..t_s.len().min(rates.len()) {
+        let rate = if is_instantaneous { 0.5 * (rates[row - 1] + rates[row]) } else { rates[row] };
+        let [from_s, to_s] = [t_s[row - 1], t_s[row]];
+        let stands = turns.left[row] == turns.left[row - 1] && turns.right[row] == turns.right[row - 1];
+        let turn_rad = rate * (to_s - from_s);
+        match windows.last_mut() {
+            Some(last) if last.stands == stands && to_s - last.from_s <= longest_s + TIME_TOLERANCE_S => {
+                last.to_s = to_s;
+                last.turn_rad += turn_rad;
+                last.rows += 1;
+            }
+            _ => windows.push(Window { from_s, to_s, turn_rad, stands, rows: 1 }),
+        }
+    }
+    windows
+}
+
+/// Angle random walk of a gyroscope, rad/√s: half of the mean square of how its mean rate changes from row to
+/// row while the wheels stand. Where they hardly do, the same of how far it strays from the wheels from
+/// window to window, by the median, which holds the wheels' noise too.
+fn noise_from_log(session: &Session<'_>) -> Option<f64> {
+    let instantaneous = session.truth_noise.gyro.is_instantaneous;
+    let nominal = Model::of(&session.robot.geometry().ok()?, 0);
+    let (mut standing, mut moving) = (Vec::new(), Vec::new());
+    for run in &session.runs {
+        let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
+        let rows = windows(run.run(), &track, instantaneous, 0.0);
+        let squared = |pair: &[Window], off: [f64; 2]| {
+            let [a_s, b_s] = [pair[0].to_s - pair[0].from_s, pair[1].to_s - pair[1].from_s];
+            (off[1] / b_s - off[0] / a_s).powi(2) / (1.0 / a_s + 1.0 / b_s)
+        };
+        let still = rows.windows(2).filter(|pair| pair[0].stands && pair[1].stands);
+        standing.extend(still.map(|pair| squared(pair, [pair[0].turn_rad, pair[1].turn_rad])));
+        let strays = |window: &Window| {
+            let turned = track.steps(window.from_s, window.to_s)?;
+            let turned = turned.into_iter().fold(Wheels::both(0.0), |sum, by| sum.zip_with(by, |a, b| a + b));
+            Some(window.turn_rad - nominal.increment(turned).turn_rad)
+        };
+        let longer = windows(run.run(), &track, instantaneous, GYRO_WINDOW_S);
+        moving.extend(longer.windows(2).filter_map(|pair| Some(squared(pair, [strays(&pair[0])?, strays(&pair[1])?]))));
+    }
+    let variance = if standing.len() >= MIN_STANDING_PAIRS {
+        standing.iter().sum::<f64>() / standing.len() as f64
+    } else {
+        let middle = moving.len() / 2;
+        if moving.is_empty() {
+            return None;
+        }
+        *moving.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::settings::CHI_SQUARE_1_MEDIAN
+    };
+    Some(variance.sqrt().max(crate::settings::MIN_GYRO_NOISE_RAD_PER_SQRT_S))
+}

@@ -1,0 +1,42 @@
+//! Numbers of partial measurements: gyroscopes, tape measures and walls.
+
+/// Longest stretch over which a gyroscope's rates are summed into one turn, seconds. Its noise is white, so
+/// that the sum loses nothing but changes of speed within it.
+/// Budgeted: shorter than a robot's motions, which last for seconds.
+pub(crate) const GYRO_WINDOW_S: f64 = 1.0;
+
+/// Standard deviation of a gyroscope's bias at the start of a run, rad/s.
+/// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there are.
+pub(crate) const GYRO_BIAS_SIGMA_RADPS: f64 = 10.0;
+
+/// Random walk of a gyroscope's bias that nothing is stated of, rad/s per √s.
+/// Convention: a bias that strays by 0.01 °/s in a minute, as those of consumer sensors do.
+pub(crate) const BIAS_WALK_RADPS: f64 = 2e-5;
+
+/// Least angle random walk of a gyroscope, rad/√s, where it is taken from the log.
+/// Convention: a hundredth of a tactical gyroscope's; a log of constant rates has none.
+pub(crate) const MIN_GYRO_NOISE_RAD_PER_SQRT_S: f64 = 1e-7;
+
+/// Pairs of rows at standstill from which the noise of a gyroscope is taken.
+/// Budgeted: its standard deviation is then known to 1/√(2·50), a tenth.
+pub(crate) const MIN_STANDING_PAIRS: usize = 50;
+
+/// Standard deviation of a wall's direction before it is seen, radians.
+/// Budgeted: all directions.
+pub(crate) const WALL_DIRECTION_SIGMA_RAD: f64 = 10.0;
+
+/// Standard deviation of a wall's distance from a run's start before it is seen, metres.
+/// Budgeted: rooms of any size.
+pub(crate) const WALL_OFFSET_SIGMA_M: f64 = 1000.0;
+
+/// Number of directions from which a wall is sought that only distances speak of.
+/// Budgeted: 15° apart, within the basin of the nearest.
+pub(crate) const WALL_START_DIRECTIONS: u32 = 24;
+
+/// Number of Gauss–Newton steps from each of these directions.
+/// Budgeted: from 15° off to 1e-6 of the nearest minimum.
+pub(crate) const WALL_START_STEPS: usize = 10;
+
+/// Distance below which the direction between two places is not known, metres.
+/// Budgeted: far below what a tape measure shows.
+pub(crate) const MIN_DISTANCE_M: f64 = 1e-6;

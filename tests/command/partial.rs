@@ -1,0 +1,74 @@
+//! A gyro, a tape measure and a mark on the floor, as a user calibrates with them.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::{document, refusal, run_in, succeed};
+
+const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gyro-and-tape.toml");
+
+/// What the scenario hides: wheels 1 % larger, the right one smaller by 0.2 % and the left one larger as
+/// much, a wheelbase 1.5 % wider.
+fn truth(folder: &Path) -> [f64; 3] {
+    let text = fs::read_to_string(folder.join("robot.truth.json")).expect("written");
+    let truth: Value = serde_json::from_str(&text).expect("JSON");
+    ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"]
+        .map(|key| truth[key].as_f64().expect("a number"))
+}
+
+fn parameters(folder: &Path) -> [Value; 3] {
+    let _ = fs::remove_file(folder.join("robot.toml"));
+    let found = document(folder, &["calibrate", "robot", "--out", "robot.toml"]);
+    ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"]
+        .map(|key| found["methods"][0]["parameters"][key].clone())
+}
+
+fn determined(folder: &Path) -> [bool; 3] {
+    let found = document(folder, &["check", "robot"]);
+    ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"]
+        .map(|key| found["determined"][key].as_bool().expect("a truth value"))
+}
+
+#[test]
+fn gyro_tape_and_whole_turns_determine_a_robot_and_each_of_them_is_missed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    succeed(folder, &["simulate", SCENARIO, "--out", "robot"]);
+    let truth = truth(folder);
+    assert_eq!(determined(folder), [true; 3]);
+    for (found, truth) in parameters(folder).iter().zip(truth) {
+        let (value, sigma) = (found["value"].as_f64().expect("a value"), found["sigma"].as_f64().expect("a sigma"));
+        // Four standard deviations: one draw in 16 000 is farther off. The wheelbase's is 0.012 % by the
+        // sweep.
+        assert!((value - truth).abs() < 4.0 * sigma, "{value} ± {sigma}, not {truth}");
+        assert!(sigma < 3e-4 * truth, "{value} ± {sigma}");
+    }
+
+    // Without whole turns the gyro's scale is all that says how far the robot turns.
+    fs::remove_file(folder.join("robot/revisit.csv")).expect("removed");
+    assert_eq!(determined(folder), [true, true, false]);
+    let [left, right, separation] = parameters(folder);
+    assert!(left["value"].is_number() && right["value"].is_number());
+    assert!(separation["value"].is_null(), "{separation}");
+    let text = succeed(folder, &["calibrate", "robot", "--out", "again.toml"]).stdout;
+    assert!(text.contains("the gyro's scale is not known"), "{text}");
+
+    // A scale that is stated is the wheelbase's uncertainty. The simulated one is off by 1 %.
+    let manifest = folder.join("robot/dataset.toml");
+    let unstated = fs::read_to_string(&manifest).expect("written");
+    fs::write(&manifest, unstated.replace("[gyro]", "[gyro]\nscale_sigma = 0.01")).expect("written");
+    assert_eq!(determined(folder), [true; 3]);
+    let [_, _, separation] = parameters(folder);
+    let sigma = separation["sigma"].as_f64().expect("a sigma") / truth[2];
+    assert!((sigma / 0.01 - 1.0).abs() < 0.05, "{sigma}");
+    fs::write(&manifest, unstated).expect("written");
+
+    // Without a tape nothing has a length.
+    fs::remove_file(folder.join("robot/distance.csv")).expect("removed");
+    let message = refusal(folder, &["calibrate", "robot", "--quiet", "--out", "none.toml"]);
+    assert!(message.contains("determine no parameter by itself"), "{message}");
+    let evaluated = run_in(folder, &["evaluate", "robot", "--calibration", "again.toml"]);
+    assert!(evaluated.stdout.contains("no absolute truth"), "{} {}", evaluated.stdout, evaluated.stderr);
+}
