@@ -206,6 +206,19 @@ function tutorial() {
   yair("diagnose", "monday", "--out", "diagnosis");
 }
 
+/** Every other page of the same robot, by the subcommand that writes it. */
+function otherPages() {
+  yair("simulate", join(root, "scenarios/drifting.toml"), "--trial", "1", "--out", "tuesday");
+  yair("calibrate", "monday", "--method", "all", "--out", "monday.toml", "--out-dir", "calibrate");
+  yair("calibrate", "monday", "--out", "joint.toml");
+  yair("evaluate", "tuesday", "--calibration", "joint.toml", "--calibration", "diagnosis/extended.toml", "--out-dir", "evaluate");
+  yair("compare", "monday", "tuesday", "--out-dir", "compare");
+  yair("plan", "monday", "--out", "plan");
+  yair("sweep", join(root, "scenarios/noise-levels.toml"), "--trials", "400", "--out", "sweep");
+  yair("reproduce", "--trials", "400", "--out", "reproduce");
+  return ["calibrate", "evaluate", "compare", "plan", "sweep", "reproduce"];
+}
+
 /** Numbers with a hyphen for a minus sign, but for what is to be copied, which stays as programs read it. */
 const hyphenated = () => {
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
@@ -288,6 +301,15 @@ async function take(browser, into) {
     }, [first, last, MARGIN]);
     const session = await context.newCDPSession(page);
     const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 80, clip, captureBeyondViewport: true });
+    writeFileSync(join(into, file), Buffer.from(data, "base64"));
+    console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
+    await context.close();
+  }
+  for (const name of otherPages()) {
+    const { context, page } = await opened(browser, name, WIDE, "light");
+    const session = await context.newCDPSession(page);
+    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 70 });
+    const file = `report-${name}.webp`;
     writeFileSync(join(into, file), Buffer.from(data, "base64"));
     console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
     await context.close();

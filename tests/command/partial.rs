@@ -72,3 +72,21 @@ fn gyro_tape_and_whole_turns_determine_a_robot_and_each_of_them_is_missed() {
     let evaluated = run_in(folder, &["evaluate", "robot", "--calibration", "again.toml"]);
     assert!(evaluated.stdout.contains("no absolute truth"), "{} {}", evaluated.stdout, evaluated.stderr);
 }
+
+#[test]
+fn measurements_beside_poses_are_said_to_be_unused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/motion-capture.toml");
+    succeed(folder, &["simulate", scenario, "--out", "robot"]);
+    let problems = || {
+        let found = document(folder, &["check", "robot"]);
+        let all = found["problems"].as_array().expect("problems").clone();
+        all.into_iter().filter(|problem| problem["id"] == "unused_measurements").collect::<Vec<_>>()
+    };
+    assert!(problems().is_empty());
+    let table = "run,t0_s,t1_s,distance_m,sigma_m\nstraight_000,0,5,1.5,0.002\n";
+    fs::write(folder.join("robot/distance.csv"), table).expect("written");
+    let found = problems();
+    assert!(found.len() == 1 && found[0]["severity"] == "warning", "{found:?}");
+}

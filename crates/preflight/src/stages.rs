@@ -20,5 +20,6 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
     problems::truth_is_odometry::found(&mut check);
     problems::rates::found(&mut check, dataset);
     problems::coverage::found(&mut check);
+    problems::coverage::unused(&mut check);
     check
 }

@@ -34,6 +34,7 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
         Kind::TooShort { .. } => "too_short",
         Kind::OneWayTurns { .. } => "one_way_turns",
         Kind::NotDetermined { .. } => "not_determined",
+        Kind::UnusedMeasurements { .. } => "unused_measurements",
     }
 }
 
@@ -177,6 +178,10 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             let what = if *turns { "drive straights of some metres too" } else { "drive turns both ways too" };
             format!("these runs do not determine {}: {why}; {what}", parameters.join(", "))
         }
+        Kind::UnusedMeasurements { gyro_alone } => format!(
+            "the run's poses are used, and not its {}, which says less of the same motion; to calibrate from that, leave the run's poses out",
+            if *gyro_alone { "gyro" } else { "gyro, tapes, walls or returns" }
+        ),
     };
     format!("{place}{what}")
 }

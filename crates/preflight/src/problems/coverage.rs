@@ -48,6 +48,20 @@ fn net(angles: &[f64]) -> f64 {
     angles.last().zip(angles.first()).map_or(0.0, |(last, first)| last - first)
 }
 
+/// Partial measurements of runs that have poses or displacements too.
+pub(crate) fn unused(check: &mut SessionCheck) {
+    let is_idle = |run: &&RunLog| !run.partial.is_empty() && !run.is_seen_in_part();
+    let idle: Vec<&RunLog> = check.runs.iter().filter(is_idle).collect();
+    if idle.is_empty() {
+        return;
+    }
+    let gyro_alone = idle.iter().flat_map(|run| &run.partial).all(|row| row.part == Part::GyroTurn);
+    // A bag's gyroscope comes along unasked; tables are made by somebody who counts on them.
+    let severity = if gyro_alone { Severity::Hint } else { Severity::Warning };
+    let runs = idle.iter().map(|run| run.id.clone()).collect();
+    check.problems.push(Problem::new(&Kind::UnusedMeasurements { gyro_alone }, severity, Some(runs), 0.999));
+}
+
 /// Which parameters the sessions determine together; what they do not is a problem.
 pub(crate) fn determined(sessions: &[SessionCheck], problems: &mut Vec<Problem>) -> BTreeMap<&'static str, bool> {
     let mut information = [[0.0; 3]; 3];
