@@ -57,7 +57,7 @@ impl Columns {
             counter_bits,
         };
         let provenance = Provenance { name, ..Provenance::default() };
-        let truth_noise = TruthNoise { sigma_xy_m, sigma_theta_rad };
+        let truth_noise = TruthNoise { sigma_xy_m, sigma_theta_rad, ..TruthNoise::default() };
         let dataset = Dataset { provenance, robot, truth_noise, points: Vec::new(), runs: Vec::new() };
         Self { dataset, warnings: Vec::new() }
     }
