@@ -23,16 +23,17 @@ fn tile(label: &str, value: String, note: &str, section: &str) -> Tile {
     Tile { label: label.to_owned(), value, note: note.to_owned(), section: section.to_owned() }
 }
 
-/// Drift of the first and of the last calibration.
-fn drift_tile(under: &UnderCalibrations) -> Tile {
+/// Drift of the nominal robot and under one of the calibrations.
+fn drift_tile(under: &UnderCalibrations, shown: usize) -> Tile {
+    let chosen = under.drifts.get(shown).or_else(|| under.drifts.last());
     let percent =
         |drift: Option<&(String, Role, calib::CalibrationDrift)>| drift.and_then(|(_, _, of)| of.drift_percent);
-    let value = match (percent(under.drifts.first()), percent(under.drifts.last())) {
+    let value = match (percent(under.drifts.first()), percent(chosen)) {
         (Some(first), Some(last)) if under.drifts.len() > 1 => format!("{first:.3} % → {last:.3} %"),
         (Some(first), _) => format!("{first:.3} %"),
         _ => "Not measured".to_owned(),
     };
-    let last = under.drifts.last().map_or("", |(name, ..)| name.as_str());
+    let last = chosen.map_or("", |(name, ..)| name.as_str());
     let note = if under.drifts.len() > 1 {
         format!("of the distance, nominal → {last}")
     } else {
@@ -105,7 +106,8 @@ impl CalibrationPage<'_> {
                 Some(tile(label, shown, &format!("{stated}± is one standard deviation"), "parameters"))
             })
             .collect();
-        tiles.push(drift_tile(under));
+        // The method of the other tiles stands behind the nominal values.
+        tiles.push(drift_tile(under, 1));
         let used = first.map_or(0, |method| method.runs_used);
         let fine = first.is_some_and(|method| method.converged && method.warnings.is_empty());
         let mut sections = vec![section];
@@ -165,7 +167,7 @@ impl EvaluationPage<'_> {
         }
         let under = UnderCalibrations::of(self.datasets, &all);
         let runs = run_names(self.datasets).len();
-        let mut tiles = vec![drift_tile(&under)];
+        let mut tiles = vec![drift_tile(&under, under.drifts.len())];
         if let Some((name, _, last)) = under.drifts.last() {
             let millimetres = |length_m| format!("{} mm", of_millimetres(length_m));
             tiles.push(tile("Mean error at the end", millimetres(last.mean_final_position_m), name, "drift"));
@@ -281,12 +283,17 @@ pub(crate) fn write_comparison(comparison: &Comparison, datasets: &[Dataset], ou
             "table",
         ));
     }
+    // Three sessions are six pairs; of fewer, one session decides the order of methods whose errors are close.
+    let few = match standings.first() {
+        Some((_, pairs, _)) if *pairs < 6 => " So few sessions do not rank methods whose errors are close.",
+        _ => "",
+    };
     let page = Report {
         command: "yair compare".to_owned(),
         subject: subject(datasets),
         tone: Tone::Neutral,
         headline: headline(&standings),
-        lead: "Every method calibrates on each session and is tested on every other: how far, on average, runs end from the measured position. Lower is better.".to_owned(),
+        lead: "Every method calibrates on each session and is tested on every other: how far, on average, runs end from the measured position. Lower is better.".to_owned() + few,
         tiles,
         sections: vec![Section::new("table", "Errors by method and kind of path").with(Block::Table(table))],
         appendix: Vec::new(),
