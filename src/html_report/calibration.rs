@@ -283,7 +283,8 @@ pub(crate) fn write_comparison(comparison: &Comparison, datasets: &[Dataset], ou
             "table",
         ));
     }
-    // Three sessions are six pairs; of fewer, one session decides the order of methods whose errors are close.
+    // Three sessions are six pairs; of fewer, one session decides the order of methods whose errors are
+    // close.
     let few = match standings.first() {
         Some((_, pairs, _)) if *pairs < 6 => " So few sessions do not rank methods whose errors are close.",
         _ => "",
