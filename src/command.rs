@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::terminal::Terminal;
+use crate::terminal::{Printed, Terminal};
 use crate::{
     calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
     help, import, manual, merge, plan, reproduce, simulate, sweep,
@@ -103,7 +103,7 @@ pub fn call(arguments: impl IntoIterator<Item = impl Into<OsString>>, watch: &Ar
     };
     let terminal = Terminal::transcript(Arc::clone(watch));
     let exit_code = run(&cli, &arguments, &terminal);
-    let (document, remarks, failure) = terminal.into_transcript();
+    let Printed { document, remarks, failure } = terminal.into_transcript();
     Call { exit_code, document, remarks, failure }
 }
 

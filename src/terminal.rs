@@ -37,8 +37,15 @@ struct Transcript {
     printed: Mutex<Printed>,
 }
 
-/// Document, remarks, failure.
-type Printed = (Option<String>, Vec<String>, Option<String>);
+/// What a process would have printed.
+#[derive(Default)]
+pub(crate) struct Printed {
+    /// The JSON document.
+    pub(crate) document: Option<String>,
+    pub(crate) remarks: Vec<String>,
+    /// The message of a failure.
+    pub(crate) failure: Option<String>,
+}
 
 impl Transcript {
     fn printed(&self) -> MutexGuard<'_, Printed> {
@@ -103,7 +110,7 @@ impl Terminal {
         if self.json {
             let text = serde_json::to_string_pretty(document)?;
             match &self.transcript {
-                Some(transcript) => transcript.printed().0 = Some(text),
+                Some(transcript) => transcript.printed().document = Some(text),
                 None => writeln_to_stdout(&text)?,
             }
         }
@@ -113,7 +120,7 @@ impl Terminal {
     /// A remark on standard error; where somebody watches, the word that says how grave it is has a colour.
     pub(crate) fn remark(&self, text: &str) {
         if let Some(transcript) = &self.transcript {
-            transcript.printed().1.push(text.to_owned());
+            transcript.printed().remarks.push(text.to_owned());
         } else if !self.quiet {
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
@@ -128,7 +135,7 @@ impl Terminal {
     pub(crate) fn failure(&self, message: &str) {
         let message = in_plain_words(&message.replace('\n', "; "));
         if let Some(transcript) = &self.transcript {
-            transcript.printed().2 = Some(message);
+            transcript.printed().failure = Some(message);
             return;
         }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");

@@ -12,7 +12,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use yair::command::{self, Call, Watch};
 
-/// Time between two looks at Ctrl-C and at the progress. A command that ends is heard at once.
+/// Time between two checks of Ctrl-C and of the progress. A command that ends is heard at once.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
 /// Stack of the thread that runs a command, bytes: that of a process' main thread on Linux, as the command

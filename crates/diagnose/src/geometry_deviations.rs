@@ -36,7 +36,7 @@ pub(crate) fn geometry_deviations(fit: &ModelFit<'_>) -> Vec<GeometryDeviation> 
     let Some(covariance) = fit.covariance(&mut []) else { return Vec::new() };
     // Steps of the geometry's columns are relative.
     let columns = [Column::LeftWheel, Column::RightWheel, Column::Separation];
-    let at = columns.map(|column| fit.columns.iter().position(|own| *own == column));
+    let at = columns.map(|column| fit.position(column));
     let logs = [
         model.m_per_rad.left / nominal.m_per_rad.left,
         model.m_per_rad.right / nominal.m_per_rad.right,

@@ -160,7 +160,7 @@ pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
 fn determines_wheels(fit: &ModelFit<'_>) -> bool {
     let Some(covariance) = fit.covariance(&mut []) else { return false };
     let relative_sigma = |column: Column| {
-        let at = fit.columns.iter().position(|own| *own == column)?;
+        let at = fit.position(column)?;
         // Steps of the wheels' columns are relative.
         Some(covariance[(at, at)].sqrt())
     };

@@ -381,7 +381,7 @@ impl ModelFit<'_> {
         }
         let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
         let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
-        if let Some((sigma, scale)) = self.records.gyro_scale_sigma.zip(self.at(Column::GyroScale)) {
+        if let Some((sigma, scale)) = self.records.gyro_scale_sigma.zip(self.position(Column::GyroScale)) {
             // What was stated of the scale did not come from the runs, and does not scatter over them.
             let by_scale = &inverse * free.row(scale).transpose() / sigma;
             robust += &by_scale * by_scale.transpose();
@@ -389,8 +389,9 @@ impl ModelFit<'_> {
         Some(&free * robust * free.transpose())
     }
 
-    /// Where a column stands among the free ones.
-    fn at(&self, column: Column) -> Option<usize> {
+    /// Where a column stands among the free ones, in steps and covariances; `None` where it is not free.
+    #[must_use]
+    pub fn position(&self, column: Column) -> Option<usize> {
         self.columns.iter().position(|of| *of == column)
     }
 
@@ -423,28 +424,28 @@ pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
         .filter(|&k| eigenvalues[k] < MAX_OBSERVABLE_SIGMA.powi(-2))
         .map(|k| eigenvectors.column(k).into_owned())
         .collect();
-    named_apart(&directions).into_iter().map(|of| DVector::from_column_slice(of.as_slice())).collect()
+    disentangled(&directions).into_iter().map(|of| DVector::from_column_slice(of.as_slice())).collect()
 }
 
 /// The same space, by the separation alone, or the wheels' common scale, where these lie in it: eigenvectors
 /// that are equally unobservable are any mixture.
-fn named_apart(directions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+fn disentangled(directions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     if directions.len() < 2 {
         return directions.to_vec();
     }
     let within = |of: &Vector3<f64>| directions.iter().map(|direction| direction * direction.dot(of)).sum();
     let named = [Vector3::z(), Vector3::new(1.0, 1.0, 0.0).normalize(), Vector3::new(1.0, -1.0, 0.0).normalize()];
-    let mut apart: Vec<Vector3<f64>> = Vec::new();
+    let mut own: Vec<Vector3<f64>> = Vec::new();
     for of in named.iter().chain(directions) {
         let inside: Vector3<f64> = within(of);
-        let rest = apart.iter().fold(inside, |rest, before| rest - before * before.dot(&rest));
+        let rest = own.iter().fold(inside, |rest, before| rest - before * before.dot(&rest));
         // What is no direction of its own any more is left out; the named ones only where they are inside.
         let is_own = rest.norm() > if directions.contains(of) { MIN_OWN_DIRECTION } else { MIN_NAMED_DIRECTION };
-        if is_own && apart.len() < directions.len() {
-            apart.push(rest.normalize());
+        if is_own && own.len() < directions.len() {
+            own.push(rest.normalize());
         }
     }
-    if apart.len() == directions.len() { apart } else { directions.to_vec() }
+    if own.len() == directions.len() { own } else { directions.to_vec() }
 }
 
 /// Information on the three geometry parameters with the other columns eliminated.

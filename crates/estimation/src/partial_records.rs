@@ -320,18 +320,26 @@ impl GyroSettings {
     }
 }
 
-/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn.
+/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn, and where rows
+/// are without a rate.
 fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool, longest_s: f64) -> Vec<Window> {
     let Some(rates) = run.odometry.extra.get(&ExtraChannel::GyroYawRate) else { return Vec::new() };
     let (t_s, turns) = (&run.odometry.t_s, track.turns());
     let mut windows: Vec<Window> = Vec::new();
     for row in 1..t_s.len().min(rates.len()) {
         let rate = if is_instantaneous { 0.5 * (rates[row - 1] + rates[row]) } else { rates[row] };
+        if !rate.is_finite() {
+            continue;
+        }
         let [from_s, to_s] = [t_s[row - 1], t_s[row]];
         let stands = turns.left[row] == turns.left[row - 1] && turns.right[row] == turns.right[row - 1];
         let turn_rad = rate * (to_s - from_s);
         match windows.last_mut() {
-            Some(last) if last.stands == stands && to_s - last.from_s <= longest_s + TIME_TOLERANCE_S => {
+            Some(last)
+                if last.to_s == from_s
+                    && last.stands == stands
+                    && to_s - last.from_s <= longest_s + TIME_TOLERANCE_S =>
+            {
                 last.to_s = to_s;
                 last.turn_rad += turn_rad;
                 last.rows += 1;
@@ -349,7 +357,8 @@ fn noise_from_log(session: &Session<'_>) -> Option<f64> {
     let instantaneous = session.truth_noise.gyro.is_instantaneous;
     let nominal = Model::of(&session.robot.geometry().ok()?, 0);
     let (mut standing, mut moving) = (Vec::new(), Vec::new());
-    for run in &session.runs {
+    let measures = |run: &&RunView<'_>| run.odometry().extra.contains_key(&ExtraChannel::GyroYawRate);
+    for run in session.runs.iter().filter(measures) {
         let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
         let rows = windows(run.run(), &track, instantaneous, 0.0);
         let squared = |pair: &[Window], off: [f64; 2]| {

@@ -22,7 +22,7 @@ impl ModelFit<'_> {
     /// # Errors
     /// [`EstimationError`] when the column is not free, or a refit diverges.
     pub fn profile(&self, column: Column, rise: f64) -> Result<(f64, f64), EstimationError> {
-        let position = self.columns.iter().position(|of| *of == column);
+        let position = self.position(column);
         let sigma = position.zip(self.solution.information(&self.columns)).and_then(|(position, information)| {
             let (_, covariance) = information.solve()?;
             Some(covariance[(position, position)].sqrt())

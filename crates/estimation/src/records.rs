@@ -5,6 +5,8 @@
 //! a segment of its own, which starts at the origin of its own frame. Displacements of a run go on from each
 //! other: the heading in the room and the state of terms are carried from one to the next.
 
+use std::cell::LazyCell;
+
 use dataset::{Run, Session, TruthSample};
 use kinematics::{Increment, Pose};
 
@@ -46,7 +48,8 @@ impl<'a> Records<'a> {
         let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
-            let gyro = GyroSettings::of(session);
+            // Only for runs without poses: its noise is sought in all rows of the session.
+            let gyro = LazyCell::new(|| GyroSettings::of(session));
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             for (position, run) in session.runs.iter().enumerate() {
                 let before = records.segments.len();

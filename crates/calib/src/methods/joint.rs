@@ -127,16 +127,16 @@ pub fn calibrated_drive(
 /// The fit as a calibration of sessions with these names.
 fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -> Result<Calibration, CalibError> {
     let covariance = fit.covariance(&mut []);
-    let at = |column: Column| fit.columns.iter().position(|of| *of == column);
     let var = |row: usize, column: usize| covariance.as_ref().map(|covariance| covariance[(row, column)]);
     let instrument = fit.mean_instrument();
     let extrinsics = fit.has(Column::SensorX).then(|| Extrinsics {
         body_from_sensor: instrument.body_from_sensor,
-        covariance: at(Column::SensorX)
+        covariance: fit
+            .position(Column::SensorX)
             .filter(|_| covariance.is_some())
             .map(|first| Matrix3::from_fn(|i, j| var(first + i, first + j).unwrap_or(f64::NAN))),
     });
-    let latency_sigma_s = at(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
+    let latency_sigma_s = fit.position(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
     Ok(Calibration {
         extrinsics,
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),

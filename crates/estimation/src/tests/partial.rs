@@ -257,6 +257,34 @@ fn straights_by_tape_and_a_whole_turn_that_is_come_back_from_determine_the_robot
 }
 
 #[test]
+fn rows_without_a_rate_leave_the_others_as_they_are() {
+    let log = |missing: &[usize]| {
+        dataset(GYRO, |run, poses| {
+            tape(run, poses, [20, 120], 0.0);
+            revisit(run, poses, [120, 210], 0.0);
+            let rates = run.odometry.extra.get_mut(&ExtraChannel::GyroYawRate).expect("a gyro");
+            missing.iter().for_each(|row| rates[*row] = f64::NAN);
+        })
+    };
+    // The first row has no interval before it; then a row of a straight, and three of a spin.
+    let sparse = log(&[0, 60, 150, 151, 152]);
+    let fit = fitted(&sparse);
+    // Rejects a rate that is not known in a sum, which leaves no number.
+    assert!(errors(&fit).iter().all(|error| error.abs() < 10.0 * NOISELESS), "{:?}", errors(&fit));
+    let turns = |dataset: &Dataset| {
+        let records = Records::of(&[dataset.session()]);
+        let times_s = records.partial[0].observations.iter().filter_map(|of| match of.quantity {
+            crate::partial_records::Quantity::GyroTurn { dt_s } => Some(dt_s),
+            _ => None,
+        });
+        times_s.sum::<f64>()
+    };
+    // Four intervals of a tenth of a second. Rejects a window that goes on across them.
+    let without_s = turns(&log(&[])) - turns(&sparse);
+    assert!((without_s - 0.4).abs() < 1e-9, "{without_s}");
+}
+
+#[test]
 fn a_gyroscope_of_unknown_scale_tells_the_ratio_of_the_wheels_and_no_separation() {
     let dataset = dataset(GYRO, |run, poses| tape(run, poses, [20, 120], 0.0));
     let fit = fitted(&dataset);
