@@ -25,11 +25,13 @@ use crate::thinning::PropagationInterval;
 const OF_MOTION: [NoiseComponent; 2] = [NoiseComponent::Wheel, NoiseComponent::Turn];
 
 /// Where the bias stands in the state, after the pose.
-const BIAS_AT: usize = 3;
+const fn bias_at() -> usize {
+    3
+}
 
 /// Where a wall stands, or what comes after so many walls.
 const fn wall_at(wall: usize) -> usize {
-    BIAS_AT + 1 + 2 * wall
+    bias_at() + 1 + 2 * wall
 }
 
 struct PartialFilter<'f> {
@@ -84,7 +86,7 @@ impl<'f> PartialFilter<'f> {
         let first_slot = wall_at(segment.walls.len());
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
-        covariance[(BIAS_AT, BIAS_AT)] = GYRO_BIAS_SIGMA_RADPS.powi(2);
+        covariance[(bias_at(), bias_at())] = GYRO_BIAS_SIGMA_RADPS.powi(2);
         for (wall, of) in segment.walls.iter().enumerate() {
             let at = wall_at(wall);
             (state[at], state[at + 1]) = (of.direction_rad, of.offset_m);
@@ -253,8 +255,8 @@ impl<'f> PartialFilter<'f> {
                 // In one place both are the same: the robot stands.
                 by[to + 2] += scale;
                 by[from + 2] -= scale;
-                by[BIAS_AT] = dt_s;
-                of.value - scale * (at(to, 2) - at(from, 2)) - self.state[BIAS_AT] * dt_s
+                by[bias_at()] = dt_s;
+                of.value - scale * (at(to, 2) - at(from, 2)) - self.state[bias_at()] * dt_s
             }
         };
         (off, by)
@@ -262,7 +264,7 @@ impl<'f> PartialFilter<'f> {
 
     fn update(&mut self, of: &Observation, model: &Model, columns: usize, sums: &mut Sums<'_>) {
         if let Quantity::GyroTurn { dt_s } = of.quantity {
-            self.covariance[(BIAS_AT, BIAS_AT)] += self.segment.bias_walk * dt_s;
+            self.covariance[(bias_at(), bias_at())] += self.segment.bias_walk * dt_s;
         }
         let (v, row) = self.predicted(of, model);
         let ph = &self.covariance * &row;

@@ -320,8 +320,8 @@ impl GyroSettings {
     }
 }
 
-/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn, and where rows
-/// are without a rate.
+/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn, and where
+/// rows are without a rate.
 fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool, longest_s: f64) -> Vec<Window> {
     let Some(rates) = run.odometry.extra.get(&ExtraChannel::GyroYawRate) else { return Vec::new() };
     let (t_s, turns) = (&run.odometry.t_s, track.turns());
