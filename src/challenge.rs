@@ -28,6 +28,9 @@ pub(crate) struct Arguments {
     /// Drive this case alone and show what was hidden and what was said.
     #[arg(long, value_name = "K", conflicts_with = "cases")]
     case: Option<u64>,
+    /// Hide large effects alone: one of the mean in each case, at ten to a hundred of its detection limits.
+    #[arg(long, conflicts_with = "check")]
+    large: bool,
     /// Write the datasets of --case into this folder, one folder a session.
     #[arg(long, value_name = "DIR", requires = "case")]
     out: Option<PathBuf>,
@@ -58,6 +61,16 @@ const MAX_CASES: u64 = 1_000_000;
 /// Most lines of confusions that a person reads.
 const MAX_SHOWN: usize = 60;
 
+impl Arguments {
+    fn scope(&self) -> Scope {
+        match (self.large, self.check.is_some()) {
+            (true, _) => Scope::Large,
+            (false, true) => Scope::Guarded,
+            (false, false) => Scope::Whole,
+        }
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     if let Some(number) = arguments.case {
         return one(arguments, number, terminal);
@@ -74,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     terminal.remark(&format!("{cases} cases on {jobs} threads: about {:.0} minutes", minutes.max(1.0)));
     let bar = terminal.progress(cases, "cases");
     let started = Instant::now();
-    let scope = if arguments.check.is_some() { Scope::Guarded } else { Scope::Whole };
+    let scope = arguments.scope();
     let result = challenge(arguments.seed, cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     terminal.remark(&format!("{} cases in {:.1} s", result.cases.len(), started.elapsed().as_secs_f64()));
@@ -135,7 +148,7 @@ fn conclude(check: &DiagnosisCheck, terminal: &Terminal) -> Result<ExitCode, Fai
 }
 
 fn one(arguments: &Arguments, number: u64, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    match challenge_case(arguments.seed, number)? {
+    match challenge_case(arguments.scope(), arguments.seed, number)? {
         Ok(result) => {
             terminal.document(&result)?;
             show_case(&result, terminal)?;
@@ -147,7 +160,7 @@ fn one(arguments: &Arguments, number: u64, terminal: &Terminal) -> Result<ExitCo
         }
     }
     if let Some(out) = &arguments.out {
-        for (session, dataset) in challenge_datasets(arguments.seed, number)?.iter().enumerate() {
+        for (session, dataset) in challenge_datasets(arguments.scope(), arguments.seed, number)?.iter().enumerate() {
             dataset::write(dataset, &out.join(format!("session_{session}")), Existing::Refuse)?;
         }
         terminal.remark(&format!("datasets in {}", out.display()));

@@ -155,7 +155,7 @@ impl Page<'_> {
                     alternative.id,
                     alternative.z,
                     alternative.to_the_best,
-                    words::status(alternative)
+                    alternative.status.text()
                 )?;
             }
             writeln!(page)?;

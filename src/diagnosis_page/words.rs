@@ -1,6 +1,6 @@
 //! Findings and checks in words that a roboticist uses.
 
-use diagnose::{Alternative, Check, Compared, Document, Finding, Status, Value, Verdict};
+use diagnose::{Check, Compared, Document, Finding, Value, Verdict};
 use effects::{Estimate, Estimates};
 
 /// What a finding's first name means, with its sizes; the finding's own sentence where that says more.
@@ -127,16 +127,5 @@ pub(crate) fn p_value(p: f64) -> String {
         p if p >= 1e-3 => format!("{p:.3}"),
         p if p > 0.0 => format!("{p:.0e}"),
         _ => "< 1e-300".to_owned(),
-    }
-}
-
-/// Why an alternative was not named.
-pub(crate) fn status(alternative: &Alternative) -> &'static str {
-    match alternative.status {
-        Status::Found => "found",
-        Status::NotDiscriminated => "not discriminated from what was found",
-        Status::ExplainsLess => "explains less than what was found, or nothing beside it",
-        Status::NotSignificant => "not significant",
-        Status::NotDetectable => "not detectable in these data",
     }
 }

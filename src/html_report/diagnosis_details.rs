@@ -7,7 +7,7 @@ use report_page::{Block, Cell, Section, Table};
 
 use super::residuals;
 use super::words::{count, plus_minus};
-use crate::diagnosis_page::words::{p_value, question, status};
+use crate::diagnosis_page::words::{p_value, question};
 
 /// What an id means.
 fn meaning(id: &str) -> String {
@@ -38,7 +38,7 @@ pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) ->
                 Cell::id(alternative.id.clone()),
                 Cell::number(format!("{:.1}", alternative.z)),
                 Cell::number(format!("{:.1}", alternative.to_the_best)),
-                Cell::text(status(alternative)),
+                Cell::text(alternative.status.text()),
             ]);
         }
         section = section.with(Block::Table(table));

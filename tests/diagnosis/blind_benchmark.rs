@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout)] // the seed, and what came of it
 
 use crate::support::{document, succeed, usage};
-use blind_benchmark::{CaseKind, CaseResult, EffectKind, NoiseClass, challenge_case};
+use blind_benchmark::{CaseKind, CaseResult, EffectKind, NoiseClass, Scope, challenge_case};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -40,7 +40,8 @@ const NULLS_AND_SINGLES: u64 = 14;
 /// Drives these cases of a seed. Left out is the case of an effect that no robot drawn for it shows.
 fn driven(seed: u64, numbers: impl Iterator<Item = u64>) -> Vec<CaseResult> {
     let numbers: Vec<u64> = numbers.collect();
-    let results = numbers.into_par_iter().map(|number| challenge_case(seed, number).expect("simulates").ok());
+    let results =
+        numbers.into_par_iter().map(|number| challenge_case(Scope::Whole, seed, number).expect("simulates").ok());
     results.collect::<Vec<_>>().into_iter().flatten().collect()
 }
 

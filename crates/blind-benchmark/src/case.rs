@@ -17,6 +17,7 @@ use super::power::DISCRIMINATION_LEVEL;
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
 use crate::oracle_view::{OracleView, form_share, has_random_signature, known_noncentrality, size_ratio, view};
+use crate::scope::Scope;
 
 /// What a case asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -30,6 +31,8 @@ pub enum CaseKind {
     Pair,
     /// One effect is hidden, and the catalogue is without it.
     LeftOut,
+    /// One effect of the mean is hidden, at ten detection limits and more.
+    Large,
 }
 
 /// A block of cases: of each twenty, so many are nulls, singles, pairs; the others leave an effect out.
@@ -39,7 +42,15 @@ const SINGLES: u64 = 7;
 const PAIRS: u64 = 2;
 
 impl CaseKind {
-    /// The round of a case, and which of its kind it is.
+    /// The kind of a case in a campaign, and which of its kind it is.
+    pub(crate) const fn in_scope(scope: Scope, number: u64) -> (Self, u64) {
+        match scope {
+            Scope::Large => (Self::Large, number),
+            Scope::Whole | Scope::Guarded => Self::of(number),
+        }
+    }
+
+    /// The same where kinds mix.
     pub(crate) const fn of(number: u64) -> (Self, u64) {
         let (block, index) = (number / BLOCK, number % BLOCK);
         if index < NULLS {
@@ -61,7 +72,7 @@ pub(crate) const fn is_guarded(number: u64) -> bool {
     match CaseKind::of(number).0 {
         CaseKind::Null => true,
         CaseKind::Single => (number / BLOCK).is_multiple_of(2),
-        CaseKind::Pair | CaseKind::LeftOut => false,
+        CaseKind::Pair | CaseKind::LeftOut | CaseKind::Large => false,
     }
 }
 
@@ -100,6 +111,8 @@ enum Attempt {
 /// Sizes over the detection limit: of singles, and of pairs, which ask for names and not for power.
 const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
 const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
+/// The same of large effects, as far as a real robot may have them.
+const LARGE_RATIOS: (f64, f64) = (10.0, 100.0);
 /// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
 const MAX_RATIO_ERROR: f64 = 1.5;
 /// Steps in which a scale is sought.
@@ -112,8 +125,8 @@ const ATTEMPTS: u64 = 10;
 
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
-    pub(crate) fn draw(seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
-        let (case_kind, index) = CaseKind::of(number);
+    pub(crate) fn draw(scope: Scope, seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
+        let (case_kind, index) = CaseKind::in_scope(scope, number);
         let mut unresolved_robots = 0;
         for attempt in 0..ATTEMPTS {
             // Two that show on the same paths must be met; which, is drawn anew.
@@ -148,6 +161,7 @@ impl Case {
         match case_kind {
             CaseKind::Null => Vec::new(),
             CaseKind::Single => vec![one(0.1, 0.15)],
+            CaseKind::Large => vec![one(0.0, 0.0)],
             CaseKind::Pair => {
                 let first = one(0.0, 0.0);
                 let mut second = one(0.0, 0.0);
@@ -181,7 +195,11 @@ impl Case {
         let measurement =
             DriveContext { seed, number, conditions: &conditions, robot: &robot, instrument_model: &instrument_model };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
-        let ratios = if case_kind == CaseKind::Pair { PAIR_RATIOS } else { SINGLE_RATIOS };
+        let ratios = match case_kind {
+            CaseKind::Pair => PAIR_RATIOS,
+            CaseKind::Large => LARGE_RATIOS,
+            CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
+        };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));

@@ -104,12 +104,12 @@ pub struct Confusion {
 ///
 /// # Errors
 /// [`ChallengeError`] when it cannot be simulated.
-pub fn challenge_case(seed: u64, number: u64) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
-    case_in(Scope::Whole, seed, number)
-}
-
-fn case_in(scope: Scope, seed: u64, number: u64) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
-    match Case::draw(seed, number)? {
+pub fn challenge_case(
+    scope: Scope,
+    seed: u64,
+    number: u64,
+) -> Result<Result<CaseResult, &'static str>, ChallengeError> {
+    match Case::draw(scope, seed, number)? {
         Ok(case) => Ok(Ok(score::score(number, &case, scope)?)),
         Err(id) => Ok(Err(id)),
     }
@@ -119,8 +119,8 @@ fn case_in(scope: Scope, seed: u64, number: u64) -> Result<Result<CaseResult, &'
 ///
 /// # Errors
 /// As [`challenge_case`].
-pub fn challenge_datasets(seed: u64, number: u64) -> Result<Vec<dataset::Dataset>, ChallengeError> {
-    Ok(Case::draw(seed, number)?.map(|case| case.datasets).unwrap_or_default())
+pub fn challenge_datasets(scope: Scope, seed: u64, number: u64) -> Result<Vec<dataset::Dataset>, ChallengeError> {
+    Ok(Case::draw(scope, seed, number)?.map(|case| case.datasets).unwrap_or_default())
 }
 
 /// Drives the cases of a scope on so many threads, 0 for one a core, and scores them; `done` is called after
@@ -137,9 +137,9 @@ pub fn challenge(
 ) -> Result<ChallengeResult, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
-    let is_asked = |number: &u64| scope == Scope::Whole || case::is_guarded(*number);
+    let is_asked = |number: &u64| scope != Scope::Guarded || case::is_guarded(*number);
     let one = |number| {
-        let result = case_in(scope, seed, number);
+        let result = challenge_case(scope, seed, number);
         done();
         result
     };

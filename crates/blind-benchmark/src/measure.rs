@@ -113,8 +113,41 @@ pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) 
         &of(CaseKind::LeftOut).collect::<Vec<_>>(),
         0.7,
     ));
+    measures.extend(large(cases));
     measures.extend(probabilities(cases));
     measures
+}
+
+/// What is said of large effects: the right name, and nothing beside it that the effect itself explains.
+fn large(cases: &[CaseResult]) -> Vec<Measure> {
+    // What another form leaves of the catalogue's is no finding of the effect's size.
+    let of_form = |case: &&CaseResult| {
+        case.case_kind == CaseKind::Large && case.hidden.first().is_some_and(|hidden| !hidden.other_form)
+    };
+    let large: Vec<&CaseResult> = cases.iter().filter(of_form).collect();
+    if large.is_empty() {
+        return Vec::new();
+    }
+    let named = |case: &CaseResult| {
+        let hidden = case.hidden.first().map(|hidden| hidden.id.as_str());
+        case.findings().next().is_some_and(|found| found.names.iter().any(|name| Some(name.as_str()) == hidden))
+    };
+    vec![
+        share(
+            "large_named",
+            "large effects that the first finding names",
+            count(large.iter().copied(), named),
+            0.95,
+            false,
+        ),
+        share(
+            "second_finding",
+            "large effects with a second finding beside them",
+            count(large.iter().copied(), |case: &CaseResult| case.findings().nth(1).is_some()),
+            0.1,
+            true,
+        ),
+    ]
 }
 
 /// A single effect counts as plain at this many detection limits, the bar on the power's ratio.

@@ -57,7 +57,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
             result.failed_checks = failed.map(|check| check.name.clone()).collect();
             result.extended = !diagnosis.found.terms().is_empty();
             debug_assert_eq!(diagnosis.document.verdict == Verdict::Consistent, result.reported.is_empty());
-            if scope == Scope::Guarded {
+            if scope != Scope::Whole {
                 return Ok(result);
             }
             result.gain = gain(case, Some(&diagnosis))?;

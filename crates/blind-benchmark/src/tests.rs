@@ -50,8 +50,8 @@ fn a_case_stands_by_itself() {
     let text = |result: &ChallengeResult| serde_json::to_string(result).expect("has a JSON form");
     assert_eq!(text(&whole), text(&alone));
     let last = whole.cases.last().expect("cases");
-    assert_eq!(challenge_case(3, last.case).expect("simulates").as_ref(), Ok(last));
-    let other = challenge_case(4, last.case).expect("simulates");
+    assert_eq!(challenge_case(Scope::Whole, 3, last.case).expect("simulates").as_ref(), Ok(last));
+    let other = challenge_case(Scope::Whole, 4, last.case).expect("simulates");
     assert_ne!(other.as_ref(), Ok(last), "another seed is another case");
 }
 
@@ -61,7 +61,7 @@ fn a_case_stands_by_itself() {
 fn records_do_not_tell_what_is_hidden() {
     let mut loads_elsewhere = 0;
     for number in 0..20 {
-        let Ok(case) = Case::draw(11, number).expect("simulates") else { continue };
+        let Ok(case) = Case::draw(Scope::Whole, 11, number).expect("simulates") else { continue };
         let hidden: Vec<&str> = case.hidden.iter().map(|hidden| hidden.id).collect();
         for dataset in &case.datasets {
             assert_eq!(dataset.provenance, dataset::Provenance::default());

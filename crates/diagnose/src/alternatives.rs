@@ -5,8 +5,10 @@ use serde::Serialize;
 use crate::cause::Cause;
 use crate::finding::Finding;
 use crate::ranking::tests_in;
+use crate::rivals::Refusal;
 use crate::selection::SearchResult;
 use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
+use crate::stamp_errors::StampError;
 use crate::statistics::z_of_p;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
@@ -42,12 +44,42 @@ pub enum Status {
     /// It is not detectable in these data.
     #[serde(rename = "not_shown")]
     NotDetectable,
+    /// It is significant alone, and refused.
+    #[serde(untagged)]
+    Refused(Refusal),
+}
+
+impl Status {
+    /// It in words.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Found => "found",
+            Self::NotDiscriminated => "not discriminated from what was found",
+            Self::ExplainsLess => "explains less than what was found, and is not needed beside that",
+            Self::Refused(Refusal::Unphysical) => "significant, but its estimates are those of no possible effect",
+            Self::Refused(Refusal::OtherWheels) => {
+                "significant, but with it the wheels are far from the stated ones, and without it they are not"
+            }
+            Self::Refused(Refusal::NotConfirmed) => "its score is significant, and a fit with it does not confirm that",
+            Self::Refused(Refusal::NotOverRuns) => "significant in a few runs alone, not over all of them",
+            Self::Refused(Refusal::PredictsWorse) => "significant, but it predicts held-out runs worse",
+            Self::Refused(Refusal::DriftsMore) => "significant, but odometry drifts more with it on held-out runs",
+            Self::NotSignificant => "not significant",
+            Self::NotDetectable => "not detectable in these data",
+        }
+    }
 }
 
 /// The alternatives, most probable first.
-pub(crate) fn alternatives(found: &SearchResult<'_>, findings: &[Finding]) -> Vec<Alternative> {
+pub(crate) fn alternatives(
+    found: &SearchResult<'_>,
+    stamps: Option<&StampError>,
+    findings: &[Finding],
+) -> Vec<Alternative> {
     let entries = &found.first_scan;
     let best = entries.iter().map(|entry| entry.scored.log_odds).fold(0.0, f64::max);
+    let best = stamps.map_or(best, |error| best.max(error.log_odds));
     let tests = tests_in(entries);
     let mut all: Vec<Alternative> = entries
         .iter()
@@ -67,11 +99,17 @@ pub(crate) fn alternatives(found: &SearchResult<'_>, findings: &[Finding]) -> Ve
             } else if entry.p_value * tests > SCAN_LEVEL {
                 Status::NotSignificant
             } else {
-                Status::ExplainsLess
+                found.refusals.get(id).map_or(Status::ExplainsLess, |refusal| Status::Refused(*refusal))
             };
             Alternative { id: id.to_owned(), z, log_odds, to_the_best: log_odds - best, status }
         })
         .collect();
+    // What was set right before the scan is in none of its entries.
+    all.extend(stamps.map(|error| {
+        let (z, log_odds) = (error.test.statistic.sqrt(), error.log_odds);
+        let id = error.candidate.id().to_owned();
+        Alternative { id, z, log_odds, to_the_best: log_odds - best, status: Status::Found }
+    }));
     all.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.id.cmp(&b.id)));
     all
 }

@@ -57,6 +57,14 @@ impl Candidate {
         }
     }
 
+    /// How the records' stamps are without it, where it is in the stamps alone.
+    pub(crate) fn restamped(&self) -> Option<effects::Restamped> {
+        match self {
+            Self::Effect { id, .. } => effects::description(id)?.restamped,
+            Self::Sparse(_) => None,
+        }
+    }
+
     /// Whether it is of the outside instrument, and no part of the robot's motion.
     pub(crate) fn is_of_instrument(&self) -> bool {
         match self {

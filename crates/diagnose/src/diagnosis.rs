@@ -26,6 +26,7 @@ use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
 use crate::stage::{OnStage, Step};
+use crate::stamp_errors::stamp_error;
 use crate::text;
 use crate::unknown_motion::unknown_motions;
 
@@ -166,11 +167,29 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     };
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
-    // Where the counts do not follow the robot at all, no small effect has a meaning.
-    let uncorrelated = !is_correlated(&base);
-    let catalogue = if uncorrelated { Vec::new() } else { mean_terms(&options.without) };
+    let every_term = mean_terms(&options.without);
+    // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
+    let error = is_correlated(&base).then(|| stamp_error(records, &base, &every_term)).flatten();
+    let restamped = error.as_ref().and_then(|error| {
+        let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
+        error.is_undone_by(&fit).then_some((error, fit))
+    });
+    let as_stamped = (records, base.clone());
+    let (stamps, records, base) = match restamped {
+        Some((error, fit)) => (Some(error), &error.records[..], fit),
+        None => (None, records, base),
+    };
+    let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
+    let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let structure = mean_structure(records, base, &catalogue, restored);
+    let mut structure = mean_structure(records, base.clone(), &catalogue, restored);
+    // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which they
+    // follow it, such as a clock that is off.
+    let uncorrelated = !is_correlated(&base) && !is_correlated(&structure.found.model.fit);
+    if uncorrelated {
+        catalogue.clear();
+        structure = mean_structure(records, base, &catalogue, restored);
+    }
     let (log, spans) = (check_rows(records), check_spans(records));
     let model = structure.model();
     let names: Vec<String> =
@@ -184,23 +203,31 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         spans: spans.as_ref(),
         faults: &faults,
         clocks: &clocks.offsets,
+        stamps,
         anomalies,
         uncorrelated,
         without: &options.without,
         carry_over: &carry_over,
     });
     begins(Step::Gain);
-    let (gain, gain_why_null) = gain_of(&structure.base, model, &names);
+    let thinned = structure.correlated.is_some().then(|| THINNED.fit(&sessions(as_stamped.0)).ok()).flatten();
+    let before = stamps.map_or(&structure.base, |_| thinned.as_ref().unwrap_or(&as_stamped.1));
+    let nothing_added = model.candidates.is_empty() && stamps.is_none();
+    let (gain, gain_why_null) = if nothing_added {
+        (None, Some("nothing was added to the calibrated model's mean".to_owned()))
+    } else {
+        gain_of(before, model, &names)
+    };
     begins(Step::Detectability);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
     begins(Step::NextExperiment);
     let next =
         next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
     let carried = carried(&structure.base, model, &carry_over);
-    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, &carried);
+    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
-    let alternatives = alternatives(&structure.found, &findings);
+    let alternatives = alternatives(&structure.found, stamps, &findings);
     let calibration_of = |model: &AugmentedModel<'_>| CalibrationReport {
         trained_on: Vec::new(),
         dataset: Names::of(names.clone()),
@@ -244,9 +271,6 @@ fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'
 }
 
 fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) -> (Option<Gain>, Option<String>) {
-    if model.candidates.is_empty() {
-        return (None, Some("nothing was added to the calibrated model's mean".to_owned()));
-    }
     let alone = AugmentedModel::base(base);
     match gain_by_level(&alone, model, names) {
         Ok(gain) => (Some(gain), None),

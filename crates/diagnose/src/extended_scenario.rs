@@ -16,16 +16,18 @@ use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::record_faults::Fault;
 use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
+use crate::stamp_errors::StampError;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
 /// diagnosed lies behind the encoders.
 const STAND_IN: &str = include_str!("default_actuators.toml");
 /// The scenario, or why it cannot be written. `nominal` is the robot as it was recorded, `datasets` are
-/// without `faults`.
+/// without `faults`, and without the errors of their `stamps`.
 pub(crate) fn scenario_of(
     datasets: &[Dataset],
     nominal: &NominalRobot,
     faults: &[&Fault],
+    stamps: Option<&StampError>,
     model: &AugmentedModel<'_>,
 ) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
@@ -72,13 +74,18 @@ pub(crate) fn scenario_of(
     }
     let mut at = 0;
     let mut terms = Vec::new();
-    for candidate in &model.candidates {
+    let in_model = model.candidates.iter().map(|candidate| {
+        let own = at..at + candidate.parameters().len();
+        at = own.end;
+        (candidate, fit.model.term_values[own].to_vec())
+    });
+    let in_stamps = stamps
+        .map(|error| (&error.candidate, error.test.estimates.iter().map(|(value, _)| *value).collect::<Vec<f64>>()));
+    for (candidate, fitted) in in_model.chain(in_stamps) {
         let parameters = candidate.parameters();
-        let fitted = &fit.model.term_values[at..at + parameters.len()];
-        at += parameters.len();
         let effect = match candidate {
             Candidate::Effect { id, .. } => {
-                let named = parameters.iter().zip(fitted).map(|(parameter, size)| (parameter.name, *size));
+                let named = parameters.iter().zip(&fitted).map(|(parameter, size)| (parameter.name, *size));
                 let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
                 let values = estimates.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
                 terms.push(EstimatedTerm { kind: (*id).to_owned(), values });

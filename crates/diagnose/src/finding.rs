@@ -24,6 +24,7 @@ use crate::settings::findings::{
 use crate::settings::levels::{
     LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
 };
+use crate::stamp_errors::StampError;
 use crate::statistics::{p_of_chi_square, sidak, z_of_p};
 use crate::wald::Test;
 
@@ -302,6 +303,13 @@ pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
     let basis = Basis::ClockOffset(offset.offset_s);
     let found = of_causes(vec![cause], p_of_chi_square(2.0 * offset.gain, 1.0), parameters, basis);
     Finding { runs: offset.runs.clone(), ..found }
+}
+
+/// The finding of an error of the stamps.
+pub(crate) fn of_stamps(error: &StampError) -> Finding {
+    let (p_value, values) = (error.test.p_value, parameters(&error.candidate, &error.test.estimates));
+    let found = of_causes(vec![error.candidate.cause()], p_value, values, Basis::Mean);
+    Finding { z: z(&error.test, p_value), ..found }
 }
 
 /// Adds what was taken off the clock before the fit to what was found of it after.

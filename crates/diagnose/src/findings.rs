@@ -17,6 +17,7 @@ use crate::record_faults::{Fault, wrong_wheels};
 use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
 use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
+use crate::stamp_errors::StampError;
 use crate::unknown_motion::Anomaly;
 use crate::wald::wald_test;
 
@@ -37,6 +38,8 @@ pub(crate) struct StageResults<'e, 'a> {
     pub(crate) spans: Option<&'e TestResult>,
     pub(crate) faults: &'e [&'e Fault],
     pub(crate) clocks: &'e [ClockOffset],
+    /// What was wrong with the log's stamps.
+    pub(crate) stamps: Option<&'e StampError>,
     /// Runs and intervals that do not belong.
     pub(crate) anomalies: &'e [Anomaly],
     /// The odometry is uncorrelated with what the instrument measured.
@@ -59,10 +62,11 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 13] = [
+    let stages: [Stage; 14] = [
         record_faults,
         mean_effects,
         clocks,
+        stamps,
         anomalies,
         sparse_terms,
         noise_effects,
@@ -98,6 +102,12 @@ fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
             findings.push(found);
         }
     }
+    findings
+}
+
+/// Stamps that were set right before effects were sought.
+fn stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.extend(results.stamps.map(finding::of_stamps));
     findings
 }
 

@@ -51,6 +51,7 @@ mod selection;
 mod settings;
 mod sparse_terms;
 mod stage;
+mod stamp_errors;
 mod statistics;
 mod text;
 mod unknown_motion;
@@ -65,4 +66,5 @@ pub use document::{
 pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};
+pub use rivals::Refusal;
 pub use stage::{OnStage, Stage};

@@ -1,8 +1,11 @@
 //! Rival models of one candidate: every effect that explains about as much, refitted, most probable first.
 
+use std::collections::BTreeMap;
+
 use estimation::ModelFit;
 use nalgebra::DVector;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::candidate::Candidate;
@@ -16,6 +19,27 @@ use crate::settings::search::{
     MIN_RIVAL_STATISTIC_RATIO,
 };
 use crate::wald::wald_test;
+
+/// Why a candidate whose score is significant is not in the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// Its estimates are those of no effect that can be.
+    Unphysical,
+    /// With it the wheels are far from the stated ones, and without it they are not.
+    OtherWheels,
+    /// The refit does not confirm what the score says of it.
+    NotConfirmed,
+    /// It is not significant over the runs: a few of them have it.
+    NotOverRuns,
+    /// Held-out runs are predicted worse with it.
+    PredictsWorse,
+    /// Held-out runs drift more with it.
+    DriftsMore,
+}
+
+/// The last refusal of each effect, by its id.
+pub(crate) type Refusals = BTreeMap<&'static str, Refusal>;
 
 /// A candidate cause of a finding.
 #[derive(Debug, Clone)]
@@ -37,6 +61,7 @@ pub(crate) fn rivals<'a>(
     index: usize,
     entries: &[Entry],
     best: f64,
+    refusals: &mut Refusals,
 ) -> Vec<(Name, AugmentedModel<'a>)> {
     let close = close_statistic(best);
     let mut contenders = contenders(entries, best);
@@ -53,8 +78,13 @@ pub(crate) fn rivals<'a>(
         models
     };
     let mut fits = fit_each(&best_variants);
-    let is_possible =
-        |extended: &AugmentedModel<'_>| is_physical(extended, index) && keeps_wheels(&without.fit, &extended.fit);
+    let impossible = |extended: &AugmentedModel<'_>| {
+        if !is_physical(extended, index) {
+            return Some(Refusal::Unphysical);
+        }
+        (!keeps_wheels(&without.fit, &extended.fit)).then_some(Refusal::OtherWheels)
+    };
+    let is_possible = |extended: &AugmentedModel<'_>| impossible(extended).is_none();
     // Another variant that explains about as much may have physical sizes.
     let can_be = |fits: &[AugmentedModel<'_>], entry: &Entry| {
         let is_its = |extended: &&AugmentedModel<'_>| extended.candidates[index].id() == entry.scored.candidate.id();
@@ -85,7 +115,11 @@ pub(crate) fn rivals<'a>(
     // Unphysical candidates are no causes. Where one explains more than all others, the first of those is
     // doubted.
     let best = named.first().map_or(f64::NEG_INFINITY, |(name, _)| name.log_odds);
-    named.retain(|(_, extended)| is_possible(extended));
+    named.retain(|(name, extended)| {
+        let refusal = impossible(extended);
+        refusals.extend(refusal.map(|refusal| (name.candidate.id(), refusal)));
+        refusal.is_none()
+    });
     if let Some((name, _)) = named.first_mut() {
         name.outdone = best > name.log_odds + log_odds_margin(name.log_odds);
     }

@@ -9,7 +9,7 @@ use crate::gain::gain;
 use crate::model_comparison::{log_bayes_factor, log_odds_margin, regated};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
-use crate::rivals::{Name, over_names, rivals};
+use crate::rivals::{Name, Refusal, Refusals, over_names, rivals};
 use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
 use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
@@ -29,6 +29,8 @@ pub(crate) struct SearchResult<'a> {
     extra_sigma: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
+    /// Why significant candidates are not in the model.
+    pub(crate) refusals: Refusals,
     /// Cache of the scans and fits on the base.
     pub(crate) known: FitCache<'a>,
 }
@@ -46,16 +48,25 @@ fn grown<'a>(
     model: &AugmentedModel<'a>,
     mut entries: Vec<Entry>,
     level: f64,
+    refusals: &mut Refusals,
 ) -> Option<AugmentedModel<'a>> {
     let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..MAX_CANDIDATES_TRIED {
         let best = most_significant(&entries, tests, level)?;
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
-        let first = rivals((base, &mut *known), model, index, &entries, statistic).into_iter().next();
-        let refuted = match first.filter(|(name, _)| name.log_odds > 0.0) {
-            Some((_, extended)) if is_confirmed(model, &extended, index, tests, level) => return Some(extended),
-            Some((name, _)) => name.candidate.id(),
-            None => id,
+        let found = rivals((base, &mut *known), model, index, &entries, statistic, refusals);
+        let refuted = match found.into_iter().next().filter(|(name, _)| name.log_odds > 0.0) {
+            Some((name, extended)) => match confirm(model, &extended, index, tests, level) {
+                Ok(()) => return Some(extended),
+                Err(refusal) => {
+                    refusals.insert(name.candidate.id(), refusal);
+                    name.candidate.id()
+                }
+            },
+            None => {
+                refusals.entry(id).or_insert(Refusal::NotConfirmed);
+                id
+            }
         };
         // What comes next may be what is there.
         entries.retain(|entry| entry.scored.candidate.id() != refuted);
@@ -98,21 +109,23 @@ fn without_what_cancels<'a>(
     subsets.swap_remove(fewest)
 }
 
-/// Whether a refit confirms what a score says of a candidate.
-fn is_confirmed(
+/// Whether a refit confirms what a score says of a candidate, or why not.
+fn confirm(
     without: &AugmentedModel<'_>,
     extended: &AugmentedModel<'_>,
     index: usize,
     tests: f64,
     level: f64,
-) -> bool {
+) -> Result<(), Refusal> {
     // A size that the refit does not confirm was an accident of the score.
-    let is_an_accident = deflated_p_value(without, extended, index).is_none_or(|p_value| p_value * tests > level);
+    if deflated_p_value(without, extended, index).is_none_or(|p_value| p_value * tests > level) {
+        return Err(Refusal::NotConfirmed);
+    }
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
     // seems significant: it must be significant over the runs alone.
     let scattered = differs_from_run_to_run(extended) < TURN_SCATTER_LEVEL;
     let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
-    !is_an_accident && cluster_robust_test(extended, index, over_runs)
+    if cluster_robust_test(extended, index, over_runs) { Ok(()) } else { Err(Refusal::NotOverRuns) }
 }
 
 /// The most significant effect of a scan, if it is significant at a family-wise level over so many tests
@@ -146,6 +159,7 @@ pub(crate) fn search<'a>(
     mut known: FitCache<'a>,
 ) -> SearchResult<'a> {
     let mut model = AugmentedModel::base(base);
+    let mut refusals = Refusals::new();
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
     let mut beside = Vec::new();
@@ -154,7 +168,7 @@ pub(crate) fn search<'a>(
         if model.candidates.is_empty() {
             first_scan.clone_from(&entries);
         }
-        let Some(extended) = grown((base, &mut known), &model, entries, level) else { break };
+        let Some(extended) = grown((base, &mut known), &model, entries, level, &mut refusals) else { break };
         model = extended;
     }
     model = without_what_cancels((base, &mut known), model);
@@ -163,7 +177,7 @@ pub(crate) fn search<'a>(
         let Some(without) = known.without(base, &model, index) else { break };
         let entries = best_variants(known.beside(&without, catalogue));
         let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
-        let mut found = rivals((base, &mut known), &without, index, &entries, best);
+        let mut found = rivals((base, &mut known), &without, index, &entries, best, &mut refusals);
         if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
             // Another candidate explains it, or beside the others no physical one does.
             model = without;
@@ -179,12 +193,17 @@ pub(crate) fn search<'a>(
         };
         // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is
         // refused. It is tested beside the others: alone, a part of a larger effect may predict worse.
-        let predicts = gain(&without, &found[0].1).map_or(true, |gain| {
+        let refusal = gain(&without, &found[0].1).ok().and_then(|gain| {
             let score = gain.log_score_per_observation;
-            score.low + score.high > 0.0 && !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS)
+            if score.low + score.high <= 0.0 {
+                return Some(Refusal::PredictsWorse);
+            }
+            gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS).then_some(Refusal::DriftsMore)
         });
-        if !predicts || !found.iter().any(is_significant) {
-            // No cause that replaced it is significant either.
+        // Where no cause that replaced it is significant either, it is not confirmed.
+        let unconfirmed = || (!found.iter().any(is_significant)).then_some(Refusal::NotConfirmed);
+        if let Some(refusal) = refusal.or_else(unconfirmed) {
+            refusals.insert(found[0].0.candidate.id(), refusal);
             model = without;
             continue;
         }
@@ -219,7 +238,7 @@ pub(crate) fn search<'a>(
             extra_sigma.remove(index);
         }
     }
-    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, known }
+    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, refusals, known }
 }
 
 /// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and

@@ -70,12 +70,8 @@ fn fitted(parameters: &BTreeMap<String, Value>) -> Vec<(&str, &str, f64)> {
 
 /// A candidate cause as scripts get it.
 pub(crate) fn candidate(alternative: &Alternative) -> document::CandidateCause {
-    let refused = match alternative.status {
-        Status::Found | Status::NotDiscriminated => None,
-        Status::ExplainsLess => Some("explains less than what was found, and is not needed beside that"),
-        Status::NotSignificant => Some("not significant"),
-        Status::NotDetectable => Some("not detectable in these data"),
-    };
+    let is_named = matches!(alternative.status, Status::Found | Status::NotDiscriminated);
+    let refused = (!is_named).then(|| alternative.status.text());
     let Alternative { id, z, log_odds, .. } = alternative;
     document::CandidateCause { id: id.clone(), z: *z, log_odds: *log_odds, refused: refused.map(ToOwned::to_owned) }
 }

@@ -5,6 +5,8 @@
 //! Diagnosis, plans, pages and the benchmark ask these properties; none of them compares ids. So a new effect
 //! states here all that they must know of it.
 
+use dataset::Dataset;
+
 use crate::benchmark::Benchmark;
 use crate::estimates::Estimates;
 use crate::on_board::{OnBoard, UNSTATED};
@@ -26,6 +28,8 @@ pub struct Description {
     /// Its mean term depends on single rows of the log, not only on what the wheels did between two
     /// measurements.
     pub goes_by_rows: bool,
+    /// The records with the stamps that they would have without it; of effects that are in the stamps alone.
+    pub restamped: Option<Restamped>,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
     /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
@@ -38,6 +42,10 @@ pub struct Description {
     /// How the blind benchmark draws it.
     pub benchmark: Benchmark,
 }
+
+/// The records of a dataset without an error of their stamps, by its only parameter's estimate and standard
+/// deviation; `None` where the stamps are not what is wrong, or cannot be told.
+pub type Restamped = fn(&Dataset, f64, f64) -> Option<Dataset>;
 
 /// A part of the instrument's mounting on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +77,7 @@ impl Description {
             isolated_error: None,
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
+            restamped: None,
             clock_offset: None,
             extrinsic: None,
             geometry: None,

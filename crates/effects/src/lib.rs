@@ -30,7 +30,9 @@ mod time_shift;
 pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw, ParameterValue, ParameterValues};
 pub use channel::Channel;
 pub use covariate::Covariate;
-pub use description::{Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Summary};
+pub use description::{
+    Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Restamped, Summary,
+};
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};

@@ -12,12 +12,13 @@ use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
 use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
-use crate::optimizer::Solution;
+use crate::optimizer::{Solution, start_heading};
 use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::{CarriedState, Propagator};
 use crate::segment::{MeasuredPose, Segment};
-use crate::settings::{MAX_DECIMATION_NONCENTRALITY, MIN_NOISE_SIGMA};
+use crate::settings::{HEADING_STEP_TOLERANCE_RAD, MAX_DECIMATION_NONCENTRALITY, MAX_UNGATED_STEPS, MIN_NOISE_SIGMA};
+use crate::thinning::Selection;
 use crate::wheel_angles::WheelInterval;
 
 /// Error of dead reckoning at a measurement.
@@ -55,11 +56,46 @@ impl ModelFit<'_> {
             .flat_map(|block| {
                 let part: Vec<_> =
                     self.selections.iter().map(|selection| selection.block(&self.records, block, blocks)).collect();
-                let Solution { model, noise, free_headings, .. } = &self.solution;
-                let found = pass(&self.records, &part, model, noise, free_headings, terms, pass_options);
-                found.runs.into_iter().filter(|run| run.count > 0.0)
+                self.started_anew(&part, terms, pass_options).into_iter().filter(|run| run.count > 0.0)
             })
             .collect()
+    }
+
+    /// The normal equations of selections that begin within segments. Where headings are not measured, each
+    /// selection begins with the heading that suits its own measurements best.
+    fn started_anew(
+        &self,
+        selections: &[Selection],
+        terms: &mut [Box<dyn ModelTerm>],
+        pass_options: PassOptions<'_>,
+    ) -> Vec<NormalEquations> {
+        let Solution { model, noise, free_headings, .. } = &self.solution;
+        if !self.records.segments.iter().any(Segment::has_free_heading) {
+            return pass(&self.records, selections, model, noise, free_headings, terms, pass_options).runs;
+        }
+        let weight = 1.0 / selections.len() as f64;
+        let mut sum: Vec<NormalEquations> = Vec::new();
+        for selection in selections {
+            let of_segment = |(number, segment): (usize, &Segment<'_>)| match selection.propagations[number].first() {
+                Some(first) if first.from > 0 => start_heading(segment, model, first.from),
+                _ => free_headings[number],
+            };
+            let mut headings: Vec<f64> = self.records.segments.iter().enumerate().map(of_segment).collect();
+            let own = std::slice::from_ref(selection);
+            let mut found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
+            for _ in 0..MAX_UNGATED_STEPS {
+                if found.headings.iter().all(|heading| heading.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
+                    break;
+                }
+                found.headings.iter().for_each(|heading| headings[heading.segment] += heading.rest);
+                found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
+            }
+            if sum.is_empty() {
+                sum = found.runs.iter().map(|run| NormalEquations::new(run.run, run.gradient.len())).collect();
+            }
+            sum.iter_mut().zip(&found.runs).for_each(|(sum, run)| sum.add(run, weight));
+        }
+        sum
     }
 
     /// The same fit on records whose intervals are joined up to `longest_s` seconds, for faster scans.

@@ -13,7 +13,7 @@ use crate::pass::{FreeHeading, Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::CachedPropagation;
 use crate::records::Records;
-use crate::segment::{Segment, Start};
+use crate::segment::Segment;
 use crate::settings::{
     ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
     HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
@@ -140,7 +140,7 @@ pub(crate) fn fit_from(
     let mut model = from.model;
     let mut headings = from
         .free_headings
-        .unwrap_or_else(|| records.segments.iter().map(|segment| start_heading(segment, &model)).collect());
+        .unwrap_or_else(|| records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect());
     let basis = free_basis(options.columns.len(), &options.fixed);
     let mut noise = from.noise.unwrap_or_else(|| prior.noise());
     if from.noise.is_none() {
@@ -234,7 +234,7 @@ pub(crate) fn pass_settled(
     noise: &Noise,
 ) -> Result<(Model, Pass), EstimationError> {
     let options = FitOptions::of(&[]);
-    let mut headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
+    let mut headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
     for round in 1.. {
         let found = pass(records, selections, &model, noise, &headings, &mut [], PassOptions::default());
         let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
@@ -426,19 +426,15 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all
 }
 
-/// Approximate start heading of a segment without measured headings, radians: the rotation of its
-/// dead-reckoned path onto the measured one.
-pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model) -> f64 {
-    let Some(first) = segment
-        .measurements
-        .first()
-        .filter(|measurement| segment.start == Start::MeasuredPose && measurement.theta_rad.is_none())
-    else {
+/// Approximate heading of a segment without measured headings at one of its measurements, radians: the
+/// rotation of its dead-reckoned path from there onto the measured one. 0 for other segments.
+pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model, from: usize) -> f64 {
+    let Some(first) = segment.measurements.get(from).filter(|_| segment.has_free_heading()) else {
         return 0.0;
     };
     let (mut pose, mut at) = (Pose::IDENTITY, first.after);
     let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
-    for measurement in &segment.measurements[1..] {
+    for measurement in &segment.measurements[from + 1..] {
         for interval in &segment.intervals[at..measurement.after] {
             pose = pose * model.increment(interval.wheel_rad).arc();
         }

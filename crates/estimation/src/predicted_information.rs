@@ -25,7 +25,7 @@ impl<'a> ModelFit<'a> {
             ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
             false,
         );
-        let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model)).collect();
+        let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
         let reused =
             Solution { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
         Self { solution: reused, ..fit }

@@ -58,14 +58,21 @@ impl ModelFit<'_> {
         let Solution { model, noise, .. } = &self.solution;
         let [wheel, turn, ..] = noise.variance;
         let mut rolled = segment.clone();
+        // What nobody recorded of the motion within a row is one error for all of it.
+        let mut within_row = Wheels::both(0.0);
         for (interval, smooth) in rolled.intervals.iter_mut().zip(smooth) {
+            if !interval.starts_within_row {
+                within_row = Wheels::from_sides(|_| draws.normal());
+            }
+            let [from, to] = interval.interpolated_rad2.map(|variance| variance.map(f64::sqrt));
             let travel_m = model.m_per_rad.zip_with(*smooth, |m_per_rad, rad| m_per_rad * rad);
             let Increment { turn_rad, .. } = Increment::from_travel(travel_m, model.separation_m);
             let apart_m = 0.5 * model.separation_m * (turn * turn_rad.abs()).sqrt() * draws.normal();
             interval.wheel_rad = Wheels::from_sides(|side| {
                 let noise_m = (wheel * travel_m[side].abs()).sqrt() * draws.normal();
                 let sense = if side == Side::Left { -1.0 } else { 1.0 };
-                smooth[side] + (noise_m + sense * apart_m) / model.m_per_rad[side]
+                let bent_rad = within_row[side] * (to[side] - from[side]);
+                smooth[side] + bent_rad + (noise_m + sense * apart_m) / model.m_per_rad[side]
             });
         }
         rolled
@@ -128,7 +135,8 @@ fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
     segment.intervals.iter().map(of).collect()
 }
 
-/// Counts the smoothed turns, each wheel from a random phase on.
+/// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts go
+/// as the smoothed turns do, as those of a log are interpolated.
 fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
     for side in Side::BOTH {
         let quantum_rad = segment.quantum_rad[side];
@@ -137,10 +145,18 @@ fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Dr
             if quantum_rad > 0.0 { (turned_rad / quantum_rad + phase).floor() * quantum_rad } else { turned_rad }
         };
         let (mut turned_rad, mut before) = (0.0, counted(0.0));
-        for (interval, smooth) in segment.intervals.iter_mut().zip(smooth) {
-            turned_rad += smooth[side];
+        let mut first = 0;
+        for row in segment.intervals.chunk_by_mut(|_, next| next.starts_within_row) {
+            let smooth = &smooth[first..first + row.len()];
+            first += row.len();
+            let of_row: f64 = smooth.iter().map(|smooth| smooth[side]).sum();
+            turned_rad += of_row;
             let now = counted(turned_rad);
-            interval.wheel_rad[side] = now - before;
+            let row_s: f64 = row.iter().map(|interval| interval.dt_s).sum();
+            for (interval, smooth) in row.iter_mut().zip(smooth) {
+                let share = if of_row == 0.0 { interval.dt_s / row_s } else { smooth[side] / of_row };
+                interval.wheel_rad[side] = (now - before) * share;
+            }
             before = now;
         }
     }

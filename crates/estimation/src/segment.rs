@@ -56,6 +56,12 @@ impl Segment<'_> {
         self.start == Start::Origin
     }
 
+    /// Does it start at a measured position without a heading, which is a parameter then?
+    pub(crate) fn has_free_heading(&self) -> bool {
+        self.start == Start::MeasuredPose
+            && self.measurements.first().is_some_and(|measurement| measurement.theta_rad.is_none())
+    }
+
     /// Are this segment and the next of one series, in which errors may be autocorrelated? Displacements of
     /// one run are; poses of two segments have a gap between them.
     pub(crate) fn is_in_series_with(&self, next: &Self) -> bool {

@@ -52,6 +52,21 @@ impl Interval<'_> {
         Increment::from_travel(self.travel_m, self.wheel_separation_m)
     }
 
+    /// Travel of each wheel at its mean speed, metres: without the rounding of this interval's counts, which
+    /// the residuals have too. What a term multiplies, compares or bends is made of it.
+    #[inline]
+    #[must_use]
+    pub fn smooth_travel_m(&self) -> Wheels<f64> {
+        self.speed_m_s.map(|speed_m_s| speed_m_s * self.dt_s)
+    }
+
+    /// Motion of the drive's centre by the wheels' mean speeds.
+    #[inline]
+    #[must_use]
+    pub fn smooth_increment(&self) -> Increment {
+        Increment::from_travel(self.smooth_travel_m(), self.wheel_separation_m)
+    }
+
     /// Motion of the drive's centre when the wheels' travels change by this much.
     #[inline]
     #[must_use]

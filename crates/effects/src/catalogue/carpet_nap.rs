@@ -118,7 +118,7 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let increment = interval.increment();
+        let increment = interval.smooth_increment();
         let distance_m = increment.distance_m.abs();
         let heading_rad = interval.world_from_body.theta_rad + 0.5 * increment.turn_rad;
         gradient[0] = in_room(interval, [distance_m, 0.0]);

@@ -107,9 +107,10 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let Increment { distance_m, turn_rad } = interval.increment();
+        let Increment { distance_m, turn_rad } = interval.smooth_increment();
         let angle_rad = (self.castor_behind_m * turn_rad).atan2(distance_m.abs());
-        let tread_m = 0.5 * (interval.travel_m.left.abs() + interval.travel_m.right.abs());
+        let travel_m = interval.smooth_travel_m();
+        let tread_m = 0.5 * (travel_m.left.abs() + travel_m.right.abs());
         gradient[0].theta_rad = -tread_m * angle_rad.sin();
     }
 }

@@ -95,7 +95,7 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let Wheels { left, right } = interval.travel_m;
+        let Wheels { left, right } = interval.smooth_travel_m();
         gradient[0] = interval.change(Wheels { left: 0.5 * left.abs(), right: 0.0 });
         gradient[1] = interval.change(Wheels { left: 0.0, right: 0.5 * right.abs() });
     }

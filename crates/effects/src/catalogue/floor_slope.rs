@@ -128,7 +128,8 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let tread_m = 0.5 * (interval.travel_m.left.abs() + interval.travel_m.right.abs());
+        let travel_m = interval.smooth_travel_m();
+        let tread_m = 0.5 * (travel_m.left.abs() + travel_m.right.abs());
         let amount = match self.with_distance {
             true => tread_m,
             false if tread_m > 0.0 => interval.dt_s,

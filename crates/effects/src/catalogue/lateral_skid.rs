@@ -109,7 +109,7 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let increment = interval.increment();
+        let increment = interval.smooth_increment();
         if interval.dt_s > 0.0 {
             gradient[0].y_m = -increment.distance_m * increment.turn_rad / interval.dt_s;
         }

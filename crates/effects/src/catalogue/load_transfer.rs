@@ -98,7 +98,7 @@ impl ModelTerm for Term {
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let twist = Increment::from_travel(interval.speed_m_s, interval.wheel_separation_m);
         let centripetal_m_s2 = twist.distance_m * twist.turn_rad;
-        let Wheels { left, right } = interval.travel_m;
+        let Wheels { left, right } = interval.smooth_travel_m();
         gradient[0] = interval.change(Wheels { left: left * centripetal_m_s2, right: -right * centripetal_m_s2 });
     }
 }

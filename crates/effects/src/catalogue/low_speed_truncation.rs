@@ -142,8 +142,8 @@ impl ModelTerm for Term {
     }
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let sense = |travel_m: f64| if travel_m == 0.0 { 0.0 } else { travel_m.signum() };
-        gradient[0] = interval.change(interval.travel_m.map(|travel_m| sense(travel_m) * interval.dt_s));
+        let sense = |speed_m_s: f64| if speed_m_s == 0.0 { 0.0 } else { speed_m_s.signum() };
+        gradient[0] = interval.change(interval.speed_m_s.map(|speed_m_s| sense(speed_m_s) * interval.dt_s));
     }
 }
 

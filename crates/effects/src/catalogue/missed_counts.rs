@@ -145,9 +145,9 @@ impl ModelTerm for Term {
 
     /// By the counted speed: what was lost is, to first order, the share of what is above the hinge.
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
-        let above_m = interval.travel_m.zip_with(interval.speed_m_s, |travel_m, speed_m_s| {
+        let above_m = interval.speed_m_s.map(|speed_m_s| {
             let above_m_s = (speed_m_s.abs() - self.hinge_m_s).max(0.0);
-            if above_m_s > 0.0 { travel_m.signum() * above_m_s * interval.dt_s } else { 0.0 }
+            speed_m_s.signum() * above_m_s * interval.dt_s
         });
         gradient[0] = interval.change(Wheels { left: above_m.left, right: 0.0 });
         gradient[1] = interval.change(Wheels { left: 0.0, right: above_m.right });

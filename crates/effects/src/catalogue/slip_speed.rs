@@ -102,7 +102,8 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let lost_m = |travel_m: f64, speed_m_s: f64| travel_m * speed_m_s.abs();
-        gradient[0] = interval.change(interval.travel_m.zip_with(interval.speed_m_s, lost_m).map(|lost_m| -lost_m));
+        let travel_m = interval.smooth_travel_m();
+        gradient[0] = interval.change(travel_m.zip_with(interval.speed_m_s, lost_m).map(|lost_m| -lost_m));
     }
 }
 

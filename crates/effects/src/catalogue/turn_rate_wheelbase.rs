@@ -100,7 +100,7 @@ impl ModelTerm for Term {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if interval.dt_s > 0.0 {
-            let turn_rad = interval.increment().turn_rad;
+            let turn_rad = interval.smooth_increment().turn_rad;
             gradient[0].theta_rad = -turn_rad * turn_rad.abs() / interval.dt_s;
         }
     }

@@ -1,0 +1,67 @@
+//! Errors of the log's stamps: undone in the records before effects are sought.
+//!
+//! Speeds, accelerations and the instants of measurements all come from the stamps. Stamps that are wrong by
+//! much are therefore more than one linear term: what that term leaves resembles other effects.
+
+use dataset::Dataset;
+use estimation::ModelFit;
+
+use crate::augmented_model::{AugmentedModel, cost, count, refit};
+use crate::candidate::Candidate;
+use crate::model_comparison::log_bayes_factor;
+use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MIN_LOG_ODDS_MARGIN, SCAN_LEVEL};
+use crate::settings::records::MAX_RESTAMPING_LOSS;
+use crate::wald::{Test, cluster_robust_test, wald_test};
+
+/// An error of the stamps, and the records without it.
+pub(crate) struct StampError {
+    pub(crate) candidate: Candidate,
+    /// Its test alone in the records as they are, with a p-value for one candidate.
+    pub(crate) test: Test,
+    pub(crate) records: Vec<Dataset>,
+    /// Log Bayes factor of it as a linear term over none.
+    pub(crate) log_odds: f64,
+    /// Cost of the model that has it as a linear term, its number of observations, and by how much it costs
+    /// less than the model without.
+    cost: f64,
+    count: f64,
+    explains: f64,
+}
+
+impl StampError {
+    /// Whether the records without it are about as likely as those with it beside the linear term.
+    pub(crate) fn is_undone_by(&self, restamped: &ModelFit<'_>) -> bool {
+        let most = self.count.max(count(restamped));
+        cost(restamped, most) <= self.cost + MIN_LOG_ODDS_MARGIN.max(MAX_RESTAMPING_LOSS * self.explains)
+    }
+}
+
+/// The most significant error of the stamps that restamping undoes, if it is significant among all of the
+/// catalogue. `base` is the fit to `datasets`.
+pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[Candidate]) -> Option<StampError> {
+    let alone = AugmentedModel::base(base);
+    let found = catalogue.iter().filter_map(|candidate| {
+        let restamped = candidate.restamped()?;
+        let model = refit(base, &alone, vec![candidate.clone()])?;
+        let (test, _) = wald_test(&model, 0)?;
+        let &[(value, sigma)] = &test.estimates[..] else { return None };
+        if test.p_value * catalogue.len() as f64 > SCAN_LEVEL || !cluster_robust_test(&model, 0, CLUSTER_ROBUST_LEVEL) {
+            return None;
+        }
+        let each: Vec<Option<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, value, sigma)).collect();
+        let changes = each.iter().any(Option::is_some);
+        let records = each.into_iter().zip(datasets).map(|(own, dataset)| own.unwrap_or_else(|| dataset.clone()));
+        let (count, log_odds) = (count(&model.fit), log_bayes_factor(base, &model));
+        let (without, cost) = (cost(base, count), cost(&model.fit, count));
+        changes.then(|| StampError {
+            candidate: candidate.clone(),
+            test,
+            records: records.collect(),
+            log_odds,
+            cost,
+            count,
+            explains: without - cost,
+        })
+    });
+    found.max_by(|a, b| a.test.statistic.total_cmp(&b.test.statistic))
+}
