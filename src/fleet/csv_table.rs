@@ -40,7 +40,8 @@ pub(super) fn of(fleet: &Fleet) -> Result<Vec<u8>, Failure> {
 
 fn row(robot: &Robot, session: &FleetSession) -> Vec<String> {
     let result = &session.result;
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    // Tiny numbers with an exponent.
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
     let mut row = vec![
         robot.rank.to_string(),
         robot.id.clone(),

@@ -45,6 +45,7 @@ struct RobotOut<'f> {
 struct SessionOut<'f> {
     dataset: &'f str,
     recorded: Option<Timestamp>,
+    path_kind: &'f str,
     runs: usize,
     drift_percent: &'f SessionDrift,
     parameters: BTreeMap<&'static str, ParameterOut>,
@@ -97,6 +98,7 @@ impl<'f> SessionOut<'f> {
         Self {
             dataset: &session.dataset,
             recorded: result.recorded,
+            path_kind: &result.path_kind,
             runs: result.runs,
             drift_percent: &result.drift_percent,
             parameters: parameters(session),

@@ -5,7 +5,7 @@ use std::path::Path;
 use ::diagnose::Options;
 use ::fleet::{ExcessDrift, GeometryEstimate, SessionDrift, SessionFinding, SessionResult};
 use calib::methods::joint::Joint;
-use calib::{CalibrationReport, Method, MethodReport, Names, evaluate};
+use calib::{CalibrationReport, Method, MethodReport, Names, evaluate, path_kind};
 use estimation::refuse_wrapped_counters;
 
 use crate::calibrate::why_no_result;
@@ -62,6 +62,7 @@ pub(super) fn analyse(path: &Path, calibrate_only: bool) -> Result<SessionResult
         robot_id: dataset.provenance.robot_id.clone(),
         recorded: dataset.provenance.recorded,
         nominal: dataset.robot,
+        path_kind: path_kind(&sessions[0]),
         runs: dataset.runs.len(),
         drift_percent,
         geometry,

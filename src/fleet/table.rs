@@ -75,7 +75,7 @@ fn row(robot: &Robot) -> [String; 8] {
         robot.rank.to_string(),
         robot.id.clone(),
         robot.sessions.len().to_string(),
-        latest.recorded.map_or_else(|| "–".to_owned(), |recorded| recorded.to_string()),
+        latest.recorded.map_or_else(|| "–".to_owned(), |recorded| recorded.strftime("%Y-%m-%d %H:%MZ").to_string()),
         format!("{} → {}", cell(drift.nominal, 1.0, 3), cell(drift.calibrated, 1.0, 3)),
         match (robot.excess.value, robot.excess.sigma, robot.excess.q_value) {
             (Some(value), Some(sigma), _) => format!("{value:.3} ± {sigma:.3}"),

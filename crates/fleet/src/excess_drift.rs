@@ -7,15 +7,16 @@
 //!
 //! With J_r the derivative of the end by the geometry and C the covariance of ĝ, an error δ of ĝ changes the
 //! excess by at most 100 · Σ |J_r δ| / Σ L_r, whose root mean square is at most σ = 100 · Σ √tr(J_r C J_rᵀ) / Σ
-//! L_r. Whether there is an excess at all is the Wald test of ĝ = g₀: (ĝ − g₀)ᵀ C⁻¹ (ĝ − g₀) is χ² with three
-//! degrees of freedom (Wald 1943).
+//! L_r. Whether there is an excess at all is the test of ĝ = g₀ by T² = (ĝ − g₀)ᵀ C⁻¹ (ĝ − g₀). C comes from
+//! the scatter of n runs, so that T² (ν − 2)/(3ν) is F with 3 and ν − 2 degrees of freedom, ν = n − 1
+//! (Hotelling 1931). Where runs are so few that C is the model's own, the test is conservative.
 
 use calib::Calibration;
 use dataset::{NominalRobot, RunView, Session};
 use kinematics::{DriveGeometry, GeometryError, Point, Pose, Rule, Wheels};
 use nalgebra::{Cholesky, Matrix2x3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::geometry::{GEOMETRY, GeometryEstimate, lengths_m};
 use crate::settings::DIFFERENCE_STEP;
@@ -61,16 +62,26 @@ impl ExcessDrift {
         Ok(Self {
             percent: 100.0 * apart_m / length_m,
             sigma_percent: 100.0 * error_m / length_m,
-            p_value: p_value(&configured, &calibrated, covariance).ok_or_else(no_scatter)?,
+            p_value: p_value(&configured, &calibrated, covariance, calibration.runs_used).ok_or_else(no_scatter)?,
         })
     }
 }
 
-/// The Wald test; `None` where the covariance is singular.
-fn p_value(configured: &DriveGeometry, calibrated: &DriveGeometry, covariance_m2: Matrix3<f64>) -> Option<f64> {
+/// The test of Hotelling; `None` where the covariance is singular or the runs are too few for one.
+fn p_value(
+    configured: &DriveGeometry,
+    calibrated: &DriveGeometry,
+    covariance_m2: Matrix3<f64>,
+    runs: usize,
+) -> Option<f64> {
+    let tested = GEOMETRY.len();
     let difference_m = Vector3::from(lengths_m(calibrated)) - Vector3::from(lengths_m(configured));
-    let statistic = difference_m.dot(&Cholesky::new(covariance_m2)?.solve(&difference_m));
-    Some(ChiSquared::new(GEOMETRY.len() as f64).ok()?.sf(statistic))
+    let t_squared = difference_m.dot(&Cholesky::new(covariance_m2)?.solve(&difference_m));
+    // Degrees of freedom of the scatter, and of the ratio's denominator.
+    let of_scatter = runs.checked_sub(1)? as f64;
+    let of_ratio = runs.checked_sub(tested).filter(|left| *left > 0)? as f64;
+    let ratio = FisherSnedecor::new(tested as f64, of_ratio).ok()?;
+    Some(ratio.sf(t_squared * of_ratio / (tested as f64 * of_scatter)))
 }
 
 /// Where a run that starts at the origin ends, and the length of its path, metres; `None` without rows.
@@ -140,7 +151,7 @@ mod tests {
     fn excess(set: &Dataset, diameter_m: Wheels<f64>, sigma_m: f64) -> Result<ExcessDrift, String> {
         let calibrated = DriveGeometry::new(diameter_m, 0.3).expect("a drive");
         let covariance = Some(Covariance::from_diagonal_element(3, 3, sigma_m * sigma_m));
-        let calibration = Calibration { covariance, ..Calibration::new("joint", calibrated, None) };
+        let calibration = Calibration { covariance, runs_used: 5, ..Calibration::new("joint", calibrated, None) };
         ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, |_| true))
     }
 
@@ -149,8 +160,9 @@ mod tests {
         let found = excess(&straight(), Wheels::both(0.101), 1e-4).expect("determined");
         // 1.00 m is believed of 1.01 m.
         assert!((found.percent - 100.0 * 0.01 / 1.01).abs() < 1e-9, "{found:?}");
-        // Two wheels off by ten standard deviations each: χ² = 200.
-        assert!(found.p_value < 1e-40, "{found:?}");
+        // Two wheels off by ten standard deviations each: T² = 200, over five runs a ratio of 100/3, of which F
+        // with 3 and 2 degrees of freedom has 1 − (100/102)^1.5 beyond it.
+        assert!((found.p_value - (1.0 - (100.0_f64 / 102.0).powf(1.5))).abs() < 1e-9, "{found:?}");
         // Along x both wheels have 10 m/m each, σ 0.1 mm: 1.41 mm; across, a wheel turns the robot by 20 rad
         // · σ/2 / 0.3 m, half of which times the distance is the offset of the end: 1.69 mm for each wheel.
         let along_m = 10.0 * 1e-4 * 2.0_f64.sqrt();

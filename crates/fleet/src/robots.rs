@@ -184,6 +184,12 @@ fn warnings(sessions: &[FleetSession]) -> Vec<String> {
                 "{earlier} and {later} were both recorded at {at}: no change is tested between them; correct recorded in one dataset.toml"
             ));
         }
+        if before.result.path_kind != after.result.path_kind {
+            warnings.push(format!(
+                "{earlier} drives {} and {later} drives {}: what a constant geometry does not describe may look like a change",
+                before.result.path_kind, after.result.path_kind
+            ));
+        }
         if before.result.nominal != after.result.nominal {
             let of = |robot: &NominalRobot| {
                 let lengths_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];

@@ -15,6 +15,8 @@ pub struct SessionResult {
     pub recorded: Option<Timestamp>,
     /// What the robot was configured with.
     pub nominal: NominalRobot,
+    /// The kind of path that it drives ([`calib::path_kind`]).
+    pub path_kind: String,
     /// How many runs it has.
     pub runs: usize,
     /// Drift on these runs.

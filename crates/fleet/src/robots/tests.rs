@@ -26,6 +26,7 @@ fn session(dataset: &str, robot_id: Option<&str>, day: Option<i64>, left_sigmas:
                 ticks_per_rev: None,
                 counter_bits: None,
             },
+            path_kind: "squares".to_owned(),
             runs: 1,
             drift_percent: SessionDrift { nominal: None, calibrated: None, why_null: None },
             geometry: GeometryEstimate {
@@ -112,10 +113,12 @@ fn sessions_without_an_instant_take_no_part_where_a_robot_has_several() {
 fn sessions_at_one_instant_are_not_compared_and_other_nominal_values_are_told() {
     let mut other = session("y", Some("a"), Some(1), 9.0);
     other.result.nominal.wheel_separation_m = 0.31;
+    other.result.path_kind = "circles".to_owned();
     let found = fleet(vec![session("x", Some("a"), Some(1), 0.0), other]);
     let [robot] = &found.robots[..] else { panic!("{found:?}") };
     assert!(robot.changes.is_empty());
-    let [same, differs] = &robot.warnings[..] else { panic!("{:?}", robot.warnings) };
+    let [same, paths, differs] = &robot.warnings[..] else { panic!("{:?}", robot.warnings) };
+    assert!(paths.contains("squares") && paths.contains("circles"), "{paths}");
     assert!(same.contains("1970-01-02T00:00:00Z") && differs.contains("300.000") && differs.contains("310.000"));
 }
 
