@@ -30,7 +30,7 @@ struct RobotOut<'f> {
     id_is_stated: bool,
     rank: usize,
     sessions: Vec<SessionOut<'f>>,
-    /// Those of the latest session, as the next three.
+    /// Parameters, what is not observable and findings are those of the latest session.
     parameters: BTreeMap<&'static str, ParameterOut>,
     not_observable: &'f [Undetermined],
     findings: Option<&'f [SessionFinding]>,
@@ -52,7 +52,7 @@ struct SessionOut<'f> {
     findings: Option<Vec<&'f str>>,
 }
 
-/// Lengths in metres.
+/// Metres.
 #[derive(Serialize)]
 struct ParameterOut {
     value: Option<f64>,

@@ -2,8 +2,8 @@
 
 mod csv_table;
 mod document;
-mod kept;
 mod session;
+mod store;
 mod table;
 
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use clap::Args;
 use crate::html_report;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, INTERRUPTED, Terminal, is_dataset, refuse_doubles};
-use kept::Kept;
+use store::SessionStore;
 
 /// Many robots and their sessions: drift, parameters, findings, what changed, and which robot to service first.
 ///
@@ -78,12 +78,12 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let datasets = datasets_of(&arguments.dirs)?;
     // Until the results stand.
-    let kept = arguments.out.as_deref().map(Kept::open).transpose()?;
-    if let Some(why) = kept.as_ref().and_then(Kept::why_not_locked) {
+    let store = arguments.out.as_deref().map(SessionStore::open).transpose()?;
+    if let Some(why) = store.as_ref().and_then(SessionStore::why_not_locked) {
         terminal.remark(&format!("warning: {why}"));
     }
-    let Some(outcomes) = outcomes(&datasets, arguments, kept.as_ref(), terminal)? else {
-        let goes_on = if kept.is_some() { "; the same command goes on" } else { "" };
+    let Some(outcomes) = outcomes(&datasets, arguments, store.as_ref(), terminal)? else {
+        let goes_on = if store.is_some() { "; the same command goes on" } else { "" };
         terminal.remark(&format!("stopped{goes_on}"));
         return Ok(ExitCode::from(INTERRUPTED));
     };
@@ -196,7 +196,7 @@ fn datasets_below(path: &Path, depth: usize) -> Vec<PathBuf> {
 fn outcomes(
     datasets: &[PathBuf],
     arguments: &Arguments,
-    kept: Option<&Kept>,
+    store: Option<&SessionStore>,
     terminal: &Terminal,
 ) -> Result<Option<Vec<(String, Outcome)>>, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -212,7 +212,7 @@ fn outcomes(
         while !stop.load(Ordering::Relaxed) {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(path) = datasets.get(number) else { break };
-            let (key, outcome) = outcome(path, arguments.calibrate_only, kept);
+            let (key, outcome) = outcome(path, arguments.calibrate_only, store);
             done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, key, outcome));
             bar.inc(1);
         }
@@ -230,12 +230,12 @@ fn outcomes(
 }
 
 /// What becomes of a dataset: what is kept of it, or what is found now and then kept.
-fn outcome(path: &Path, calibrate_only: bool, kept: Option<&Kept>) -> (String, Outcome) {
-    let key = match kept::key(path, calibrate_only) {
+fn outcome(path: &Path, calibrate_only: bool, store: Option<&SessionStore>) -> (String, Outcome) {
+    let key = match store::key(path, calibrate_only) {
         Ok(key) => key,
         Err(why) => return (String::new(), Outcome::Failed(why)),
     };
-    if let Some(result) = kept.and_then(|kept| kept.read(&key)) {
+    if let Some(result) = store.and_then(|store| store.read(&key)) {
         return (key, Outcome::Reused(Box::new(result)));
     }
     // One robot's odd log is to stop no other, whatever it meets.
@@ -243,7 +243,7 @@ fn outcome(path: &Path, calibrate_only: bool, kept: Option<&Kept>) -> (String, O
         Err("an error of the program itself, which yair diagnose shows too; please report it".to_owned())
     });
     let outcome = match found {
-        Ok(result) => match kept.map_or(Ok(()), |kept| kept.write(&key, &result)) {
+        Ok(result) => match store.map_or(Ok(()), |store| store.write(&key, &result)) {
             Ok(()) => Outcome::Computed(Box::new(result)),
             Err(why) => Outcome::Failed(why),
         },

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use ::fleet::{Change, Fleet, GEOMETRY, Robot};
 use calib::nominal_value;
+use dataset::Timestamp;
 use report_page::{Axis, Block, Cell, Chart, Mark, Report, Role, Section, Series, Table, Tile, Tone};
 
 use super::made_by;
@@ -46,7 +47,7 @@ pub(crate) fn write_fleet(fleet: &Fleet, file: &Path) -> Result<(), Failure> {
     let mut page = Report {
         command: "yair fleet".to_owned(),
         subject,
-        tone: if excessive > 0 { Tone::Found } else { Tone::Neutral },
+        tone: Tone::Neutral,
         headline,
         lead: format!(
             "Predicted excess drift is how far the configured geometry takes a robot from where its latest calibration does, on the runs of its latest session. Changes and excesses are judged at a false-discovery rate of {} over the fleet.",
@@ -95,15 +96,18 @@ fn robots(fleet: &Fleet) -> Table {
         "robot",
         "sessions",
         "latest",
-        "excess drift, % of the distance",
-        "drift as configured, %",
+        "excess drift, %",
+        "drift, %",
         "left wheel, mm",
         "right wheel, mm",
         "separation, mm",
-        "changed since the last session",
+        "changed",
         "findings",
     ];
-    let mut table = Table::new("Every robot as its latest session has it; ± is one standard deviation", &headings);
+    let mut table = Table::new(
+        "Every robot as its latest session has it, drift as configured; ± is one standard deviation, at most one of the excess",
+        &headings,
+    );
     for robot in &fleet.robots {
         let latest = &robot.latest().result;
         let geometry = &latest.geometry;
@@ -111,9 +115,10 @@ fn robots(fleet: &Fleet) -> Table {
             let shown = |value_m: f64| plus_minus(1e3 * value_m, geometry.sigma_m(row).map(|sigma_m| 1e3 * sigma_m));
             Cell::number(geometry.value_m[row].map_or_else(|| "not determined".to_owned(), shown))
         };
-        let excess = match (robot.excess.value, &robot.excess.why_null) {
+        let excess = match (robot.excess.value, robot.excess.p_value) {
             (Some(value), _) => plus_minus(value, robot.excess.sigma),
-            (None, why) => why.clone().unwrap_or_default(),
+            (None, Some(_)) => "none seen".to_owned(),
+            (None, None) => "not known".to_owned(),
         };
         let changed = robot.latest_changes().filter(|change| change.significant).map(|change| change.parameter);
         let changed = changed.collect::<Vec<_>>().join(", ");
@@ -126,7 +131,7 @@ fn robots(fleet: &Fleet) -> Table {
             Cell::number(robot.rank.to_string()),
             Cell::id(robot.id.clone()),
             Cell::number(robot.sessions.len().to_string()),
-            Cell::text(latest.recorded.map_or_else(|| "–".to_owned(), |recorded| recorded.to_string())),
+            Cell::text(instant(latest.recorded)),
             Cell::text(excess),
             Cell::number(latest.drift_percent.nominal.map_or_else(|| "–".to_owned(), |drift| format!("{drift:.3}"))),
             length(0),
@@ -137,6 +142,11 @@ fn robots(fleet: &Fleet) -> Table {
         ]);
     }
     table
+}
+
+/// An instant to the minute; a dash where none is stated.
+fn instant(recorded: Option<Timestamp>) -> String {
+    recorded.map_or_else(|| "–".to_owned(), |recorded| recorded.strftime("%Y-%m-%d %H:%MZ").to_string())
 }
 
 fn changes(changed: &[(&Robot, &Change)]) -> Table {
@@ -166,15 +176,20 @@ fn charts(changed: &[(&Robot, &Change)]) -> Vec<Chart> {
             continue;
         }
         let results = || robot.sessions.iter().map(|session| &session.result);
-        let millimetres = |value_m: Option<f64>| value_m.map(|value_m| 1e3 * value_m);
+        // From what the first session is configured with: an axis from zero would show no change.
+        let zero_m = results().find_map(|of| nominal_value(&of.nominal, change.parameter)).unwrap_or(0.0);
+        let millimetres = |value_m: Option<f64>| value_m.map(|value_m| 1e3 * (value_m - zero_m));
         let half_width = |sigma_m: Option<f64>| sigma_m.map(|sigma_m| SIGMAS_95 * 1e3 * sigma_m);
         charts.push(Chart {
             title,
-            caption: "Calibrated in every session, with 95 % intervals, and as the robot is configured.".to_owned(),
+            caption: format!(
+                "Calibrated in every session, with 95 % intervals, and as the robot is configured, over {:.3} mm.",
+                1e3 * zero_m
+            ),
             x: Axis::new("session", ""),
-            y: Axis::new(change.parameter.trim_end_matches("_m"), "mm"),
+            y: Axis::new("difference", "mm"),
             at: (0_u32..).map(f64::from).take(robot.sessions.len()).collect(),
-            names: results().map(|of| of.recorded.map_or_else(String::new, |recorded| recorded.to_string())).collect(),
+            names: results().map(|of| instant(of.recorded)).collect(),
             series: vec![
                 Series {
                     name: "calibrated".to_owned(),

@@ -247,7 +247,7 @@ mod documents_show_what_commands_print {
 
     #[test]
     fn fleet() {
-        shows_what_its_commands_print("docs/fleet.md", 3);
+        shows_what_its_commands_print("docs/fleet.md", 2);
     }
 
     #[test]

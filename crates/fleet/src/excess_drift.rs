@@ -6,10 +6,11 @@
 //! odometry or of the instrument, and is what a new calibration saves on such runs.
 //!
 //! With J_r the derivative of the end by the geometry and C the covariance of ĝ, an error δ of ĝ changes the
-//! excess by at most 100 · Σ |J_r δ| / Σ L_r, whose root mean square is at most σ = 100 · Σ √tr(J_r C J_rᵀ) / Σ
-//! L_r. Whether there is an excess at all is the test of ĝ = g₀ by T² = (ĝ − g₀)ᵀ C⁻¹ (ĝ − g₀). C comes from
-//! the scatter of n runs, so that T² (ν − 2)/(3ν) is F with 3 and ν − 2 degrees of freedom, ν = n − 1
-//! (Hotelling 1931). Where runs are so few that C is the model's own, the test is conservative.
+//! excess by at most 100 · Σ |J_r δ| / Σ L_r, whose root mean square is at most
+//! σ = 100 · Σ √tr(J_r C J_rᵀ) / Σ L_r. Whether there is an excess at all is the test of ĝ = g₀ by
+//! T² = (ĝ − g₀)ᵀ C⁻¹ (ĝ − g₀). C comes from the scatter of n runs, so that T² (ν − 2)/(3ν) is F with 3 and
+//! ν − 2 degrees of freedom, ν = n − 1 (Hotelling 1931). Where runs are so few that C is the model's own, the
+//! test is conservative.
 
 use calib::Calibration;
 use dataset::{NominalRobot, RunView, Session};
@@ -163,10 +164,11 @@ mod tests {
         // Two wheels off by ten standard deviations each: T² = 200, over five runs a ratio of 100/3, of which F
         // with 3 and 2 degrees of freedom has 1 − (100/102)^1.5 beyond it.
         assert!((found.p_value - (1.0 - (100.0_f64 / 102.0).powf(1.5))).abs() < 1e-9, "{found:?}");
-        // Along x both wheels have 10 m/m each, σ 0.1 mm: 1.41 mm; across, a wheel turns the robot by 20 rad
-        // · σ/2 / 0.3 m, half of which times the distance is the offset of the end: 1.69 mm for each wheel.
-        let along_m = 10.0 * 1e-4 * 2.0_f64.sqrt();
-        let across_m = 20.0 * 0.5e-4 / 0.3 * 0.5 * 1.01 * 2.0_f64.sqrt();
+        // Along x each wheel of 20 rad moves the end by 5 times the error of its diameter: 0.71 mm for both;
+        // across, it turns the robot by 10 times that over 0.3 m, half of which times the distance is the
+        // offset of the end: 2.38 mm for both.
+        let along_m = 5.0 * 1e-4 * 2.0_f64.sqrt();
+        let across_m = 10.0 * 1e-4 / 0.3 * 0.5 * 1.01 * 2.0_f64.sqrt();
         let expected = 100.0 * along_m.hypot(across_m) / 1.01;
         assert!((found.sigma_percent / expected - 1.0).abs() < 1e-6, "{found:?} {expected}");
     }

@@ -18,13 +18,13 @@ const GENERATION: u32 = 1;
 const BLOCK_BYTES: usize = 1 << 16;
 
 /// The folder of --out, for this process alone.
-pub(super) struct Kept {
+pub(super) struct SessionStore {
     folder: PathBuf,
     out: PathBuf,
     lock: FolderLock,
 }
 
-impl Kept {
+impl SessionStore {
     /// Takes the folder, which is made where it is not there.
     pub(super) fn open(out: &Path) -> Result<Self, Failure> {
         let lock = FolderLock::take(out).map_err(|error| match error {
