@@ -21,7 +21,7 @@ use crate::simulate::write_whole;
 use crate::terminal::{Failure, INTERRUPTED, Terminal, is_dataset, refuse_doubles};
 use store::SessionStore;
 
-/// Many robots and their sessions: drift, parameters, findings, what changed, and which robot to service first.
+/// Many robots and their sessions: drift, parameters, findings, what changed, and whom to service first.
 ///
 /// Datasets with the same `[robot] id` are sessions of one robot, in the order of `recorded`; a dataset
 /// without an id is a robot of its own. A dataset that fails is listed and stops no other; the exit code is

@@ -1,4 +1,4 @@
-//! `yair fleet`: sessions grouped by robot, changes and ranks, what fails, and what is kept for the next call.
+//! `yair fleet`: sessions grouped by robot, changes and ranks, what fails, and what the next call reuses.
 
 use std::fs;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn the_worn_robot_is_first_its_change_is_found_and_what_fails_stops_nothing() {
     assert!(number(&right["sigma"]) < 5e-5 && right["significant"] == true, "{right}");
     // The seeds are fixed: of the steady robot's three changes none is significant.
     assert!(entries(steady, "changes").iter().all(|change| change["significant"] == false), "{steady}");
-    // Per metre the right wheel turns it by 0.004/0.363 rad, which a square of 1.5 m and straights of 2 m show
+    // Per metre the right wheel turns it by 0.004/0.363 rad, which squares of 1.5 m and straights of 2 m show
     // as about a per cent.
     let excess = &worn["excess_drift_percent"];
     assert!(excess["distinguishable"] == true && (0.8..1.6).contains(&number(&excess["value"])), "{excess}");

@@ -161,8 +161,8 @@ mod tests {
         let found = excess(&straight(), Wheels::both(0.101), 1e-4).expect("determined");
         // 1.00 m is believed of 1.01 m.
         assert!((found.percent - 100.0 * 0.01 / 1.01).abs() < 1e-9, "{found:?}");
-        // Two wheels off by ten standard deviations each: T² = 200, over five runs a ratio of 100/3, of which F
-        // with 3 and 2 degrees of freedom has 1 − (100/102)^1.5 beyond it.
+        // Two wheels off by ten standard deviations each: T² = 200, over five runs a ratio of 100/3, beyond
+        // which F with 3 and 2 degrees of freedom has 1 − (100/102)^1.5.
         assert!((found.p_value - (1.0 - (100.0_f64 / 102.0).powf(1.5))).abs() < 1e-9, "{found:?}");
         // Along x each wheel of 20 rad moves the end by 5 times the error of its diameter: 0.71 mm for both;
         // across, it turns the robot by 10 times that over 0.3 m, half of which times the distance is the

@@ -3,9 +3,9 @@
 //! Of m tests the procedure of Benjamini & Hochberg calls the k smallest p-values discoveries, where k is the
 //! largest number with p₍k₎ ≤ k·q/m; the expected share of false ones among them is then at most q. It holds
 //! for independent tests and for tests with positive regression dependence (Benjamini & Yekutieli 2001). The
-//! tests of a fleet are independent between robots. Those of one robot are not: its parameters are correlated,
-//! and two changes share the session between them. The test of this file that simulates this dependence keeps
-//! the rate.
+//! tests of a fleet are independent between robots. Those of one robot are not: its parameters are
+//! correlated, and two changes share the session between them. The test of this file that simulates this
+//! dependence keeps the rate.
 //!
 //! Reference: Benjamini & Hochberg 1995, eq. 1.
 
@@ -75,7 +75,7 @@ mod tests {
         pairs.map(|z: f64| erfc((z + added).abs() / 2.0_f64.sqrt())).collect()
     }
 
-    /// Mean share of false ones among the discoveries over 2000 fleets of twelve robots of which three change.
+    /// Mean share of false ones among the discoveries over 2000 fleets of twelve robots; three change.
     fn false_share(of: impl Fn(&[f64]) -> Vec<f64>) -> f64 {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(1995);
         let fleets = 2000;
@@ -92,8 +92,8 @@ mod tests {
     }
 
     /// The procedure promises 0.1 · 9/12 = 0.075 for independent tests. The share of one fleet has a standard
-    /// deviation below 0.1, so that the mean of 2000 has one below 0.0023; four of them are allowed. Without a
-    /// correction the share is 0.2.
+    /// deviation below 0.1, so that the mean of 2000 has one below 0.0023; four of them are allowed.
+    /// Without a correction the share is 0.2.
     #[test]
     fn the_rate_holds_over_correlated_parameters_and_shared_sessions() {
         let kept = false_share(q_values);

@@ -291,7 +291,7 @@ fn keys_units_and_sizes() {
     toml(
         "wheel_separation_m = 0.3",
         "wheel_separation_mm = 300",
-        "dataset.toml:5: unknown field `wheel_separation_mm`, expected one of `left_wheel_diameter_m`",
+        "dataset.toml:5: unknown field `wheel_separation_mm`, expected one of `id`, `left_wheel_diameter_m`",
     );
     toml("= 0.3", "= \"0.3\"", "dataset.toml:5: invalid type: string \"0.3\", expected");
     toml("= 0.3", "= 0", "dataset.toml:5: wheel_separation_m = 0; expected a positive finite number");
