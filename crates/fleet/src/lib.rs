@@ -1,8 +1,8 @@
 //! A fleet: the sessions of many robots side by side.
 //!
 //! [`SessionResult`] is what one session shows of its robot. [`Fleet::of`] groups sessions by robot and
-//! orders them by time, tests what changed between consecutive sessions (`change.rs`) at a false-discovery rate over
-//! the fleet (`false_discovery.rs`), and ranks the robots by their predicted excess drift
+//! orders them by time, tests what changed between consecutive sessions (`change.rs`) at a false-discovery
+//! rate over the fleet (`false_discovery.rs`), and ranks the robots by their predicted excess drift
 //! (`excess_drift.rs`). There are no files and no clock.
 
 mod change;
