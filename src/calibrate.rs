@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         && let Some(why) = why_no_result(only)
     {
         terminal.document(&report)?;
-        return Err(why.into());
+        return Err(format!("{why}; --force gives the numbers all the same").into());
     }
     if let Some(out) = &arguments.out {
         write_whole(out, report.to_toml()?.as_bytes())?;
@@ -283,24 +283,23 @@ fn refuse_other_file(out: &Path) -> Result<(), Failure> {
 }
 
 /// Why the only method asked for gives no result that a robot should use.
-fn why_no_result(method: &MethodReport) -> Option<String> {
+pub(crate) fn why_no_result(method: &MethodReport) -> Option<String> {
     let name = &method.method;
-    let force = "--force gives the numbers all the same";
     let rejected = method.runs_rejected.first();
     if method.runs_used == 0 {
         let why = rejected.map_or_else(String::new, |rejected| format!(": run {}: {}", rejected.run, rejected.why));
-        return Some(format!("{name}: no run was used{why}; yair check says what is wrong with them; {force}"));
+        return Some(format!("{name}: no run was used{why}; yair check says what is wrong with them"));
     }
     if !method.determines_anything() {
         let why = method.not_observable.first().map_or("", |blind| blind.why.as_str());
-        return Some(format!("{name}: these runs determine no parameter by itself: {why}; {force}"));
+        return Some(format!("{name}: these runs determine no parameter by itself: {why}"));
     }
     if !method.converged {
         let why = "the fit did not converge, so that its numbers are no result; yair check says what is wrong";
-        return Some(format!("{name}: {why}; {force}"));
+        return Some(format!("{name}: {why}"));
     }
     if let Some(warning) = method.warnings.first() {
-        return Some(format!("{name}: the result cannot be the stated robot: {warning}; {force}"));
+        return Some(format!("{name}: the result cannot be the stated robot: {warning}"));
     }
     None
 }

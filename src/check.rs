@@ -153,27 +153,40 @@ fn say_how_far(all: bool, terminal: &Terminal) {
 
 /// A problem in one line.
 fn line(problem: &Problem) -> String {
+    format!("{}: {}", word(problem), text(problem))
+}
+
+/// What a problem is, without how bad.
+fn text(problem: &Problem) -> String {
     let fix = problem.fix.as_ref().map_or_else(String::new, |fix| format!(" ({fix})"));
-    format!("{}: {}: {}{fix}", word(problem), problem.id, problem.sentence)
+    format!("{}: {}{fix}", problem.id, problem.sentence)
 }
 
 /// Refuses datasets with an error, in the words of the worst.
 pub(crate) fn refuse(datasets: &[Dataset], terminal: &Terminal) -> Result<(), Failure> {
     let found = checked(datasets, terminal);
-    let mut errors = found.problems.iter().filter(|problem| problem.severity == Severity::Error);
-    if let Some(first) = errors.next() {
-        let more = errors.count();
-        let more = match more {
-            0 => String::new(),
-            1 => "; yair check names another".to_owned(),
-            _ => format!("; yair check names {more} more"),
-        };
-        let fix = first.fix.as_ref().map_or_else(String::new, |fix| format!(" ({fix} in dataset.toml)"));
-        let fix = fix.replace(" (--force in dataset.toml)", "");
-        return Err(format!("{}: {}{fix}{more}; --force calibrates all the same", first.id, first.sentence).into());
+    if let Some(why) = why_refused(&found) {
+        return Err(format!("{why}; --force calibrates all the same").into());
     }
-    for problem in found.problems.iter().filter(|problem| problem.severity == Severity::Warning) {
-        terminal.remark(&line(problem));
-    }
+    warnings(&found).for_each(|warning| terminal.remark(&format!("warning: {warning}")));
     Ok(())
+}
+
+/// What should be known of datasets that are not refused, a line each.
+pub(crate) fn warnings(found: &Preflight) -> impl Iterator<Item = String> {
+    found.problems.iter().filter(|problem| problem.severity == Severity::Warning).map(text)
+}
+
+/// Why datasets are refused, in the words of the worst error.
+pub(crate) fn why_refused(found: &Preflight) -> Option<String> {
+    let mut errors = found.problems.iter().filter(|problem| problem.severity == Severity::Error);
+    let first = errors.next()?;
+    let more = match errors.count() {
+        0 => String::new(),
+        1 => "; yair check names another".to_owned(),
+        more => format!("; yair check names {more} more"),
+    };
+    let fix = first.fix.as_ref().map_or_else(String::new, |fix| format!(" ({fix} in dataset.toml)"));
+    let fix = fix.replace(" (--force in dataset.toml)", "");
+    Some(format!("{}: {}{fix}{more}", first.id, first.sentence))
 }

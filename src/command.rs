@@ -17,7 +17,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::terminal::{Printed, Terminal};
 use crate::{
     calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
-    help, import, manual, merge, plan, reproduce, simulate, sweep,
+    fleet_command, help, import, manual, merge, plan, reproduce, simulate, sweep,
 };
 
 pub use crate::watch::{Progress, Watch};
@@ -49,6 +49,7 @@ enum Command {
     Compare(compare::Arguments),
     Correct(correct::Arguments),
     Export(export_command::Arguments),
+    Fleet(fleet_command::Arguments),
     Sweep(sweep::Arguments),
     Merge(merge::Arguments),
     Plan(plan::Arguments),
@@ -135,6 +136,7 @@ fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
         Command::Compare(arguments) => compare::run(arguments, terminal),
         Command::Correct(arguments) => correct::run(arguments, terminal),
         Command::Export(arguments) => export_command::run(arguments, terminal),
+        Command::Fleet(arguments) => fleet_command::run(arguments, terminal),
         Command::Sweep(arguments) => sweep::run(arguments, terminal),
         Command::Merge(arguments) => merge::run(arguments, terminal),
         Command::Plan(arguments) => plan::run(arguments, terminal),

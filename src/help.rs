@@ -33,6 +33,13 @@ const GROUPS: &[(&str, &[Entry])] = &[
             ("correct", &["yair correct mine --calibration diagnosis/extended.toml --out poses"]),
             ("compare", &["yair compare monday tuesday wednesday"]),
             (
+                "fleet",
+                &[
+                    "yair fleet robots --out nightly --html fleet.html",
+                    "yair fleet robots/cart-1 robots/cart-2 --calibrate-only --csv fleet.csv",
+                ],
+            ),
+            (
                 "export",
                 &[
                     "yair export ros2-yaml mine.toml",

@@ -8,6 +8,7 @@ use dataset::import::{IMPORTERS, Importer, Source, importer};
 use dataset::{Loaded, read_ahead};
 use serde::Serialize;
 
+use crate::session_identity::SessionIdentity;
 use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
 use crate::{import_csv, import_ros2, import_tum};
@@ -38,6 +39,9 @@ struct Plain {
     /// Replace datasets that are already there.
     #[arg(long)]
     force: bool,
+
+    #[command(flatten)]
+    identity: SessionIdentity,
 }
 
 /// The name of the format that is none.
@@ -117,7 +121,7 @@ fn run_known(importer: &Importer, arguments: &Plain, terminal: &Terminal) -> Res
     let sources = (importer.open)(&arguments.source)?;
     let dirs = folders(arguments, &sources)?;
     let was_there = arguments.out.exists();
-    let datasets = write(sources, dirs, arguments.force, terminal).inspect_err(|_| {
+    let datasets = write(sources, dirs, arguments, terminal).inspect_err(|_| {
         // Nothing of a failed import stays, not even the folder that was to hold its sessions.
         if !was_there {
             let _ = std::fs::remove_dir(&arguments.out);
@@ -132,10 +136,17 @@ fn run_known(importer: &Importer, arguments: &Plain, terminal: &Terminal) -> Res
 }
 
 /// Writes all datasets, a run at a time, before the first is put into its place.
-fn write(sources: Vec<Source>, dirs: Vec<PathBuf>, force: bool, terminal: &Terminal) -> Result<Vec<Imported>, Failure> {
+fn write(
+    sources: Vec<Source>,
+    dirs: Vec<PathBuf>,
+    arguments: &Plain,
+    terminal: &Terminal,
+) -> Result<Vec<Imported>, Failure> {
     let mut written = Vec::with_capacity(sources.len());
     for (source, dir) in sources.into_iter().zip(dirs) {
-        let mut writer = begin_dataset(source.header, &dir, force)?;
+        let mut header = source.header;
+        arguments.identity.state_in(&mut header.provenance);
+        let mut writer = begin_dataset(header, &dir, arguments.force)?;
         let (mut runs, mut odometry_rows) = (0, 0);
         let name = source.name;
         read_ahead(source.runs, |loaded| {

@@ -115,6 +115,7 @@ struct Written {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let found = csv::read(&arguments.files, &arguments.reading.options()?);
+    let found = arguments.reading.identified(found);
     write("csv", &arguments.files, found, &arguments.out, arguments.force, terminal)
 }
 
@@ -151,6 +152,13 @@ pub(crate) fn write(
 }
 
 impl ReadingArguments {
+    /// States in what was read which robot it is of and when it was recorded, as far as was given.
+    pub(crate) fn identified(&self, found: Result<FromCsv, DatasetError>) -> Result<FromCsv, DatasetError> {
+        let mut found = found?;
+        self.robot.identity.state_in(&mut found.imported.dataset.provenance);
+        Ok(found)
+    }
+
     pub(crate) fn options(&self) -> Result<Options, Failure> {
         Ok(Options {
             writing: Writing { delimiter: self.delimiter, decimal: self.decimal, header: self.header },

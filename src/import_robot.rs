@@ -9,6 +9,7 @@ use dataset::{DatasetError, NominalRobot};
 use kinematics::Wheels;
 use serde::Deserialize;
 
+use crate::session_identity::SessionIdentity;
 use crate::terminal::Failure;
 
 /// The robot's own numbers, which stand in no log.
@@ -29,6 +30,9 @@ pub(crate) struct RobotArguments {
     /// A dataset.toml, or a file with its [robot], instead of the four.
     #[arg(long, value_name = "FILE", help_heading = "Robot")]
     robot: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) identity: SessionIdentity,
 }
 
 impl RobotArguments {
@@ -88,12 +92,14 @@ pub(crate) fn rates() -> impl TypedValueParser<Value = Rates> {
 fn read_robot(file: &PathBuf) -> Result<NominalRobot, Failure> {
     #[derive(Deserialize)]
     struct WithRobot {
-        robot: NominalRobot,
+        robot: toml::Table,
     }
+    let no_robot = |error: toml::de::Error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message());
     let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    let with_robot: WithRobot = toml::from_str(&text)
-        .map_err(|error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message()))?;
-    Ok(with_robot.robot)
+    let WithRobot { mut robot } = toml::from_str(&text).map_err(no_robot)?;
+    // Robots of one kind may share the file: --robot-id says which one this is.
+    robot.remove("id");
+    Ok(robot.try_into().map_err(no_robot)?)
 }
 
 /// What is missing, as the command line to type; none of another error.

@@ -135,7 +135,9 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
         RosBagError::Dataset(missing) => with_command_line(missing).unwrap_or_else(|| error.into()),
         _ => error.into(),
     };
-    let FromBag { dataset, took, warnings } = ros_bag::import(&arguments.bag, &arguments.options()?).map_err(asked)?;
+    let FromBag { mut dataset, took, warnings } =
+        ros_bag::import(&arguments.bag, &arguments.options()?).map_err(asked)?;
+    arguments.robot.identity.state_in(&mut dataset.provenance);
     let gyro = took.gyro.iter().map(|gyro| ("gyro", "--gyro", gyro));
     let both = [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)];
     for (what, flag, topic) in both.into_iter().chain(gyro) {

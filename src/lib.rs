@@ -20,6 +20,7 @@
 pub use ::bench;
 pub use ::diagnose;
 pub use ::export;
+pub use ::fleet;
 pub use blind_benchmark;
 pub use calib;
 pub use dataset;
@@ -60,6 +61,7 @@ mod manual;
 mod merge;
 mod plan;
 mod reproduce;
+mod session_identity;
 mod shard;
 mod simulate;
 mod sparse_lines;
@@ -68,11 +70,13 @@ mod sweep_summary;
 mod sweep_table;
 mod terminal;
 mod watch;
-// Under other names than their files': the rooms `diagnose` and `export` are named here too.
+// Under other names than their files': the rooms `diagnose`, `export` and `fleet` are named here too.
 #[path = "diagnose.rs"]
 mod diagnose_command;
 #[path = "export.rs"]
 mod export_command;
+#[path = "fleet/mod.rs"]
+mod fleet_command;
 
 #[cfg(doctest)]
 mod readmes;

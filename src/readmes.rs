@@ -29,6 +29,9 @@ pub struct Estimation;
 #[doc = include_str!("../crates/export/README.md")]
 pub struct Export;
 
+#[doc = include_str!("../crates/fleet/README.md")]
+pub struct Fleet;
+
 #[doc = include_str!("../crates/kinematics/README.md")]
 pub struct Kinematics;
 

@@ -12,6 +12,7 @@ use serde::Serialize;
 use sim_yair::Simulation;
 use tempfile::NamedTempFile;
 
+use crate::session_identity::SessionIdentity;
 use crate::terminal::{Failure, Terminal};
 
 /// Run a scenario's protocols once; the dataset goes to DIR, the hidden truth beside it to DIR.truth.json.
@@ -37,6 +38,9 @@ pub(crate) struct Arguments {
     /// Replace a dataset that is already there.
     #[arg(long)]
     force: bool,
+
+    #[command(flatten)]
+    identity: SessionIdentity,
 }
 
 #[derive(Serialize)]
@@ -57,7 +61,8 @@ struct Document {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let seed = arguments.seed.unwrap_or(scenario.seed);
-    let simulation = simulate(arguments, &scenario, seed)?;
+    let mut simulation = simulate(arguments, &scenario, seed)?;
+    arguments.identity.state_in(&mut simulation.dataset.provenance);
     // The truth waits in a temporary file until the dataset stands: both are written or none.
     let truth = truth_path(&arguments.out)?;
     if truth.is_dir() || (truth.exists() && !arguments.force) {

@@ -271,17 +271,21 @@ pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Ve
     all
 }
 
+/// Whether a folder is a dataset.
+pub(crate) fn is_dataset(path: &Path) -> bool {
+    path.join("dataset.toml").exists()
+}
+
 /// A dataset, or those in a folder of datasets, by name.
 fn datasets_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
-    const MANIFEST: &str = "dataset.toml";
-    if !path.is_dir() || path.join(MANIFEST).exists() {
+    if !path.is_dir() || is_dataset(path) {
         return Ok(vec![path.to_owned()]);
     }
     let unreadable = |error| format!("{}: {error}", path.display());
     let mut inside = Vec::new();
     for entry in std::fs::read_dir(path).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?.path();
-        if entry.join(MANIFEST).is_file() {
+        if is_dataset(&entry) {
             inside.push(entry);
         }
     }
@@ -301,7 +305,7 @@ pub(crate) fn datasets_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// The same runs twice would halve every variance.
-fn refuse_doubles(paths: &[PathBuf]) -> Result<(), Failure> {
+pub(crate) fn refuse_doubles(paths: &[PathBuf]) -> Result<(), Failure> {
     let mut seen = BTreeSet::new();
     match paths.iter().find(|path| path.canonicalize().is_ok_and(|real| !seen.insert(real))) {
         None => Ok(()),

@@ -66,6 +66,20 @@ def test_check_and_plan(command, robot, scenarios):
     )
 
 
+def test_fleet(command, scenarios, tmp_path):
+    scenario = scenarios / "fleet.toml"
+    for day, point in [(23, 1), (24, 3)]:
+        recorded = f"2026-11-{day}T08:00:00+01:00"
+        out = tmp_path / "robots" / str(day)
+        yair.simulate(scenario, point=point, seed=day, robot_id="cart", recorded=recorded, out=out)
+    expected = document(command, "fleet", tmp_path / "robots", "--calibrate-only")
+    found = yair.fleet(tmp_path / "robots", calibrate_only=True)
+    assert found.json == expected
+    assert found.report is not None
+    changed = found.to_pandas().set_index("parameter").changed
+    assert changed["right_wheel_diameter_m"] and not changed["wheel_separation_m"]
+
+
 def test_correct_and_simulate(command, robot, scenarios, tmp_path):
     found = yair.calibrate(robot, out=tmp_path / "calibrated")
     document(command, "correct", robot, "--calibration", found.file, "--out", tmp_path / "command")

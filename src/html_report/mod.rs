@@ -6,6 +6,7 @@ mod campaign;
 mod diagnosis;
 mod diagnosis_details;
 mod drift;
+mod fleet;
 mod markdown;
 mod next_drive;
 mod paths;
@@ -15,6 +16,7 @@ mod words;
 pub(crate) use calibration::{CalibrationPage, EvaluationPage, write_comparison};
 pub(crate) use campaign::{write_plan, write_reproduction, write_sweep};
 pub(crate) use diagnosis::{DiagnosisPage, drift_percents};
+pub(crate) use fleet::write_fleet;
 use paths::{Under, UnderCalibrations};
 
 use std::path::Path;

@@ -38,6 +38,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "diagnose",
         ],
     ),
+    ("fleet", &["kinematics", "dataset", "motion-programs", "model-term", "estimation", "calib"]),
     ("report", &["atomic-file"]),
     ("report-page", &[]),
     (
@@ -110,6 +111,7 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "paper-reproduction",
             "preflight",
             "export",
+            "fleet",
         ],
     ),
 ];

@@ -246,6 +246,11 @@ mod documents_show_what_commands_print {
     }
 
     #[test]
+    fn fleet() {
+        shows_what_its_commands_print("docs/fleet.md", 2);
+    }
+
+    #[test]
     fn export() {
         shows_what_its_commands_print("docs/export.md", 2);
     }

@@ -16,7 +16,8 @@ use crate::{files, root, text};
 
 /// The sources of the crates whose settings are listed. Each has a file `settings.rs` or a folder
 /// `settings/`.
-const SOURCES: [&str; 4] = ["crates/preflight/src", "crates/estimation/src", "crates/calib/src", "crates/diagnose/src"];
+const SOURCES: [&str; 5] =
+    ["crates/preflight/src", "crates/estimation/src", "crates/calib/src", "crates/diagnose/src", "crates/fleet/src"];
 
 const NUMERIC: [&str; 11] = ["f32", "f64", "u8", "u16", "u32", "u64", "usize", "i32", "i64", "isize", "Duration"];
 

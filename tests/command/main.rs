@@ -1,5 +1,5 @@
 //! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, files
-//! for robots, pages, campaigns that are stopped, and the gate on accuracy.
+//! for robots, fleets, pages, campaigns that are stopped, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;
@@ -11,6 +11,7 @@ mod correct;
 mod demo;
 mod export;
 mod export_mcap;
+mod fleet;
 mod good_log;
 mod import_csv;
 mod import_ros2;

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::partial::{GyroNoise, Revisit, TapeDistance, WallReading};
+use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
 use serde::{Deserialize, Serialize};
 
 /// One robot's measured runs and what is known of the robot beforehand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
-    /// Name, licence and source; all optional.
+    /// Name, licence and source, the robot's id and the session's instant; all optional.
     pub provenance: Provenance,
     /// Nominal values: what the robot believes today.
     pub robot: NominalRobot,
@@ -47,6 +48,10 @@ pub struct Provenance {
     pub source: Option<String>,
     /// Anything else worth saying.
     pub notes: Option<String>,
+    /// The robot's id: sessions with the same id are of one robot (`[robot] id`).
+    pub robot_id: Option<String>,
+    /// When the session was recorded.
+    pub recorded: Option<Timestamp>,
 }
 
 /// Nominal geometry and encoder of the robot, metres: what its odometry uses today, and what a calibration

@@ -18,6 +18,7 @@ use crate::clock::{self, Clock, Times, seconds};
 use crate::error::RosBagError;
 use crate::gyro::IMU;
 use crate::gyro_column::GyroColumn;
+use crate::recorded::recorded;
 use crate::rows::{self, BothRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
 use crate::topics::{Survey, Topic};
 use crate::truth::{TruthReader, TruthReading};
@@ -408,7 +409,8 @@ fn assemble(
         rates.unwrap_or_default()
     );
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let provenance = Provenance { name, notes: Some(notes), ..Provenance::default() };
+    let recorded = recorded(both.wheels.times.iter().map(|times| times.received_ns));
+    let provenance = Provenance { name, notes: Some(notes), recorded, ..Provenance::default() };
     Ok(Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs })
 }
 

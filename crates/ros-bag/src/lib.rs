@@ -4,7 +4,7 @@
 //! `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr` messages
 //! (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
 //! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
-//! `import` the dataset.
+//! `import` the dataset (`recorded` when).
 //! `listing` shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 
 mod bag;
@@ -22,6 +22,7 @@ mod known_types;
 mod listing;
 mod mcap_file;
 mod messages;
+mod recorded;
 mod recorder;
 mod resync;
 mod rows;

@@ -5,7 +5,7 @@ command's JSON. Lengths are metres, angles radians, times seconds.
 """
 
 from ._yair import __version__
-from .api import calibrate, check, correct, diagnose, evaluate, merge, plan, simulate, sweep
+from .api import calibrate, check, correct, diagnose, evaluate, fleet, merge, plan, simulate, sweep
 from .call import Error, YairWarning
 from .dataset import Dataset
 from .result import Record, Result
@@ -22,6 +22,7 @@ __all__ = [
     "correct",
     "diagnose",
     "evaluate",
+    "fleet",
     "merge",
     "plan",
     "simulate",

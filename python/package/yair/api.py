@@ -166,6 +166,31 @@ def correct(
     return _result(text, remarks, rows.pose_tables, folder, None, temporary)
 
 
+def fleet(
+    *dirs: PathLike,
+    out: PathLike | None = None,
+    jobs: int = 0,
+    calibrate_only: bool = False,
+    fdr: float | None = None,
+    csv: PathLike | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Many robots and sessions: drift, parameters, findings, what changed, and whom to service first.
+
+    Folders are searched two levels deep for datasets. `out` keeps what was found for the next call. Datasets
+    that fail are in `failed`, and stop no other.
+    """
+    folder, temporary = _folder(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    flags = _options(
+        out=out, jobs=jobs, calibrate_only=calibrate_only, fdr=fdr, csv=csv, html=folder / "report.html"
+    )
+    with _removed_on_failure(folder, temporary):
+        # 1: a dataset failed, which the document tells.
+        text, remarks = call(["fleet", *dirs, *flags], progress, accepted=(0, 1))
+    return _result(text, remarks, rows.robot_rows, folder, None, temporary)
+
+
 def simulate(
     scenario: PathLike,
     *,
@@ -174,12 +199,26 @@ def simulate(
     trial: int = 0,
     point: int | None = None,
     method: str | None = None,
+    robot_id: str | None = None,
+    recorded: str | None = None,
     force: bool = False,
 ) -> Dataset:
-    """Drives a scenario once. With `out` the dataset is written there, and its hidden truth beside it."""
+    """Drives a scenario once. With `out` the dataset is written there, and its hidden truth beside it.
+
+    `robot_id` and `recorded` (RFC 3339) are what `fleet` groups and orders sessions by.
+    """
     with tempfile.TemporaryDirectory(prefix="yair-") as temporary:
         target = Path(temporary, Path(scenario).stem) if out is None else Path(out)
-        flags = _options(out=target, seed=seed, trial=trial, point=point, method=method, force=force)
+        flags = _options(
+            out=target,
+            seed=seed,
+            trial=trial,
+            point=point,
+            method=method,
+            robot_id=robot_id,
+            recorded=recorded,
+            force=force,
+        )
         call(["simulate", scenario, *flags])
         dataset = Dataset.read(target)
     return dataset if out is not None else Dataset(dataset._columns, name=target.name)

@@ -43,6 +43,25 @@ def problem_rows(document: Record) -> list[dict[str, Any]]:
     return [problem.to_dict() for problem in document.problems]
 
 
+def robot_rows(document: Record) -> list[dict[str, Any]]:
+    """A row a robot and parameter of its latest session."""
+    return [
+        {
+            "rank": robot.rank,
+            "id": robot.id,
+            "parameter": name,
+            **value.to_dict(),
+            "changed": any(
+                change.significant and change.parameter == name and change.to == robot.sessions[-1].dataset
+                for change in robot.changes
+            ),
+            "excess_drift_percent": robot.excess_drift_percent.value,
+        }
+        for robot in document.robots
+        for name, value in robot.parameters.items()
+    ]
+
+
 def plan_rows(document: Record) -> list[dict[str, Any]]:
     """A row an effect and what the next experiment predicts of it."""
     following = document.get("next_experiment") or Record({})

@@ -119,6 +119,7 @@ fn provenance(name: &str) -> Provenance {
              in a row without time stamps: time is the sum of the intervals, gaps left out."
                 .to_owned(),
         ),
+        ..Provenance::default()
     }
 }
 

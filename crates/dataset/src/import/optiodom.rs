@@ -153,6 +153,7 @@ fn open_session(metadata_file: &Path) -> Result<Source, DatasetError> {
              the radius of a circle is the mean over the run."
                 .to_owned(),
         ),
+        ..Provenance::default()
     };
     let header = Dataset {
         provenance,

@@ -5,6 +5,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
+use jiff::Timestamp;
 use kinematics::Point;
 use serde::Deserialize;
 use toml::{Spanned, Value};
@@ -12,6 +13,7 @@ use toml::{Spanned, Value};
 use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
+use crate::identity::{parse_recorded, parse_robot_id};
 use crate::partial::GyroNoise;
 use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
 use crate::table::open_file;
@@ -44,6 +46,7 @@ struct ManifestToml {
     licence: Option<String>,
     source: Option<String>,
     notes: Option<String>,
+    recorded: Option<Spanned<Value>>,
     robot: Spanned<RobotToml>,
     #[serde(default)]
     truth: TruthToml,
@@ -60,6 +63,7 @@ struct ManifestToml {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotToml {
+    id: Option<Spanned<String>>,
     left_wheel_diameter_m: Spanned<f64>,
     right_wheel_diameter_m: Spanned<f64>,
     wheel_separation_m: Spanned<f64>,
@@ -171,7 +175,14 @@ impl Source<'_> {
             return Err(self.unsupported(&toml.format));
         }
         let robot_line = self.line(&toml.robot.span());
-        let robot = self.robot(toml.robot.into_inner())?;
+        let mut robot_toml = toml.robot.into_inner();
+        let robot_id = robot_toml
+            .id
+            .take()
+            .map(|id| parse_robot_id(id.as_ref()).map_err(|why| self.error(&id.span(), format!("[robot] id: {why}"))));
+        let robot_id = robot_id.transpose()?;
+        let recorded = toml.recorded.map(|recorded| self.recorded(&recorded)).transpose()?;
+        let robot = self.robot(robot_toml)?;
         let truth_noise = TruthNoise {
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,
             sigma_theta_rad: self.sigma("sigma_theta_rad", toml.truth.sigma_theta_rad)?,
@@ -203,7 +214,8 @@ impl Source<'_> {
             let body = Point::new(self.finite("x_m", &x_m)?, self.finite("y_m", &y_m)?);
             points.push(MarkedPoint { id: id.into_inner(), body });
         }
-        let provenance = Provenance { name: toml.name, licence: toml.licence, source: toml.source, notes: toml.notes };
+        let ManifestToml { name, licence, source, notes, .. } = toml;
+        let provenance = Provenance { name, licence, source, notes, robot_id, recorded };
         Ok(Manifest { provenance, robot, robot_line, truth_noise, corrections, points, runs, run_lines })
     }
 
@@ -259,6 +271,16 @@ impl Source<'_> {
             ticks_per_rev: robot.ticks_per_rev.map(|ticks| self.positive("ticks_per_rev", &ticks)).transpose()?,
             counter_bits,
         })
+    }
+
+    /// An instant, written as a text or as TOML's own date and time with an offset.
+    fn recorded(&self, value: &Spanned<Value>) -> Result<Timestamp, DatasetError> {
+        let text = match value.as_ref() {
+            Value::String(text) => text.clone(),
+            Value::Datetime(instant) => instant.to_string(),
+            _ => return Err(self.wrong_type("recorded", value, "an instant of RFC 3339")),
+        };
+        parse_recorded(&text).map_err(|why| self.error(&value.span(), format!("recorded: {why}")))
     }
 
     /// Corrections whose factors are factors.

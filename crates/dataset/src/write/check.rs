@@ -5,6 +5,7 @@ use std::mem::{Discriminant, discriminant};
 
 use crate::counter;
 use crate::error::{DatasetError, shown};
+use crate::identity::parse_robot_id;
 use crate::read::{has_truth, is_run_key, meant_quantity, why_no_id};
 use crate::record::{Dataset, Odometry, Run, RunInfo, WheelLog};
 
@@ -85,6 +86,7 @@ fn check_robot(dataset: &Dataset) -> Check {
     sigma("scale_sigma", gyro.scale_sigma)?;
     sigma("noise_rad_per_sqrt_s", gyro.noise_rad_per_sqrt_s)?;
     sigma("bias_walk_radps_per_sqrt_s", gyro.bias_walk_radps_per_sqrt_s)?;
+    dataset.provenance.robot_id.as_deref().map_or(Ok(()), |id| parse_robot_id(id).map(|_| ()))?;
     let mut ids = BTreeSet::new();
     for point in &dataset.points {
         id("point", &point.id)?;
@@ -277,6 +279,7 @@ mod tests {
         fault("wheel_separation_m = 0; expected", |set| set.robot.wheel_separation_m = 0.0);
         fault("ticks_per_rev = NaN", |set| set.robot.ticks_per_rev = Some(f64::NAN));
         fault("the robot has no ticks_per_rev", |set| set.robot.ticks_per_rev = None);
+        fault("\"\" is no id", |set| set.provenance.robot_id = Some(String::new()));
         fault("counter_bits = 64", |set| set.robot.counter_bits = Some(64));
         fault("sigma_xy_m = -1", |set| set.truth_noise.sigma_xy_m = Some(-1.0));
         fault("without runs", |set| set.runs.clear());

@@ -19,13 +19,23 @@ struct ManifestOut<'a> {
     source: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     notes: Option<&'a str>,
-    robot: &'a NominalRobot,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recorded: Option<String>,
+    robot: RobotOut<'a>,
     truth: TruthOut,
     #[serde(skip_serializing_if = "GyroOut::is_empty")]
     gyro: GyroOut,
     run: Vec<RunOut<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     point: Vec<PointOut<'a>>,
+}
+
+#[derive(Serialize)]
+struct RobotOut<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(flatten)]
+    nominal: &'a NominalRobot,
 }
 
 #[derive(Serialize)]
@@ -100,14 +110,15 @@ struct PointOut<'a> {
 
 /// `dataset.toml` of a dataset that has been checked, whose runs are these.
 pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, toml::ser::Error> {
-    let Provenance { name, licence, source, notes } = &dataset.provenance;
+    let Provenance { name, licence, source, notes, robot_id, recorded } = &dataset.provenance;
     toml::to_string(&ManifestOut {
         format: FORMAT,
         name: name.as_deref(),
         licence: licence.as_deref(),
         source: source.as_deref(),
         notes: notes.as_deref(),
-        robot: &dataset.robot,
+        recorded: recorded.map(|recorded| recorded.to_string()),
+        robot: RobotOut { id: robot_id.as_deref(), nominal: &dataset.robot },
         truth: TruthOut {
             sigma_xy_m: dataset.truth_noise.sigma_xy_m,
             sigma_theta_rad: dataset.truth_noise.sigma_theta_rad,

@@ -291,7 +291,7 @@ fn keys_units_and_sizes() {
     toml(
         "wheel_separation_m = 0.3",
         "wheel_separation_mm = 300",
-        "dataset.toml:5: unknown field `wheel_separation_mm`, expected one of `left_wheel_diameter_m`",
+        "dataset.toml:5: unknown field `wheel_separation_mm`, expected one of `id`, `left_wheel_diameter_m`",
     );
     toml("= 0.3", "= \"0.3\"", "dataset.toml:5: invalid type: string \"0.3\", expected");
     toml("= 0.3", "= 0", "dataset.toml:5: wheel_separation_m = 0; expected a positive finite number");
@@ -306,6 +306,18 @@ fn keys_units_and_sizes() {
         "= 2000",
         "= 2000\ncounter_bits = 64",
         "dataset.toml:7: counter_bits = 64; expected a width from 2 to 63 bits",
+    );
+    toml("[robot]", "[robot]\nid = \" 7\"", "dataset.toml:3: [robot] id: \" 7\" is no id; expected a text");
+    toml("format = 1", "format = 1\nrecorded = \"2026-11-23\"", "dataset.toml:2: recorded: \"2026-11-23\" is no such");
+    toml(
+        "format = 1",
+        "format = 1\nrecorded = 2026-11-23T08:00:00",
+        "dataset.toml:2: recorded: \"2026-11-23T08:00:00\"",
+    );
+    toml(
+        "format = 1",
+        "format = 1\nrecorded = 7",
+        "dataset.toml:2: key recorded is of type integer; expected an instant",
     );
     toml("sigma_xy_m = 0.001", "sigma_xy_m = -1", "dataset.toml:8: sigma_xy_m = -1; expected a positive");
     toml("sigma_xy_m", "sigma_xy_mm", "dataset.toml:8: unknown field `sigma_xy_mm`, expected");

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use dataset::{
     Dataset, Displacement, Existing, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, Revisit, Run, RunByRun, RunInfo, TapeDistance, TruthNoise, TruthSample, TruthSigma,
-    WallReading, WheelLog, WheelSpeed, read, write,
+    ProtocolSettings, Provenance, Revisit, Run, RunByRun, RunInfo, TapeDistance, Timestamp, TruthNoise, TruthSample,
+    TruthSigma, WallReading, WheelLog, WheelSpeed, read, write,
 };
 use kinematics::{Point, Wheels};
 use proptest::collection::{btree_map, vec};
@@ -227,14 +227,21 @@ fn datasets() -> impl Strategy<Value = Dataset> {
         let points: Vec<_> =
             points.into_iter().map(|(id, (x, y))| MarkedPoint { id, body: Point::new(x, y) }).collect();
         let robot = (positive(), positive(), positive(), positive());
-        let provenance = (text(), text(), text(), text());
+        let recorded =
+            option::of((-1_000_000_000_i64..4_000_000_000).prop_map(|s| Timestamp::from_second(s).expect("a year")));
+        let provenance = (text(), text(), text(), text(), option::of("[a-z]{1,6} 7"), recorded);
         let noise = (option::of(positive()), option::of(positive()));
         (provenance, robot, noise, vec(run(form, points.len()), 1..4)).prop_map(
-            move |((name, licence, source, notes), (left, right, separation, ticks_per_rev), noise, mut runs)| {
+            move |(
+                (name, licence, source, notes, robot_id, recorded),
+                (left, right, separation, ticks_per_rev),
+                noise,
+                mut runs,
+            )| {
                 let mut ids = std::collections::BTreeSet::new();
                 runs.retain(|run| ids.insert(run.info.id.clone()));
                 Dataset {
-                    provenance: Provenance { name, licence, source, notes },
+                    provenance: Provenance { name, licence, source, notes, robot_id, recorded },
                     robot: NominalRobot {
                         left_wheel_diameter_m: left,
                         right_wheel_diameter_m: right,
