@@ -402,9 +402,13 @@ impl ModelFit<'_> {
     ) -> DMatrix<f64> {
         let Some(map) = self.records.map else { return DMatrix::zeros(inverse.nrows(), inverse.ncols()) };
         let Solution { model, noise, free_headings, .. } = &self.solution;
-        let ungated = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };
+        // The counts are integrated once: they are the same wherever the poses are.
+        let mut kept = None;
         added_covariance(&self.records, map, own, inverse, |records| {
-            let found = pass(records, &self.selections, model, noise, free_headings, terms, ungated);
+            let (gate, by, keep) = (OutlierGate::Off, kept.as_ref(), kept.is_none());
+            let options = PassOptions { gate, keep, by, ..PassOptions::default() };
+            let found = pass(records, &self.selections, model, noise, free_headings, terms, options);
+            kept = kept.take().or(found.cached);
             found.runs.iter().map(|run| run.of(&self.columns).along(free)).collect()
         })
     }

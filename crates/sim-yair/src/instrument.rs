@@ -80,9 +80,7 @@ impl Observer {
             | Instrument::Revisit { .. } => f64::INFINITY,
             Instrument::MotionCapture { rate_hz, .. }
             | Instrument::Slam(Slam { rate_hz, .. })
-            | Instrument::Tachometer { rate_hz, .. } => {
-                f64::from(self.samples) / rate_hz
-            }
+            | Instrument::Tachometer { rate_hz, .. } => f64::from(self.samples) / rate_hz,
         }
     }
 

@@ -78,8 +78,10 @@ impl SlamErrors {
         let Slam { map_sigma_xy_m, map_sigma_theta_rad, .. } = self.slam;
         let Pose { x_m, y_m, theta_rad } = world_from_body;
         let [dx, dy, dtheta] = [0, 1, 2].map(|of: usize| {
-            let sum: f64 =
-                self.map[of].iter().map(|wave| (wave.per_m[0] * x_m + wave.per_m[1] * y_m + wave.phase_rad).cos()).sum();
+            let sum: f64 = self.map[of]
+                .iter()
+                .map(|wave| (wave.per_m[0] * x_m + wave.per_m[1] * y_m + wave.phase_rad).cos())
+                .sum();
             (2.0 / WAVES as f64).sqrt() * sum
         });
         let distorted =

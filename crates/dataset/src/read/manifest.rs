@@ -392,7 +392,8 @@ impl Source<'_> {
         let Some(stated) = stated else { return Ok(None) };
         let [sigma_xy_m, sigma_theta_rad] = values;
         let Some(length_m) = self.sigma("map_length_m", map_length_m.clone())? else {
-            let message = "map_length_m is missing: over what distance, metres, do the map's errors resemble each other?";
+            let message =
+                "map_length_m is missing: over what distance, metres, do the map's errors resemble each other?";
             return Err(self.error(&stated.span(), message.to_owned()));
         };
         Ok(Some(MapDistortion { sigma_xy_m, sigma_theta_rad, length_m }))
