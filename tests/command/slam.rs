@@ -42,7 +42,8 @@ fn a_stated_distortion_of_the_map_is_in_the_sigma() {
     fs::write(&manifest, whole.replace("map_length_m = 1.0\n", "")).expect("written");
     let message = refusal(folder, &["calibrate", "robot", "--quiet", "--out", "none.toml"]);
     assert!(message.contains("dataset.toml") && message.contains("map_length_m is missing"), "{message}");
-    let silent: String = whole.lines().filter(|line| !line.starts_with("map_")).map(|line| format!("{line}\n")).collect();
+    let silent: String =
+        whole.lines().filter(|line| !line.starts_with("map_")).map(|line| format!("{line}\n")).collect();
     fs::write(&manifest, silent).expect("written");
     for ([_, with], [_, without]) in stated.into_iter().zip(parameters(folder)) {
         // Runs all over the hall meet the same places: by the sweep the scatter over runs alone misses a
@@ -75,6 +76,16 @@ fn a_tape_tells_the_maps_scale_and_poses_alone_do_not() {
     let [value, sigma] = ["value", "sigma"].map(|key| scale[key].as_f64().expect("a number"));
     // Four standard deviations, and the tape's millimetre over a dozen straights of 3 m.
     assert!((value - 0.02).abs() < 4.0 * sigma && sigma < 5e-4, "{value} ± {sigma}");
+
+    // Where the map is distorted, which no test of a mean takes into account, the name is not alone.
+    let manifest = folder.join("robot/dataset.toml");
+    let exact = fs::read_to_string(&manifest).expect("written");
+    let distorted = exact.replace("[truth]", "[truth]\nmap_sigma_xy_m = 0.01\nmap_length_m = 1.0");
+    fs::write(&manifest, distorted).expect("written");
+    let doubted = document(folder, &["diagnose", "robot", "tape"]);
+    assert_eq!(doubted["findings"][0]["names"], serde_json::json!(["truth_map_scale", "unlisted"]));
+    let sentence = doubted["findings"][0]["sentence"].as_str().expect("a sentence");
+    assert!(sentence.contains("distortion of the instrument's map"), "{sentence}");
 }
 
 #[test]

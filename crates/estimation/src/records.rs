@@ -27,7 +27,7 @@ pub struct Records<'a> {
     /// Standard deviation of the gyroscope's relative scale, where it is stated.
     pub(crate) gyro_scale_sigma: Option<f64>,
     /// The distortion of the map in which poses are, where it is stated: sessions have one map.
-    pub(crate) map: Option<MapDistortion>,
+    pub map: Option<MapDistortion>,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.

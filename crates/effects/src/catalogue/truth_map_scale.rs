@@ -14,6 +14,7 @@ use kinematics::{Point, Pose, sin_cos};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
+use crate::benchmark::{Benchmark, Needs};
 use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
@@ -57,6 +58,7 @@ impl PhysicalEffect for TruthMapScale {
                 format!("{MEANING}, by {}: nothing is wrong with the robot", values.shown("scale_error", 100.0, "%"))
             }),
             excitation: Excitation::Conditions("measure a straight by tape, in a run without poses (distance.csv)"),
+            benchmark: Benchmark { needs: Needs { length: true, ..Needs::NONE }, ..Benchmark::OF_MEAN },
             on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
         }
