@@ -51,7 +51,7 @@ fn a_gyroscope_stands_for_a_truth() {
 #[test]
 fn a_map_is_stated_with_its_length_and_written_as_it_was_read() {
     let with = |keys: &str| Case::good().with("dataset.toml", TOML.replace("[truth]", &format!("[truth]\n{keys}")));
-    let read = |case: Case| dataset::read(case.path()).expect("readable").dataset;
+    let read = |case: Case| read(case.path()).expect("readable").dataset;
     let stated = read(with("map_sigma_xy_m = 0.02\nmap_length_m = 1.5"));
     let map = stated.truth_noise.map.expect("stated");
     assert_eq!((map.sigma_xy_m, map.sigma_theta_rad, map.length_m), (0.02, 0.0, 1.5));
