@@ -66,7 +66,9 @@ fn a_tape_tells_the_maps_scale_and_poses_alone_do_not() {
     assert_eq!(alone["findings"], Value::Array(Vec::new()), "{}", alone["findings"]);
     let blind = alone["blind_to"].as_array().expect("a list");
     let of_map = blind.iter().find(|of| of["id"] == "truth_map_scale").expect("not determined by poses alone");
-    assert!(of_map["smallest_detectable"].is_null(), "{of_map}");
+    // Rounding alone is left of its information: a hundred times what is large would not show.
+    let smallest = of_map["smallest_detectable"]["value"].as_f64();
+    assert!(smallest.is_none_or(|scale_error| scale_error > 1.0), "{of_map}");
 
     let both = document(folder, &["diagnose", "robot", "tape"]);
     let findings = both["findings"].as_array().expect("a list");

@@ -1,5 +1,5 @@
-//! The instruments: the paper's floor grid, motion capture, poses in a map, a tachometer beside each wheel, a gyroscope, a
-//! tape measure, and marks of where a run began.
+//! The instruments: the paper's floor grid, motion capture, poses in a map, a tachometer beside each wheel, a
+//! gyroscope, a tape measure, and marks of where a run began.
 
 use dataset::{
     ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, TruthSigma, WheelSpeed,
