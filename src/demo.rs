@@ -225,6 +225,9 @@ fn drawn(id: &'static str, robot: &Scenario, draws: Address) -> Result<Hidden, &
     if of.benchmark.needs.payload || of.benchmark.needs.jitter {
         return Err("it needs loads or irregular stamps, which this robot does not have");
     }
+    if of.benchmark.needs.length {
+        return Err("it needs a length that does not come from the instrument, which this robot does not have");
+    }
     let host = HostRobot {
         cruise_speed_m_s: robot.robot.cruise_speed_m_s,
         acceleration_m_s2: robot.robot.acceleration_m_s2,

@@ -21,6 +21,7 @@ mod interrupt;
 mod pages;
 mod partial;
 mod pose_errors;
+mod slam;
 mod spoiled_files;
 #[path = "../support/mod.rs"]
 mod support;

@@ -116,6 +116,7 @@ const SPECIMENS: &[[&str; 4]] = &[
         "lever_x_m = nan, lever_y_m = 0.0",
     ],
     ["truth_yaw", "yaw_rad = 0.0", "yaw_rad = 0.02", "yaw_rad = nan"],
+    ["truth_map_scale", "scale_error = 0.0", "scale_error = 0.01", "scale_error = -1.0"],
     [
         "truth_correlated_noise",
         "sigma_xy_m = 0.0, sigma_theta_rad = 0.0, tau_s = 1.0",
@@ -245,6 +246,7 @@ const NAMES: [&[&str]; 9] = [
         "clock_rate",
         "truth_lever_arm",
         "truth_yaw",
+        "truth_map_scale",
         "truth_outliers",
         "truth_correlated_noise",
     ],

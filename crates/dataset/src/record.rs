@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::map_distortion::MapDistortion;
 use crate::partial::{GyroNoise, Revisit, TapeDistance, WallReading};
 use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
@@ -94,6 +95,8 @@ pub struct TruthNoise {
     pub sigma_xy_m: Option<f64>,
     /// Of the heading, radians.
     pub sigma_theta_rad: Option<f64>,
+    /// The map in which its poses are; `None`: it has none, or nothing is known of its errors.
+    pub map: Option<MapDistortion>,
     /// The gyroscope.
     pub gyro: GyroNoise,
 }

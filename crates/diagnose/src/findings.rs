@@ -5,7 +5,7 @@ use effects::GeometryRatio;
 
 use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
-use crate::cause::Doubt;
+use crate::cause::{Basis, Doubt};
 use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
@@ -76,6 +76,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         doubt_incomplete_models,
         doubt_low_significance,
         doubt_what_does_not_carry_over,
+        doubt_in_distorted_maps,
         by_significance,
     ];
     stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
@@ -212,6 +213,16 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
         let is_refuted = finding.carry_over.as_ref().is_some_and(|of| of.carries_over == Some(false));
         if is_refuted && !finding.is_unlisted() {
             finding.or_unlisted(1.0, Doubt::DoesNotCarryOver);
+        }
+    }
+    findings
+}
+
+/// Errors of a map return with the place, in all runs alike: no test of a mean takes them into account.
+fn doubt_in_distorted_maps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if results.structure.base.records.map.is_some() {
+        for finding in findings.iter_mut().filter(|finding| matches!(finding.basis, Basis::Mean)) {
+            finding.or_unlisted(1.0, Doubt::MapDistortion);
         }
     }
     findings

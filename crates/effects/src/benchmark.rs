@@ -43,15 +43,22 @@ pub struct Needs {
     pub payload: bool,
     /// Stamps that jitter.
     pub jitter: bool,
+    /// A length that does not come from the instrument, which its robots do not have: such effects are not
+    /// hidden.
+    pub length: bool,
 }
 
 impl Needs {
-    pub(crate) const NONE: Self = Self { payload: false, jitter: false };
+    pub(crate) const NONE: Self = Self { payload: false, jitter: false, length: false };
 
     /// What either needs.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
-        Self { payload: self.payload || other.payload, jitter: self.jitter || other.jitter }
+        Self {
+            payload: self.payload || other.payload,
+            jitter: self.jitter || other.jitter,
+            length: self.length || other.length,
+        }
     }
 }
 

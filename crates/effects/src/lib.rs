@@ -213,6 +213,7 @@ contents! {
     truth_latency::TruthLatency,
     truth_lever_arm::TruthLeverArm,
     truth_yaw::TruthYaw,
+    truth_map_scale::TruthMapScale,
     truth_correlated_noise::TruthCorrelatedNoise,
     truth_outliers::TruthOutliers,
     truth_jump::TruthJump,

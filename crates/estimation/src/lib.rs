@@ -25,6 +25,7 @@ mod filter_state;
 mod group_extrinsics;
 mod kinematic_samples;
 mod log_dead_reckoning;
+mod map_distortion;
 mod maximum_likelihood;
 mod model;
 mod model_fit;

@@ -8,6 +8,7 @@ use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
 use crate::error::EstimationError;
+use crate::map_distortion::{OwnScatter, added_covariance};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
@@ -369,7 +370,7 @@ impl ModelFit<'_> {
 
     /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
     /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
-    /// & McCaffrey 2002). `terms` are those of the fit.
+    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
@@ -377,7 +378,8 @@ impl ModelFit<'_> {
         let units = self.units(terms);
         let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
         if units.len() < enough {
-            return Some(&free * inverse * free.transpose());
+            let own = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
+            return Some(&free * own * free.transpose());
         }
         let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
         let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
@@ -386,7 +388,29 @@ impl ModelFit<'_> {
             let by_scale = &inverse * free.row(scale).transpose() / sigma;
             robust += &by_scale * by_scale.transpose();
         }
+        robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
         Some(&free * robust * free.transpose())
+    }
+
+    /// What a stated distortion of the instrument's map adds to the covariance along a basis.
+    fn map_covariance(
+        &self,
+        free: &DMatrix<f64>,
+        inverse: &DMatrix<f64>,
+        own: OwnScatter,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> DMatrix<f64> {
+        let Some(map) = self.records.map else { return DMatrix::zeros(inverse.nrows(), inverse.ncols()) };
+        let Solution { model, noise, free_headings, .. } = &self.solution;
+        // The counts are integrated once: they are the same wherever the poses are.
+        let mut kept = None;
+        added_covariance(&self.records, map, own, inverse, |records| {
+            let (gate, by, keep) = (OutlierGate::Off, kept.as_ref(), kept.is_none());
+            let options = PassOptions { gate, keep, by, ..PassOptions::default() };
+            let found = pass(records, &self.selections, model, noise, free_headings, terms, options);
+            kept = kept.take().or(found.cached);
+            found.runs.iter().map(|run| run.of(&self.columns).along(free)).collect()
+        })
     }
 
     /// Where a column stands among the free ones, in steps and covariances; `None` where it is not free.

@@ -52,12 +52,14 @@ pub enum OneStepError {
     Estimation(#[from] EstimationError),
 }
 
-/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], and have a measurement in 500
-/// rows at least.
+/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], have a measurement in 500 rows
+/// at least, and no map whose distortion is stated.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
     let (rows, measurements) = rows_and_measurements(datasets);
-    rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
+    // What a map's distortion adds takes all measurements at once.
+    let has_map = datasets.iter().any(|blocks| blocks.header().truth_noise.map.is_some());
+    !has_map && rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
 }
 
 fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {

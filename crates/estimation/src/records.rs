@@ -7,7 +7,7 @@
 
 use std::cell::LazyCell;
 
-use dataset::{Run, Session, TruthSample};
+use dataset::{MapDistortion, Run, Session, TruthSample};
 use kinematics::{Increment, Pose};
 
 use crate::model::Model;
@@ -26,6 +26,8 @@ pub struct Records<'a> {
     pub(crate) partial: Vec<PartialSegment<'a>>,
     /// Standard deviation of the gyroscope's relative scale, where it is stated.
     pub(crate) gyro_scale_sigma: Option<f64>,
+    /// The distortion of the map in which poses are, where it is stated: sessions have one map.
+    pub map: Option<MapDistortion>,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
@@ -45,6 +47,7 @@ impl<'a> Records<'a> {
     pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
         let mut records = Self::nothing();
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
+        records.map = sessions.iter().find_map(|session| session.truth_noise.map);
         let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
@@ -85,7 +88,14 @@ impl<'a> Records<'a> {
 
     /// Of no run.
     pub(crate) fn nothing() -> Self {
-        Self { segments: Vec::new(), partial: Vec::new(), gyro_scale_sigma: None, unused: Vec::new(), ids: Vec::new() }
+        Self {
+            segments: Vec::new(),
+            partial: Vec::new(),
+            gyro_scale_sigma: None,
+            map: None,
+            unused: Vec::new(),
+            ids: Vec::new(),
+        }
     }
 
     /// Does a gyroscope measure in some run?

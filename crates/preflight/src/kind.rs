@@ -37,6 +37,8 @@ pub(crate) enum Kind {
     SeveralRobots { parameter: &'static str, sessions: [String; 2], values_m: [f64; 2] },
     /// The truth is computed from the wheels.
     TruthIsOdometry,
+    /// Between its corrections the truth moves as the wheels do, in a share of its steps.
+    TruthFollowsOdometry { share: f64 },
     /// A counter shows something else for a row.
     CounterSpike { side: Side, t_s: f64, count: f64, rows: usize },
     /// A counter starts again from 0.

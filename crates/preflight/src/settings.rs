@@ -148,6 +148,16 @@ pub(crate) const OWN_HEADING_RAD: f64 = 1e-4;
 /// Convention: wheels are known to a per cent before they are calibrated.
 pub(crate) const OWN_DISTANCE: f64 = 1e-3;
 
+/// Radians. Turns of the instrument from one pose to the next that are nearer to those of the wheels are
+/// computed from the wheels.
+/// Convention: half of what the heading of the best instrument errs by; poses in files of four decimals keep
+/// within it.
+pub(crate) const OWN_STEP_RAD: f64 = 5e-5;
+
+/// Radians. Least turn of a step that is compared for it.
+/// Derived: wheels that are off by half a per cent miss it by as much as `OWN_STEP_RAD`.
+pub(crate) const MIN_OWN_STEP_RAD: f64 = 0.01;
+
 /// Metres. Steps of the path that are compared for it.
 /// Budgeted: files with four decimals round them by a hundredth.
 pub(crate) const MIN_OWN_STEP_M: f64 = 5e-3;

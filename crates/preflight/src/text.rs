@@ -25,6 +25,7 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
         Kind::OtherRobot { .. } => "other_robot",
         Kind::SeveralRobots { .. } => "several_robots",
         Kind::TruthIsOdometry => "truth_is_odometry",
+        Kind::TruthFollowsOdometry { .. } => "truth_follows_odometry",
         Kind::CounterSpike { .. } => "counter_spike",
         Kind::CounterRestart { .. } => "counter_restart",
         Kind::TruthOutlier { .. } => "truth_outlier",
@@ -138,6 +139,10 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::TruthIsOdometry => {
             "the truth is computed from the wheels: it follows nominal dead reckoning closer than any instrument could; give what an outside instrument measured".to_owned()
         }
+        Kind::TruthFollowsOdometry { share } => format!(
+            "the truth moves by the wheels between its corrections: in {:.0} % of its turning steps the turn is that of nominal dead reckoning to 5e-5 rad, as in poses of SLAM or AMCL that odometry carries on; the calibration leans towards the nominal values: give the poses at the corrections alone, or poses of scan matching without the wheels",
+            100.0 * share
+        ),
         Kind::CounterSpike { side, t_s, count, rows } => {
             let more = if *rows > 1 { format!(", as in {} more rows", rows - 1) } else { String::new() };
             format!(

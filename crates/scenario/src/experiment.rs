@@ -11,6 +11,7 @@ use crate::error::{NoFit, ScenarioError};
 use crate::estimated::Estimated;
 use crate::limits::{LENGTHS_M, MAX_RUNS};
 use crate::robot::Robot;
+use crate::slam::Slam;
 use crate::sweep::Sweep;
 
 /// An experiment.
@@ -122,6 +123,8 @@ pub enum Instrument {
         /// How the marker's frame is turned on the robot, radians.
         lever_theta_rad: f64,
     },
+    /// Poses in a map, by simultaneous localization and mapping (`truth.csv`).
+    Slam(Slam),
     /// A tachometer on the ground beside each wheel, as of a roller or a fifth wheel (`wheel_reference.csv`).
     Tachometer {
         /// Samples per second. A sample is the mean speed since the one before, as from pulses counted over a
@@ -265,6 +268,15 @@ impl Scenario {
                     finite("instrument.lever_x_m", lever_x_m)?;
                     finite("instrument.lever_y_m", lever_y_m)?;
                     finite("instrument.lever_theta_rad", lever_theta_rad)?;
+                }
+                Instrument::Slam(slam) => {
+                    interval("1 / instrument.rate_hz", 1.0 / slam.rate_hz)?;
+                    slam.not_negative().into_iter().try_for_each(|(key, value)| not_negative(key, value))?;
+                    length("instrument.map_length_m", slam.map_length_m)?;
+                    positive("instrument.wander_tau_s", slam.wander_tau_s)?;
+                    let scale_error = slam.map_scale_error;
+                    let holds = (-0.5..=0.5).contains(&scale_error);
+                    range("instrument.map_scale_error", scale_error, holds, "from -0.5 to 0.5")?;
                 }
                 Instrument::Tachometer { rate_hz, sigma_m_s } => {
                     interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;

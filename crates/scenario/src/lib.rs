@@ -15,6 +15,7 @@ mod points;
 mod programs;
 mod robot;
 mod shipped;
+mod slam;
 mod sweep;
 
 pub use axis::{Level, Levels, Range, Scale};
@@ -26,4 +27,5 @@ pub use file::LARGEST_FILE_BYTES;
 pub use points::{Axis, CASE_AXIS, Point};
 pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODING, Robot};
 pub use shipped::{MOTION_CAPTURE, PAPER};
+pub use slam::Slam;
 pub use sweep::{Case, Sobol, Sweep};

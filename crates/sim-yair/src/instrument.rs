@@ -1,10 +1,14 @@
-//! The instruments: the paper's floor grid, motion capture, a tachometer beside each wheel, a gyroscope, a
-//! tape measure, and marks of where a run began.
+//! The instruments: the paper's floor grid, motion capture, poses in a map, a tachometer beside each wheel, a
+//! gyroscope, a tape measure, and marks of where a run began.
 
-use dataset::{ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, WheelSpeed};
+use dataset::{
+    ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, TruthSigma, WheelSpeed,
+};
 use effects::{Address, Stream, StreamName};
 use kinematics::{Frame, Point, Pose, Wheels, wrap_to_pi};
-use scenario::Instrument;
+use scenario::{Instrument, Slam};
+
+use crate::slam::SlamErrors;
 
 /// Standstills closer than this are one, seconds.
 const SAME_INSTANT_S: f64 = 1e-9;
@@ -24,6 +28,8 @@ pub(crate) struct Observer {
     stood: Option<[(f64, Pose); 2]>,
     /// The gyroscope's last row: its instant, seconds, the true heading, radians, and the bias, rad/s.
     gyro_row: Option<(f64, f64, f64)>,
+    /// The errors of poses in a map.
+    slam: Option<SlamErrors>,
 }
 
 /// A tape is laid between places that are farther apart than this, metres; a robot is back where it is
@@ -42,6 +48,10 @@ impl Observer {
             ground_m: Wheels::both(0.0),
             stood: None,
             gyro_row: None,
+            slam: match instrument {
+                Instrument::Slam(slam) => Some(SlamErrors::new(slam, position)),
+                _ => None,
+            },
         }
     }
 
@@ -49,13 +59,16 @@ impl Observer {
         &self.instrument
     }
 
-    /// Another run begins; its draws come from `stream`.
+    /// Another run begins, the first of a session or a later one; its draws come from `stream`.
     #[inline]
-    pub(crate) fn restart(&mut self, stream: impl Fn(StreamName) -> Stream) {
+    pub(crate) fn restart(&mut self, stream: impl Fn(StreamName) -> Stream, is_first: bool) {
         self.stream = stream(self.name);
         self.samples = 0;
         self.ground_m = Wheels::both(0.0);
         (self.stood, self.gyro_row) = (None, None);
+        if let Some(slam) = &mut self.slam {
+            slam.restart(stream, is_first);
+        }
     }
 
     /// When the instrument next measures by itself, seconds; the floor grid never does.
@@ -65,15 +78,18 @@ impl Observer {
             | Instrument::Gyro { .. }
             | Instrument::Tape { .. }
             | Instrument::Revisit { .. } => f64::INFINITY,
-            Instrument::MotionCapture { rate_hz, .. } | Instrument::Tachometer { rate_hz, .. } => {
-                f64::from(self.samples) / rate_hz
-            }
+            Instrument::MotionCapture { rate_hz, .. }
+            | Instrument::Slam(Slam { rate_hz, .. })
+            | Instrument::Tachometer { rate_hz, .. } => f64::from(self.samples) / rate_hz,
         }
     }
 
     /// Does the instrument measure the robot unasked?
     pub(crate) const fn free_running(&self) -> bool {
-        matches!(self.instrument, Instrument::MotionCapture { .. } | Instrument::Tachometer { .. })
+        matches!(
+            self.instrument,
+            Instrument::MotionCapture { .. } | Instrument::Slam(_) | Instrument::Tachometer { .. }
+        )
     }
 
     /// A measurement at the moving robot at [`Self::next_measurement_s`], whose contacts have gone so far
@@ -86,6 +102,10 @@ impl Observer {
             run.wheel_reference.push(WheelSpeed { t_s, speed_m_s });
             self.samples += 1;
             self.ground_m = ground_m;
+            return;
+        }
+        if let Instrument::Slam(slam) = self.instrument {
+            self.pose_in_map(&slam, t_s, world_from_body.pose(), run);
             return;
         }
         let Instrument::MotionCapture {
@@ -109,6 +129,25 @@ impl Observer {
             world_from_marker.y_m + sigma_xy_m * stream.normal(),
             Some(world_from_marker.theta_rad + sigma_theta_rad * stream.normal()),
         ));
+    }
+
+    /// A pose in the map, with the standard deviations that its row states.
+    fn pose_in_map(&mut self, slam: &Slam, t_s: f64, world_from_body: Pose, run: &mut Run) {
+        self.samples += 1;
+        let Some(errors) = &mut self.slam else { return };
+        let seen = errors.pose(t_s, world_from_body);
+        let [dx, dy] = self.stream.normals();
+        run.truth.push(TruthSample::new(
+            t_s,
+            seen.x_m + slam.sigma_xy_m * dx,
+            seen.y_m + slam.sigma_xy_m * dy,
+            Some(seen.theta_rad + slam.sigma_theta_rad * self.stream.normal()),
+        ));
+        if slam.stated_over_true > 0.0 {
+            let [xy_m, theta_rad] = slam.sigma().map(|sigma| Some(slam.stated_over_true * sigma));
+            let stated = TruthSigma { sigma_xy_m: xy_m, sigma_theta_rad: theta_rad };
+            run.truth_sigma.get_or_insert_default().push(stated);
+        }
     }
 
     /// Does the instrument need every row or standstill of a run to be driven?

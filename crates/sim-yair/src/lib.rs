@@ -22,6 +22,7 @@ mod robot;
 mod servo;
 mod servo_error;
 mod simulation;
+mod slam;
 
 pub use prepared_program::PreparedProgram;
 pub use robot::{SimulatedRobot, SimulationError};

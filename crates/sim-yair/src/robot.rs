@@ -1,6 +1,6 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
-use dataset::{GyroNoise, MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
+use dataset::{GyroNoise, MapDistortion, MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
 use effects::{Address, EffectError, Forward, RunStart, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use motion_programs::{MotionProgram, Platform};
@@ -217,7 +217,7 @@ impl SimulatedRobot {
         self.effects.on_run_start(&mut RunStart { number, session_s, session_m, info: &mut run.info });
         self.effects.seed_run(|name| streams.stream(name));
         for observer in &mut self.observers {
-            observer.restart(|name| streams.stream(name));
+            observer.restart(|name| streams.stream(name), number == 0);
         }
         self.streams.wheel_noise = streams.stream(WHEEL_NOISE);
         if self.setup.sensitivity_sigma > 0.0 {
@@ -290,6 +290,16 @@ impl Platform for SimulatedRobot {
                     (reading_sigma_m.hypot(resolution_m / 12_f64.sqrt()), 0.0)
                 }
                 Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => (sigma_xy_m, sigma_theta_rad),
+                Instrument::Slam(slam) => {
+                    // The precision of its poses is its own opinion, if anyone's: it is estimated.
+                    let distorted = slam.map_sigma_xy_m > 0.0 || slam.map_sigma_theta_rad > 0.0;
+                    noise.map = distorted.then_some(MapDistortion {
+                        sigma_xy_m: slam.map_sigma_xy_m,
+                        sigma_theta_rad: slam.map_sigma_theta_rad,
+                        length_m: slam.map_length_m,
+                    });
+                    (0.0, 0.0)
+                }
                 Instrument::Gyro { noise_rad_per_sqrt_s, bias_walk_radps_per_sqrt_s, scale_sigma, .. } => {
                     let known = |sigma: f64| (sigma > 0.0).then_some(sigma);
                     noise.gyro = GyroNoise {

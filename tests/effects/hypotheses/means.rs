@@ -56,6 +56,7 @@ const CASES: &[Case] = &[
     fixed("backlash", ("width_m", 2e-3), &[("left_gap_m", 2e-3), ("right_gap_m", 2e-3)], 0.0),
     case("truth_lever_arm", &[("lever_x_m", 0.05), ("lever_y_m", -0.03)], 0.0),
     case("truth_yaw", &[("yaw_rad", 0.02)], 0.0),
+    case("truth_map_scale", &[("scale_error", 0.02)], 0.0),
     // Of second order: 1/(1 + β|ω|) at 1.4 rad/s, 1/(1 − share), and the phase by an encoder that errs by nA
     // = 0.11 itself.
     case("turn_rate_wheelbase", &[("beta_s", 0.02)], 0.03),

@@ -26,6 +26,9 @@ pub enum NoBound {
     /// Partial measurements have no bound here yet.
     #[error("a gyro, a tape measure and revisits have no closed bound here")]
     PartialMeasurements,
+    /// Errors of poses in a map resemble each other.
+    #[error("poses of slam have correlated errors, for which there is no closed bound here")]
+    CorrelatedErrors,
     /// The floor grid reads fewer than two distinct points.
     #[error("the robot's marked points give no heading: two of them must differ")]
     NoHeading,

@@ -137,6 +137,7 @@ impl PoseInstrument {
                 let covariance = body_from_reading * Matrix3::from_diagonal(&var) * body_from_reading.transpose();
                 Ok(Self { rate_hz: Some(rate_hz), covariance })
             }
+            Instrument::Slam(_) => Err(NoBound::CorrelatedErrors),
             Instrument::Tachometer { .. } => Err(NoBound::WheelSpeeds),
             Instrument::Gyro { .. } | Instrument::Tape { .. } | Instrument::Revisit { .. } => {
                 Err(NoBound::PartialMeasurements)

@@ -14,6 +14,7 @@ use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::identity::{parse_recorded, parse_robot_id};
+use crate::map_distortion::MapDistortion;
 use crate::partial::GyroNoise;
 use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
 use crate::table::open_file;
@@ -76,6 +77,9 @@ struct RobotToml {
 struct TruthToml {
     sigma_xy_m: Option<Spanned<f64>>,
     sigma_theta_rad: Option<Spanned<f64>>,
+    map_sigma_xy_m: Option<Spanned<f64>>,
+    map_sigma_theta_rad: Option<Spanned<f64>>,
+    map_length_m: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize, Default)]
@@ -184,6 +188,7 @@ impl Source<'_> {
         let recorded = toml.recorded.map(|recorded| self.recorded(&recorded)).transpose()?;
         let robot = self.robot(robot_toml)?;
         let truth_noise = TruthNoise {
+            map: self.map_distortion(&toml.truth)?,
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,
             sigma_theta_rad: self.sigma("sigma_theta_rad", toml.truth.sigma_theta_rad)?,
             gyro: GyroNoise {
@@ -394,6 +399,28 @@ impl Source<'_> {
     }
 
     /// A standard deviation; 0 is unknown.
+    /// The errors of the instrument's map, where some are stated.
+    fn map_distortion(&self, truth: &TruthToml) -> Result<Option<MapDistortion>, DatasetError> {
+        let TruthToml { map_sigma_xy_m, map_sigma_theta_rad, map_length_m, .. } = truth;
+        let sigmas = [("map_sigma_xy_m", map_sigma_xy_m), ("map_sigma_theta_rad", map_sigma_theta_rad)];
+        let mut stated = None;
+        let mut values = [0.0; 2];
+        for (value, (key, of)) in values.iter_mut().zip(sigmas) {
+            if let Some(sigma) = self.sigma(key, of.clone())? {
+                *value = sigma;
+                stated = of.as_ref();
+            }
+        }
+        let Some(stated) = stated else { return Ok(None) };
+        let [sigma_xy_m, sigma_theta_rad] = values;
+        let Some(length_m) = self.sigma("map_length_m", map_length_m.clone())? else {
+            let message =
+                "map_length_m is missing: over what distance, metres, do the map's errors resemble each other?";
+            return Err(self.error(&stated.span(), message.to_owned()));
+        };
+        Ok(Some(MapDistortion { sigma_xy_m, sigma_theta_rad, length_m }))
+    }
+
     fn sigma(&self, key: &str, value: Option<Spanned<f64>>) -> Result<Option<f64>, DatasetError> {
         match value {
             None => Ok(None),

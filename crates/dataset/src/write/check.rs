@@ -82,6 +82,11 @@ fn check_robot(dataset: &Dataset) -> Check {
     }
     sigma("sigma_xy_m", dataset.truth_noise.sigma_xy_m)?;
     sigma("sigma_theta_rad", dataset.truth_noise.sigma_theta_rad)?;
+    if let Some(map) = dataset.truth_noise.map {
+        sigma("map_sigma_xy_m", Some(map.sigma_xy_m))?;
+        sigma("map_sigma_theta_rad", Some(map.sigma_theta_rad))?;
+        positive("map_length_m", map.length_m)?;
+    }
     let gyro = dataset.truth_noise.gyro;
     sigma("scale_sigma", gyro.scale_sigma)?;
     sigma("noise_rad_per_sqrt_s", gyro.noise_rad_per_sqrt_s)?;

@@ -44,6 +44,12 @@ struct TruthOut {
     sigma_xy_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sigma_theta_rad: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map_sigma_xy_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map_sigma_theta_rad: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map_length_m: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -122,6 +128,9 @@ pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, tom
         truth: TruthOut {
             sigma_xy_m: dataset.truth_noise.sigma_xy_m,
             sigma_theta_rad: dataset.truth_noise.sigma_theta_rad,
+            map_sigma_xy_m: dataset.truth_noise.map.map(|map| map.sigma_xy_m),
+            map_sigma_theta_rad: dataset.truth_noise.map.map(|map| map.sigma_theta_rad),
+            map_length_m: dataset.truth_noise.map.map(|map| map.length_m),
         },
         gyro: GyroOut::of(dataset.truth_noise.gyro),
         run: runs.iter().map(RunOut::new).collect(),

@@ -46,3 +46,20 @@ fn a_gyroscope_stands_for_a_truth() {
     assert!(with("sampling = \"mean\"").error().to_string().contains("interval_end"));
     assert!(Case::good().without("truth.csv").error().to_string().contains("gyro_radps"));
 }
+
+/// The distortion of a map needs the length over which its errors resemble each other.
+#[test]
+fn a_map_is_stated_with_its_length_and_written_as_it_was_read() {
+    let with = |keys: &str| Case::good().with("dataset.toml", TOML.replace("[truth]", &format!("[truth]\n{keys}")));
+    let read = |case: Case| read(case.path()).expect("readable").dataset;
+    let stated = read(with("map_sigma_xy_m = 0.02\nmap_length_m = 1.5"));
+    let map = stated.truth_noise.map.expect("stated");
+    assert_eq!((map.sigma_xy_m, map.sigma_theta_rad, map.length_m), (0.02, 0.0, 1.5));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let again = folder.path().join("again");
+    dataset::write(&stated, &again, dataset::Existing::Refuse).expect("written");
+    assert_eq!(dataset::read(&again).expect("readable").dataset, stated);
+    assert_eq!(read(with("map_sigma_xy_m = 0\nmap_length_m = 1.5")).truth_noise.map, None);
+    assert!(with("map_sigma_theta_rad = 0.01").error().to_string().contains("map_length_m is missing"));
+    assert!(with("map_sigma_xy_m = -0.01\nmap_length_m = 1.5").error().to_string().contains("map_sigma_xy_m"));
+}

@@ -103,6 +103,7 @@ impl Setting {
         let (minutes, time) = minutes(limits, budget.and_then(|budget| budget.minutes).unwrap_or(MINUTES));
         let between_measurements_s = scenario.instruments.iter().find_map(|instrument| match *instrument {
             Instrument::MotionCapture { rate_hz, .. } => Some(1.0 / rate_hz),
+            Instrument::Slam(slam) => Some(1.0 / slam.rate_hz),
             _ => None,
         });
         Some(Self {

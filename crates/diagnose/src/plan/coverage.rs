@@ -386,6 +386,7 @@ fn spread(frame: &Frame, equations: &NormalEquations) -> f64 {
 fn noise(scenario: &Scenario) -> Option<Noise> {
     let (xy_m, theta_rad) = scenario.instruments.iter().find_map(|instrument| match *instrument {
         Instrument::MotionCapture { sigma_xy_m, sigma_theta_rad, .. } => Some((sigma_xy_m, sigma_theta_rad)),
+        Instrument::Slam(slam) => Some(slam.sigma().into()),
         Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
             let of_mark_m = reading_sigma_m.hypot(resolution_m / 12_f64.sqrt());
             let marks = &scenario.robot.points;
