@@ -67,6 +67,13 @@ pub(crate) enum Basis {
     TurnScatter(f64),
 }
 
+impl Basis {
+    /// Whether what an effect in the model leaves, its form being known roughly, may give such a finding.
+    pub(crate) const fn may_be_error_of_form(&self) -> bool {
+        matches!(self, Self::FailedTests(_) | Self::LargeErrors(_) | Self::Autocorrelated(_) | Self::TurnScatter(_))
+    }
+}
+
 /// Why a cause is not alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Doubt {
@@ -74,6 +81,8 @@ pub(crate) enum Doubt {
     TermDoesAsWell,
     /// Something is left that it does not explain.
     Incomplete,
+    /// Other unmodelled effects of turns scatter like it.
+    ScattersAlike,
     /// It is of low significance.
     LowSignificance,
     /// It may be part of an uncatalogued effect.

@@ -10,8 +10,9 @@ use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
-use crate::geometry_deviations::geometry_deviations;
+use crate::geometry_deviations::remaining_deviations;
 use crate::mean_structure::MeanStructure;
+use crate::model_comparison::form_error_statistic;
 use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
 use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
@@ -62,7 +63,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 14] = [
+    let stages: [Stage; 16] = [
         record_faults,
         mean_effects,
         clocks,
@@ -72,6 +73,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         noise_effects,
         faults_of_the_log,
         failed_checks,
+        without_errors_of_form,
         doubt_parts_of_stronger_findings,
         doubt_incomplete_models,
         doubt_low_significance,
@@ -145,7 +147,8 @@ fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
 fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let StageResults { structure, log, spans, faults, without, .. } = *results;
     let wheels = if results.uncorrelated { None } else { wrong_wheels(&structure.base) };
-    let mut deviations = if results.uncorrelated { Vec::new() } else { geometry_deviations(&structure.base) };
+    let mut deviations =
+        if results.uncorrelated { Vec::new() } else { remaining_deviations(&structure.base, structure.model()) };
     // Another robot's counts say more than another robot's wheels.
     deviations.retain(|deviation| wheels.is_none() || deviation.of != GeometryRatio::Wheels);
     // An effect that is found beside another robot's geometry may be what the geometry is wrong by.
@@ -181,6 +184,13 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     if !(results.restored() || scatters || is_reported) {
         findings.extend(finding::of_failed_checks(&structure.checked));
     }
+    findings
+}
+
+/// Failed checks and noise effects that are no more than the error of a larger effect's form are none beside it.
+fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let least_z = form_error_statistic(results.structure.model()).sqrt();
+    findings.retain(|finding| !finding.basis.may_be_error_of_form() || finding.z >= least_z);
     findings
 }
 

@@ -3,6 +3,8 @@
 use effects::GeometryRatio;
 use estimation::{Column, ModelFit};
 
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::terms;
 use crate::settings::records::{
     MAX_SEPARATION_DEVIATION, MAX_SKID_STEERED_SEPARATION, MAX_WHEEL_DEVIATION_SIGMAS, MIN_DEVIATION_SIGMAS,
     WHEEL_PRIOR_SIGMA,
@@ -30,10 +32,18 @@ impl GeometryDeviation {
     }
 }
 
-/// The deviations of a fit that are too large and certain.
-pub(crate) fn geometry_deviations(fit: &ModelFit<'_>) -> Vec<GeometryDeviation> {
+/// The deviations of the base fit that are too large and certain, and that the effects found do not take back.
+pub(crate) fn remaining_deviations(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Vec<GeometryDeviation> {
+    let remain = geometry_deviations(model);
+    let of_base = geometry_deviations(&AugmentedModel::base(base));
+    of_base.into_iter().filter(|deviation| remain.iter().any(|other| other.of == deviation.of)).collect()
+}
+
+/// The deviations of a model that are too large and certain.
+fn geometry_deviations(model: &AugmentedModel<'_>) -> Vec<GeometryDeviation> {
+    let fit = &model.fit;
+    let Some(covariance) = fit.covariance(&mut terms(&model.candidates)) else { return Vec::new() };
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
-    let Some(covariance) = fit.covariance(&mut []) else { return Vec::new() };
     // Steps of the geometry's columns are relative.
     let columns = [Column::LeftWheel, Column::RightWheel, Column::Separation];
     let at = columns.map(|column| fit.position(column));

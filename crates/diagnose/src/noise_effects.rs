@@ -12,7 +12,7 @@ use estimation::NoiseComponent;
 
 use crate::augmented_model::{cost, count};
 use crate::candidate::terms;
-use crate::cause::{Basis, Cause};
+use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, Component, ResidualPersistence};
 use crate::document::Value;
 use crate::finding;
@@ -144,5 +144,8 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
     let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
     let parameters = BTreeMap::from([("turn_sigma_rad_per_sqrt_rad".to_owned(), value)]);
     let causes = with_sign(Sign::ScatterWithTurn, without_ids);
-    Some(finding::of_causes(causes, p_value, parameters, Basis::TurnScatter(sigma)))
+    let mut found = finding::of_causes(causes, p_value, parameters, Basis::TurnScatter(sigma));
+    // Whatever else is unmodelled and differs from turn to turn has no other sign.
+    found.or_unlisted(1.0, Doubt::ScattersAlike);
+    Some(found)
 }

@@ -6,7 +6,7 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
-use crate::model_comparison::{log_bayes_factor, log_odds_margin, regated};
+use crate::model_comparison::{form_error_statistic, log_bayes_factor, log_odds_margin, regated};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, Refusal, Refusals, over_names, rivals};
@@ -164,10 +164,13 @@ pub(crate) fn search<'a>(
     let mut names: Vec<Vec<Name>> = Vec::new();
     let mut beside = Vec::new();
     while model.candidates.len() < MAX_EFFECTS {
-        let entries = best_variants(known.beside(&model, catalogue));
+        let mut entries = best_variants(known.beside(&model, catalogue));
         if model.candidates.is_empty() {
             first_scan.clone_from(&entries);
         }
+        // What is no more than the error of a larger effect's form is none beside it.
+        let form_error = form_error_statistic(&model);
+        entries.retain(|entry| entry.scored.statistic >= form_error);
         let Some(extended) = grown((base, &mut known), &model, entries, level, &mut refusals) else { break };
         model = extended;
     }

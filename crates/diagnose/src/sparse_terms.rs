@@ -10,12 +10,13 @@ use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
 use crate::geometry_deviations::keeps_wheels;
-use crate::model_comparison::{log_bayes_factor, regated};
+use crate::model_comparison::{form_error_statistic, log_bayes_factor, regated};
 use crate::null_distribution::NullDistribution;
 use crate::scan::{Scored, scan};
 use crate::settings::levels::SPARSE_TERM_LEVEL;
 use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
 use crate::statistics::{p_of_chi_square, sidak};
+use crate::wald::wald_test;
 
 /// A sparse term with its model.
 pub(crate) struct FoundTerm<'a> {
@@ -270,5 +271,8 @@ fn deflate_best(null: &NullDistribution<'_, '_>, scored: &mut [Scored]) {
 
 /// The best sparse term beside a model.
 pub(crate) fn sparse<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, level: f64) -> Option<FoundTerm<'a>> {
-    SparseSearch::beside(level, base, model)?.finding(level)
+    let found = SparseSearch::beside(level, base, model)?.finding(level)?;
+    // What is no more than the error of a larger effect's form is none beside it.
+    let (test, _) = wald_test(&found.model, found.model.candidates.len().checked_sub(1)?)?;
+    (test.statistic >= form_error_statistic(model)).then_some(found)
 }

@@ -119,6 +119,7 @@ fn sentence(finding: &Finding) -> String {
             }
             Doubt::TermDoesAsWell => format!("{sentence}; a term that is not in the catalogue explains it as well"),
             Doubt::Incomplete => format!("{sentence}; it does not explain all that is there"),
+            Doubt::ScattersAlike => format!("{sentence}; other effects that differ from turn to turn scatter alike"),
             Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
             Doubt::OtherGeometry => {
                 format!("{sentence}; beside a geometry that is not the described robot's, it may be something else")
