@@ -297,7 +297,8 @@ mod tests {
     #[test]
     fn what_needs_something_of_the_records_can_be_there_without_harm() {
         for id in CATALOGUE {
-            let needs = description(id).expect("known").benchmark.needs;
+            // A length that is known is a record of its own, which the benchmark does not draw.
+            let needs = Needs { length: false, ..description(id).expect("known").benchmark.needs };
             let found = harmless(id, &host());
             assert_eq!(needs != Needs::NONE, found.is_some(), "{id}");
             assert!(found.is_none_or(|effect| effect.id() == *id && effect.physical().check().is_ok()), "{id}");

@@ -123,9 +123,9 @@ mod tests {
 
     #[test]
     fn positions_are_scaled_and_headings_are_not() {
-        let mut state = State { effect: TruthMapScale { scale_error: 0.01 } };
-        let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(2.0, -3.0, 0.5) };
+        let mut state = State { effect: TruthMapScale { scale_error: 0.25 } };
+        let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(2.0, -4.0, 0.5) };
         state.instrument(&mut reading);
-        assert_eq!(reading.world_from_body, Pose::new(2.02, -3.03, 0.5));
+        assert_eq!(reading.world_from_body, Pose::new(2.5, -5.0, 0.5));
     }
 }
