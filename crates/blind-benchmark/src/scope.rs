@@ -7,7 +7,7 @@ pub enum Scope {
     Whole,
     /// Nulls, the single effects of every second block, and what is said of them: all that a baseline guards.
     Guarded,
-    /// Single effects of the mean at ten to a hundred of their detection limits, whatever the number; no gains
-    /// and no planned runs.
+    /// Single effects of the mean at ten to a hundred of their detection limits, whatever the number; no
+    /// gains and no planned runs.
     Large,
 }

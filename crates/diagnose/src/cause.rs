@@ -2,7 +2,7 @@
 
 use crate::check::{Check, ResidualPersistence};
 use crate::document::UnlistedTerm;
-use crate::geometry_deviations::GeometryDeviation;
+use crate::geometry_deviation::GeometryDeviation;
 use crate::unknown_motion::Anomaly;
 
 /// A candidate cause.

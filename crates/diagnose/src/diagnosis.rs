@@ -183,8 +183,8 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
     let mut structure = mean_structure(records, base.clone(), &catalogue, restored);
-    // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which they
-    // follow it, such as a clock that is off.
+    // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
+    // they follow it, such as a clock that is off.
     let uncorrelated = !is_correlated(&base) && !is_correlated(&structure.found.model.fit);
     if uncorrelated {
         catalogue.clear();

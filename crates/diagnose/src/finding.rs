@@ -12,7 +12,7 @@ use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
 use crate::clock_offsets::ClockOffset;
 use crate::document::{UnlistedTerm, Value};
-use crate::geometry_deviations::GeometryDeviation;
+use crate::geometry_deviation::GeometryDeviation;
 use crate::model_comparison::relative_odds;
 use crate::record_faults::Fault;
 use crate::residual_tests::Checked;

@@ -187,7 +187,8 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     findings
 }
 
-/// Failed checks and noise effects that are no more than the error of a larger effect's form are none beside it.
+/// Failed checks and noise effects that are no more than the error of a larger effect's form are none beside
+/// it.
 fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let least_z = form_error_statistic(results.structure.model()).sqrt();
     findings.retain(|finding| !finding.basis.may_be_error_of_form() || finding.z >= least_z);

@@ -5,34 +5,13 @@ use estimation::{Column, ModelFit};
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
+use crate::geometry_deviation::GeometryDeviation;
 use crate::settings::records::{
-    MAX_SEPARATION_DEVIATION, MAX_SKID_STEERED_SEPARATION, MAX_WHEEL_DEVIATION_SIGMAS, MIN_DEVIATION_SIGMAS,
-    WHEEL_PRIOR_SIGMA,
+    MAX_SEPARATION_DEVIATION, MAX_WHEEL_DEVIATION_SIGMAS, MIN_DEVIATION_SIGMAS, WHEEL_PRIOR_SIGMA,
 };
 
-/// A ratio of the geometry that is farther from its stated value than any robot of that description.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct GeometryDeviation {
-    pub(crate) of: GeometryRatio,
-    /// Calibrated over stated.
-    pub(crate) ratio: f64,
-    pub(crate) sigma: f64,
-}
-
-impl GeometryDeviation {
-    /// How certain it is.
-    pub(crate) fn chi_square(&self) -> f64 {
-        (self.ratio.ln() * self.ratio / self.sigma).powi(2)
-    }
-
-    /// Whether a robot whose wheels skid in turns has it: its effective separation is larger than the
-    /// wheels'.
-    pub(crate) fn is_of_skid_steering(&self) -> bool {
-        self.of == GeometryRatio::Separation && (1.0..=MAX_SKID_STEERED_SEPARATION).contains(&self.ratio)
-    }
-}
-
-/// The deviations of the base fit that are too large and certain, and that the effects found do not take back.
+/// The deviations of the base fit that are too large and certain, and that the effects found do not take
+/// back.
 pub(crate) fn remaining_deviations(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Vec<GeometryDeviation> {
     let remain = geometry_deviations(model);
     let of_base = geometry_deviations(&AugmentedModel::base(base));

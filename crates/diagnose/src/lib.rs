@@ -26,6 +26,7 @@ mod finding;
 mod findings;
 mod fit_cache;
 mod gain;
+mod geometry_deviation;
 mod geometry_deviations;
 mod heterogeneity;
 mod kinds;

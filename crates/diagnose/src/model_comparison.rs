@@ -29,8 +29,9 @@ pub(crate) fn log_bayes_factor(base: &ModelFit<'_>, model: &AugmentedModel<'_>) 
     cost(base, count_of_both) - cost(&model.fit, count_of_both) + occam_factors.sum::<f64>()
 }
 
-/// The largest statistic that the error of form of the effects in a model may give to what is tested beside them.
-/// What the instrument and its clock do is known exactly; what a wheel, a floor or a castor does is not.
+/// The largest statistic that the error of form of the effects in a model may give to what is tested beside
+/// them. What the instrument and its clock do is known exactly; what a wheel, a floor or a castor does is
+/// not.
 pub(crate) fn form_error_statistic(model: &AugmentedModel<'_>) -> f64 {
     let of_robot = model.candidates.iter().enumerate().filter(|(_, candidate)| !candidate.is_of_instrument());
     let statistics = of_robot.filter_map(|(index, _)| wald_test(model, index)).map(|(test, _)| test.statistic);

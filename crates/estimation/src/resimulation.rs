@@ -135,8 +135,8 @@ fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
     segment.intervals.iter().map(of).collect()
 }
 
-/// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts go
-/// as the smoothed turns do, as those of a log are interpolated.
+/// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts
+/// go as the smoothed turns do, as those of a log are interpolated.
 fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
     for side in Side::BOTH {
         let quantum_rad = segment.quantum_rad[side];

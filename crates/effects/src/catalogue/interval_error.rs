@@ -240,8 +240,8 @@ mod tests {
             let squares = found.iter().zip(stamped(share)).map(|(found, due)| (found - due).powi(2));
             (squares.sum::<f64>() / late_s.len() as f64).sqrt()
         };
-        // The line through 501 rows is off by 1 ms/√501 on average, by twice that at the ends of a run. Rejects
-        // the stamps as they are, 1 ms off.
+        // The line through 501 rows is off by 1 ms/√501 on average, by twice that at the ends of a run.
+        // Rejects the stamps as they are, 1 ms off.
         let whole = read_times(&stamped(1.0), 0.96, 0.02).expect("a beat");
         assert!(off_s(&whole, 0.0) < 1e-4, "{}", off_s(&whole, 0.0));
         // A share that is surely half leaves the other half, which is true.
