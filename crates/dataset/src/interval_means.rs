@@ -2,14 +2,16 @@
 
 /// Longest step between two rates that is bridged, in median steps: one or two may be lost, and the rate in
 /// between is nearly linear. Derived: a robot turns up to some 3 rad/s², an IMU measures 50 times a second or
-/// more; where that sets in half-way, the mean over 3 steps of 20 ms is off by 3 rad/s² · 60 ms / 8 = 0.02 rad/s.
+/// more; where that sets in half-way, the mean over 3 steps of 20 ms is off by 3 rad/s² · 60 ms / 8 = 0.02
+/// rad/s.
 const MAX_STEP_IN_MEDIANS: f64 = 3.5;
 
-/// Mean rates over the intervals that end at `rows`; NaN where they are not known: before the first rate, after
-/// the last, and across a step of more than 3.5 median steps between two. The first row ends no interval.
+/// Mean rates over the intervals that end at `rows`; NaN where they are not known: before the first rate,
+/// after the last, and across a step of more than 3.5 median steps between two. The first row ends no
+/// interval.
 ///
-/// `rates` are instants and rates in the order of time, linear in between; `seconds` is the time from one instant
-/// to another.
+/// `rates` are instants and rates in the order of time, linear in between; `seconds` is the time from one
+/// instant to another.
 pub fn interval_means<T: Copy + PartialOrd>(rates: &[(T, f64)], rows: &[T], seconds: impl Fn(T, T) -> f64) -> Vec<f64> {
     let steps_s = || rates.windows(2).map(|pair| seconds(pair[0].0, pair[1].0));
     let mut sorted: Vec<f64> = steps_s().collect();

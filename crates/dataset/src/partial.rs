@@ -52,8 +52,8 @@ pub struct WallReading {
     pub sigma_rad: Option<f64>,
 }
 
-/// The robot's heading in the room without a position (`truth.csv` with empty `x_m,y_m`): a compass, or the sun.
-/// The direction that it counts from may be any; it is found for each run.
+/// The robot's heading in the room without a position (`truth.csv` with empty `x_m,y_m`): a compass, or the
+/// sun. The direction that it counts from may be any; it is found for each run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadingReading {
     /// Seconds from the run's start.

@@ -141,8 +141,9 @@ pub struct Run {
 }
 
 impl Run {
-    /// The gyroscope's mean yaw rate over the interval that ends at each row of the odometry, rad/s, NaN where it
-    /// is not known: from its own rates, else the column of the odometry; `None` without a gyroscope.
+    /// The gyroscope's mean yaw rate over the interval that ends at each row of the odometry, rad/s, NaN
+    /// where it is not known: from its own rates, else the column of the odometry; `None` without a
+    /// gyroscope.
     #[must_use]
     pub fn gyro_rates(&self) -> Option<Cow<'_, [f64]>> {
         if self.gyro.is_empty() {

@@ -1,8 +1,8 @@
 //! The score of the variances: what each measurement says of them.
 //!
-//! Measurements with independent components add theirs in [`crate::filter`], one after the other. Where errors of
-//! position and heading correlate, the components depend on the variances themselves; the whole measurement is
-//! taken at once, as the covariance of its errors alone depends on them.
+//! Measurements with independent components add theirs in [`crate::filter`], one after the other. Where
+//! errors of position and heading correlate, the components depend on the variances themselves; the whole
+//! measurement is taken at once, as the covariance of its errors alone depends on them.
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 

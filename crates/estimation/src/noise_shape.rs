@@ -1,13 +1,14 @@
 //! Covariances that rows of the truth state: correlated errors of one measured pose.
 //!
-//! A row's covariance is that of the instrument's errors but for one scale of position and one of heading, which
-//! are estimated: R = S F S with S = diag(σ, σ, σ_θ) and F the stated covariance relative to a reference. Rows
-//! without correlations are two factors, and the filter takes their components one by one. Here R = L D Lᵀ in
-//! the robot's frame, L unit lower triangular, makes independent components of correlated ones: L⁻¹ times the
-//! error has the variances D. Components keep their order and their meaning: along the robot, across given
-//! along, heading given both (Bierman 1977, §III.3).
+//! A row's covariance is that of the instrument's errors but for one scale of position and one of heading,
+//! which are estimated: R = S F S with S = diag(σ, σ, σ_θ) and F the stated covariance relative to a
+//! reference. Rows without correlations are two factors, and the filter takes their components one by one.
+//! Here R = L D Lᵀ in the robot's frame, L unit lower triangular, makes independent components of correlated
+//! ones: L⁻¹ times the error has the variances D. Components keep their order and their meaning: along the
+//! robot, across given along, heading given both (Bierman 1977).
 //!
-//! L depends on σ/σ_θ where positions and headings correlate; [`crate::noise_score`] takes whole measurements.
+//! L depends on σ/σ_θ where positions and headings correlate; [`crate::noise_score`] takes whole
+//! measurements.
 
 use dataset::PoseCovariance;
 use nalgebra::{Matrix3, Vector3};
@@ -70,8 +71,8 @@ impl NoiseShape {
         [position + mixed, mixed + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, whole))]
     }
 
-    /// The covariance of a pose that starts at such a measurement, and its derivatives by the logarithms of both
-    /// variances; `lever` is how the pose moves as the measured heading turns.
+    /// The covariance of a pose that starts at such a measurement, and its derivatives by the logarithms of
+    /// both variances; `lever` is how the pose moves as the measured heading turns.
     pub(crate) fn at_start(&self, variance: [f64; 2], lever: Vector3<f64>) -> [Matrix3<f64>; 3] {
         let mut by_error = Matrix3::identity();
         by_error.set_column(2, &lever);

@@ -1,6 +1,6 @@
 //! A run as the checks see it: wheel angles over time without impossible rows, and what the instrument saw.
 
-use dataset::{Displacement, ExtraChannel, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
+use dataset::{Displacement, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
 use kinematics::{Side, Wheels};
 
 use crate::settings::GYRO_TURN_SIGMA_RAD;

@@ -57,8 +57,8 @@ pub(crate) fn doubt_of_axis(readings: &[GyroReading]) -> Option<String> {
     })
 }
 
-/// Mean rates over the intervals that end at `rows_ns`, as [`interval_means`] has them. `messages` are instants
-/// and rates in the order of time.
+/// Mean rates over the intervals that end at `rows_ns`, as [`interval_means`] has them. `messages` are
+/// instants and rates in the order of time.
 pub(crate) fn means(messages: &[(i64, f64)], rows_ns: &[i64]) -> Vec<f64> {
     interval_means(messages, rows_ns, seconds)
 }

@@ -144,8 +144,8 @@ fn precision([xx, xy, xt, yy, yt, tt]: [f64; 6]) -> (TruthSigma, Option<&'static
     (TruthSigma { sigma_xy_m, sigma_theta_rad: sigma(tt), covariance }, stated.err())
 }
 
-/// The precision of each row; `None` where no message states one. Where standard deviations tell all of each, they
-/// are given; else the covariances are.
+/// The precision of each row; `None` where no message states one. Where standard deviations tell all of each,
+/// they are given; else the covariances are.
 pub(crate) fn precisions<'a>(
     readings: impl Iterator<Item = &'a TruthReading> + Clone,
     has_heading: bool,
@@ -205,28 +205,32 @@ mod tests {
         assert_eq!(heading_and_tilt(f64::NAN, 0.0, 0.0, 1.0), None);
     }
 
-    #[test]
-    fn positive_variances_are_sigmas_and_others_are_unknown() {
+    /// The pose of a message with a covariance whose elements at these places are not zero.
+    fn read_with(elements: &[(usize, f64)]) -> TruthReading {
         let numbers = |names: &str, values: &[f64]| {
             let of = |(name, value): (char, &f64)| (name.to_string(), Value::Float(*value));
             Value::Message(names.chars().zip(values).map(of).collect())
         };
+        let mut covariance = vec![Value::Float(0.0); 36];
+        elements.iter().for_each(|(place, value)| covariance[*place] = Value::Float(*value));
+        let pose = Value::Message(vec![
+            ("position".to_owned(), numbers("xyz", &[1.0, 2.0, 3.0])),
+            ("orientation".to_owned(), numbers("xyzw", &[0.0, 0.0, 0.0, 1.0])),
+        ]);
+        let with_covariance =
+            Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
+        let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
+        let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
+        let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
+        reader.read(&message).expect("a pose")[0].1
+    }
+
+    #[test]
+    fn positive_variances_are_sigmas_and_others_are_unknown() {
         let read = |xx: f64, yy: f64, yaw: f64| {
-            let mut covariance = vec![Value::Float(0.0); 36];
-            (covariance[0], covariance[7], covariance[35]) = (Value::Float(xx), Value::Float(yy), Value::Float(yaw));
-            let pose = Value::Message(vec![
-                ("position".to_owned(), numbers("xyz", &[1.0, 2.0, 3.0])),
-                ("orientation".to_owned(), numbers("xyzw", &[0.0, 0.0, 0.0, 1.0])),
-            ]);
-            let with_covariance =
-                Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
-            let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
-            let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
-            let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
-            let readings = reader.read(&message).expect("a pose");
-            assert_eq!((readings[0].1.x_m, readings[0].1.y_m), (1.0, 2.0));
-            let precision = readings[0].1.precision;
-            (precision.sigma_xy_m, precision.sigma_theta_rad)
+            let reading = read_with(&[(0, xx), (7, yy), (35, yaw)]);
+            assert_eq!((reading.x_m, reading.y_m), (1.0, 2.0));
+            (reading.precision.sigma_xy_m, reading.precision.sigma_theta_rad)
         };
         assert_eq!(read(3.0, 5.0, 0.25), (Some(2.0), Some(0.5)));
         assert_eq!(read(3.0, 0.0, -1.0), (None, None));
@@ -239,6 +243,11 @@ mod tests {
             let (precision, impossible) = precision(elements);
             TruthReading { x_m: 0.0, y_m: 0.0, theta_rad: Some(0.0), tilt_rad: 0.0, precision, impossible }
         };
+        // Row by row of x, y, z and the rotations about these.
+        let upper = [(0, 4.0), (1, 1.0), (5, 0.5), (7, 3.0), (11, 0.25), (35, 1.0)];
+        let read = read_with(&[&upper[..], &[(6, 1.0), (30, 0.5), (31, 0.25)]].concat());
+        let found = read.precision.covariance.map(|of| of.elements());
+        assert_eq!(found, Some([4.0, 1.0, 0.5, 3.0, 0.25, 1.0]));
         let plain = reading([4.0, 0.0, 0.0, 4.0, 0.0, 0.25]);
         let correlated = reading([4.0, 1.0, 0.5, 3.0, 0.0, 0.25]);
         let nothing = reading([0.0; 6]);

@@ -21,6 +21,9 @@ pub(crate) const DISPLACEMENT: &str = "displacement.csv";
 pub(crate) const POINTS: &str = "points.csv";
 pub(crate) const WHEEL_REFERENCE: &str = "wheel_reference.csv";
 
+/// The columns of a table, or what it lacks.
+type Found = Result<Box<dyn TruthColumns>, DatasetError>;
+
 /// One kind of table: adding one is one line in [`KINDS`] and its columns.
 #[derive(Debug)]
 struct Kind {
@@ -28,7 +31,7 @@ struct Kind {
     header: &'static str,
     known: &'static [&'static str],
     /// From its header, and the standard deviation of headings that the manifest states.
-    find: fn(&Table, Option<f64>) -> Result<Box<dyn TruthColumns>, DatasetError>,
+    find: fn(&Table, Option<f64>) -> Found,
 }
 
 const KINDS: [Kind; 8] = [

@@ -286,6 +286,16 @@ fn walls(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io
     Ok(())
 }
 
+fn gyro(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
+    let id = quoted_where_needed(&run.info.id);
+    for sample in &run.gyro {
+        out.write_all(id.as_bytes())?;
+        numbers(out, [sample.t_s, sample.omega_radps])?;
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -322,14 +332,4 @@ mod tests {
             }
         }
     }
-}
-
-fn gyro(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
-    let id = quoted_where_needed(&run.info.id);
-    for sample in &run.gyro {
-        out.write_all(id.as_bytes())?;
-        numbers(out, [sample.t_s, sample.omega_radps])?;
-        out.write_all(b"\n")?;
-    }
-    Ok(())
 }

@@ -72,7 +72,8 @@ fn again(dataset: &dataset::Dataset) -> dataset::Dataset {
     read(&path).expect("readable").dataset
 }
 
-/// A row's covariance is read whole, in part or not at all, and what no covariance can be is refused with its line.
+/// A row's covariance is read whole, in part or not at all, and what no covariance can be is refused with its
+/// line.
 #[test]
 fn covariances_of_rows_are_read_and_impossible_ones_named() {
     let header = "run,t_s,x_m,y_m,theta_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt\n";
@@ -108,17 +109,17 @@ fn headings_without_a_position_are_read_with_their_sigma() {
     let header = "run,t_s,x_m,y_m,theta_rad,sigma_theta_rad\n";
     let rows = "a,0,,,0.5,0.01\na,0.1,1,2,0.6,\na,0.2,,,0.7,\nb,0,0,0,0,\n";
     let case = |rows: &str| Case::good().with("truth.csv", format!("{header}{rows}"));
-    let set = read(case(rows).path()).expect("readable").dataset;
+    let toml = TOML.replace("[truth]", "[truth]\nsigma_theta_rad = 0.002");
+    let set = read(case(rows).with("dataset.toml", toml).path()).expect("readable").dataset;
     let headings: Vec<_> = set.runs[0].headings.iter().map(|of| (of.t_s, of.theta_rad, of.sigma_rad)).collect();
     // Where the row states none, the standard deviation is that of the manifest.
-    assert_eq!((headings, set.runs[0].truth.len()), (vec![(0.0, 0.5, 0.01), (0.2, 0.7, 0.001)], 1));
+    assert_eq!((headings, set.runs[0].truth.len()), (vec![(0.0, 0.5, 0.01), (0.2, 0.7, 0.002)], 1));
     assert_eq!(again(&set).runs, set.runs);
     let message = |case: Case| case.error().to_string();
     assert!(message(case("a,0,,,,\nb,0,0,0,0,\n")).contains("truth.csv:2: the row measures nothing"));
     assert!(message(case("a,0.1,1,2,0.6,\na,0,,,0.5,\nb,0,0,0,0,\n")).contains("truth.csv:3"));
     assert!(message(case("a,0,1,,0.6,\nb,0,0,0,0,\n")).contains("y_m"));
-    let unknown = case(rows).with("dataset.toml", TOML.replace("sigma_theta_rad = 0.001", "sigma_theta_rad = 0"));
-    assert!(message(unknown).contains("truth.csv:4: the row measures nothing; expected a value and its standard"));
+    assert!(message(case(rows)).contains("truth.csv:4: the row measures nothing; expected a value and its standard"));
 }
 
 /// A gyroscope with instants of its own: means over the rows' intervals.

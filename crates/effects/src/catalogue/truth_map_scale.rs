@@ -126,6 +126,9 @@ mod tests {
         let mut state = State { effect: TruthMapScale { scale_error: 0.01 } };
         let mut reading = PoseReading { t_s: 0.0, world_from_body: Pose::new(2.0, -3.0, 0.5) };
         state.instrument(&mut reading);
-        assert_eq!(reading.world_from_body, Pose::new(2.02, -3.03, 0.5));
+        let Pose { x_m, y_m, theta_rad } = reading.world_from_body;
+        // Rounding of one product of size 3.
+        assert!((x_m - 2.02).abs() < 1e-15 * 3.0 && (y_m + 3.03).abs() < 1e-15 * 3.0, "{x_m} {y_m}");
+        assert_eq!(theta_rad, 0.5);
     }
 }

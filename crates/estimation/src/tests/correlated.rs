@@ -7,8 +7,8 @@ use super::*;
 /// Standard deviations of [`NOISE`].
 const SIGMA: [f64; 2] = [3e-3, 5e-3];
 
-/// The dataset whose rows state covariances of the noise's size: R Rᵀ about `correlation` of all coordinates, in
-/// other directions from row to row.
+/// The dataset whose rows state covariances of the noise's size: R Rᵀ about `correlation` of all coordinates,
+/// in other directions from row to row.
 fn stated(with_headings: bool, correlation: f64) -> Dataset {
     let mut dataset = dataset(with_headings);
     dataset.truth_noise =
@@ -87,9 +87,9 @@ fn positions_alone_have_the_score_of_their_own_part() {
     assert!((far - plain).norm() > 0.1 * plain.norm(), "{far} {plain}");
 }
 
-/// A straight of 1 m along x, from a start that is known; its end is measured off along one axis of an ellipse at
-/// 45°, ten times as long as wide. On paper the pull on the wheels is jᵀ R⁻¹ v, and R⁻¹ v is v over the variance
-/// along it.
+/// A straight of 1 m along x, from a start that is known; its end is measured off along one axis of an
+/// ellipse at 45°, ten times as long as wide. On paper the pull on the wheels is jᵀ R⁻¹ v, and R⁻¹ v is v
+/// over the variance along it.
 #[test]
 fn a_long_ellipse_pulls_along_its_short_axis_alone() {
     const SHORT_M: f64 = 1e-3;
@@ -127,8 +127,8 @@ fn a_long_ellipse_pulls_along_its_short_axis_alone() {
         let found = pull([x * off_m, y * off_m]);
         // Both wheels' relative change moves the end along x by 1 m; −v lowers the cost.
         let on_paper = -off_m / variance;
-        // The start's 0.1 µm and the wheels' 0.01 µm beside 1 mm. A filter with the mean variance of both axes
-        // would pull the same along both.
+        // The start's 0.1 µm and the wheels' 0.01 µm beside 1 mm. A filter with the mean variance of both
+        // axes would pull the same along both.
         assert!((found / on_paper - 1.0).abs() < 1e-6, "{found} {on_paper}");
     }
 }
