@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use crate::corrections::Corrections;
 use crate::counter;
 use crate::error::{DatasetError, shown};
-use crate::record::{Dataset, Run};
+use crate::record::{Dataset, ExtraChannel, Run};
 use crate::table::RunIndex;
 use crate::warning::Warning;
 use columns::PointIndex;
@@ -126,6 +126,11 @@ impl Opened {
             warnings.push(Warning::NotMetres { file: manifest_file.clone(), key, value_m });
         }
         let truths = truth::open_all(dir, odometry.has_gyro(), truth_noise.sigma_theta_rad, &mut warnings)?;
+
+        if odometry.has_gyro() && truths.iter().any(|table| table.name() == GYRO) {
+            let (file, column) = (dir.join(ODOMETRY), ExtraChannel::GyroYawRate.column());
+            warnings.push(Warning::RedundantColumn { file, column, used: GYRO });
+        }
 
         let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
         let runs = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();

@@ -131,6 +131,12 @@ fn a_gyroscope_may_have_its_own_instants() {
     // Two trapezoids of 0.3 rad/s; sums of some 0.01 rad.
     assert!(rates[0].is_nan() && (rates[1] - 0.3).abs() < 1e-12, "{rates:?}");
     assert_eq!(again(&set).runs, set.runs);
+    let both = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,0\na,0.1,10,12,7\nb,0,5,5,0\nb,0.1,7,7,0\n";
+    let loaded = read(Case::good().with("gyro.csv", rows).with("odometry.csv", both).path()).expect("readable");
+    let rates = loaded.dataset.runs[0].gyro_rates().expect("a gyroscope");
+    assert!((rates[1] - 0.3).abs() < 1e-12, "{rates:?}");
+    let said: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|line| line.contains("gyro_radps") && line.contains("gyro.csv")), "{said:?}");
     let back = rows.replace("a,0.1,0.2", "a,0.05,0.2");
     assert!(Case::good().with("gyro.csv", back).error().to_string().contains("gyro.csv:4"));
 }
