@@ -336,7 +336,7 @@ mod tests {
             ("covariance only", 3),
             ("geometry", 3),
             ("never", 5),
-            ("of the instrument", 6),
+            ("of the instrument", 7),
             ("static", 8),
             ("with an input", 7),
             ("with state", 7),
