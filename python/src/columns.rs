@@ -136,6 +136,7 @@ impl Columns {
         let sigma = |row: usize| TruthSigma {
             sigma_xy_m: known(&sigma_xy_m, row),
             sigma_theta_rad: known(&sigma_theta_rad, row),
+            covariance: None,
         };
         let has_sigma = sigma_xy_m.is_some() || sigma_theta_rad.is_some();
         run.truth = (0..t_s.len()).map(sample).collect();

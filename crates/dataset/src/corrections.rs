@@ -4,6 +4,8 @@
 use kinematics::Wheels;
 use serde::Deserialize;
 
+use crate::partial::HeadingReading;
+use crate::pose_covariance::PoseCovariance;
 use crate::record::{Run, TruthSample, WheelLog};
 
 /// Corrections of all runs; none by default.
@@ -81,6 +83,19 @@ impl Corrections {
             let (x_m, y_m) = place(sample.x_m, sample.y_m);
             *sample = TruthSample::new(time(sample.t_s), x_m, y_m, sample.theta_rad().map(turn));
         }
+        // Errors go the way of what they are errors of.
+        let [of_x, of_y] = [place(1.0, 0.0), place(0.0, 1.0)];
+        for sigma in run.truth_sigma.iter_mut().flatten() {
+            sigma.sigma_xy_m.iter_mut().for_each(|sigma_m| *sigma_m *= self.truth_length_factor.abs());
+            sigma.sigma_theta_rad.iter_mut().for_each(|sigma_rad| *sigma_rad = turn(*sigma_rad).abs());
+            let mapped = |of: &mut PoseCovariance| *of = of.mapped([[of_x.0, of_y.0], [of_x.1, of_y.1]], turn(1.0));
+            sigma.covariance.iter_mut().for_each(mapped);
+        }
+        for heading in &mut run.headings {
+            let [theta_rad, sigma_rad] = [turn(heading.theta_rad), turn(heading.sigma_rad).abs()];
+            *heading = HeadingReading { t_s: time(heading.t_s), theta_rad, sigma_rad };
+        }
+        run.gyro.iter_mut().for_each(|sample| sample.t_s *= self.time_factor);
         for displacement in &mut run.displacements {
             (displacement.t0_s, displacement.t1_s) = (time(displacement.t0_s), time(displacement.t1_s));
             (displacement.dx_m, displacement.dy_m) = place(displacement.dx_m, displacement.dy_m);

@@ -146,6 +146,19 @@ pub enum DatasetError {
         /// Who needs it.
         why: &'static str,
     },
+    /// Six numbers that no covariance can have.
+    #[error(
+        "{file}:{line}: cov_xx to cov_tt are no covariance: {why}; expected variances in m² and rad², covariances below them, \
+         and zeros or empty cells where nothing is known"
+    )]
+    ImpossibleCovariance {
+        /// The file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong.
+        why: &'static str,
+    },
     /// A number that nothing physical can have.
     #[error("{file}:{line}: {key} = {value}; expected {expected}")]
     NotPhysical {

@@ -52,6 +52,27 @@ pub struct WallReading {
     pub sigma_rad: Option<f64>,
 }
 
+/// The robot's heading in the room without a position (`truth.csv` with empty `x_m,y_m`): a compass, or the
+/// sun. The direction that it counts from may be any; it is found for each run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadingReading {
+    /// Seconds from the run's start.
+    pub t_s: f64,
+    /// Heading, radians, counter-clockwise, wrapped or not.
+    pub theta_rad: f64,
+    /// Its standard deviation, radians.
+    pub sigma_rad: f64,
+}
+
+/// A gyroscope's yaw rate at an instant of its own (`gyro.csv`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GyroSample {
+    /// Seconds from the run's start, by the robot's clock.
+    pub t_s: f64,
+    /// Yaw rate, rad/s.
+    pub omega_radps: f64,
+}
+
 /// What is known of the gyroscope whose yaw rate stands in `odometry.csv`: `[gyro]` of `dataset.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GyroNoise {

@@ -1,9 +1,12 @@
 //! The records of a dataset, as columns in memory: SI units, one [`Run`] a run.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use crate::interval_means::interval_means;
 use crate::map_distortion::MapDistortion;
-use crate::partial::{GyroNoise, Revisit, TapeDistance, WallReading};
+use crate::partial::{GyroNoise, GyroSample, HeadingReading, Revisit, TapeDistance, WallReading};
+use crate::pose_covariance::PoseCovariance;
 use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
 use serde::{Deserialize, Serialize};
@@ -121,6 +124,10 @@ pub struct Run {
     pub truth: Vec<TruthSample>,
     /// Precision of each truth sample, where the file gives it; as long as `truth`.
     pub truth_sigma: Option<Vec<TruthSigma>>,
+    /// Headings without a position (`truth.csv`).
+    pub headings: Vec<HeadingReading>,
+    /// A gyroscope's rates by its own instants (`gyro.csv`).
+    pub gyro: Vec<GyroSample>,
     /// Displacements between two instants (`displacement.csv`).
     pub displacements: Vec<Displacement>,
     /// Marked points read in the room (`points.csv`).
@@ -139,6 +146,24 @@ pub struct Run {
 }
 
 impl Run {
+    /// The gyroscope's mean yaw rate over the interval that ends at each row of the odometry, rad/s, NaN
+    /// where it is not known: from its own rates, else the column of the odometry; `None` without a
+    /// gyroscope.
+    #[must_use]
+    pub fn gyro_rates(&self) -> Option<Cow<'_, [f64]>> {
+        if self.gyro.is_empty() {
+            return self.odometry.extra.get(&ExtraChannel::GyroYawRate).map(|column| Cow::Borrowed(&column[..]));
+        }
+        let rates: Vec<(f64, f64)> = self.gyro.iter().map(|of| (of.t_s, of.omega_radps)).collect();
+        Some(Cow::Owned(interval_means(&rates, &self.odometry.t_s, |from_s, to_s| to_s - from_s)))
+    }
+
+    /// Does a gyroscope measure in it?
+    #[must_use]
+    pub fn has_gyro(&self) -> bool {
+        !self.gyro.is_empty() || self.odometry.extra.contains_key(&ExtraChannel::GyroYawRate)
+    }
+
     /// Do the counts leave open how the robot moved, somewhere between two instants?
     #[must_use]
     pub fn is_motion_unknown(&self, from_s: f64, to_s: f64) -> bool {
@@ -370,13 +395,20 @@ impl PartialEq for TruthSample {
     }
 }
 
-/// One standard deviation of one truth sample; `None` is unknown.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How precise one truth sample is; `None` is unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TruthSigma {
-    /// Of each position coordinate, metres.
+    /// One standard deviation of each position coordinate, metres.
     pub sigma_xy_m: Option<f64>,
-    /// Of the heading, radians.
+    /// One standard deviation of the heading, radians.
     pub sigma_theta_rad: Option<f64>,
+    /// The whole covariance; it comes before both standard deviations in what it states.
+    pub covariance: Option<PoseCovariance>,
+}
+
+impl TruthSigma {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { sigma_xy_m: None, sigma_theta_rad: None, covariance: None };
 }
 
 /// The instrument's pose at `t1_s` seen from its pose at `t0_s`, in the instrument's own frame.

@@ -18,8 +18,8 @@ pub enum Warning {
         /// Known columns of this table.
         known: String,
     },
-    /// A column says less than others of the same table, and was left out.
-    #[error("{file}: column {column} was left out, because the table also has {used}")]
+    /// A column says less than others of the table or of another one, and was left out.
+    #[error("{file}: column {column} was left out, because the dataset also has {used}")]
     RedundantColumn {
         /// The table.
         file: PathBuf,

@@ -7,7 +7,7 @@
 
 use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix3, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
@@ -15,6 +15,8 @@ use crate::filter_state::{FilterState, Step};
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
+use crate::noise_score::{JointUpdate, NoiseScore};
+use crate::noise_shape::Whitened;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
@@ -36,24 +38,6 @@ pub struct InnovationComponent {
     pub z: f64,
     /// That standard deviation: metres, or radians of a heading.
     pub sigma: f64,
-}
-
-/// Score of the cost by the logarithms of the variances, and its information.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct NoiseScore {
-    pub(crate) gradient: Vector4<f64>,
-    pub(crate) information: Matrix4<f64>,
-}
-
-impl NoiseScore {
-    pub(super) fn zero() -> Self {
-        Self { gradient: Vector4::zeros(), information: Matrix4::zeros() }
-    }
-
-    pub(super) fn add(&mut self, other: &Self, weight: f64) {
-        self.gradient += weight * other.gradient;
-        self.information += weight * other.information;
-    }
 }
 
 /// The filter of one segment.
@@ -204,11 +188,18 @@ impl<'f, 'a> Filter<'f, 'a> {
         (self.sums, self.outliers, self.innovations, self.noise_score, self.propagator.propagations.into_cached())
     }
 
+    /// Variances of position and heading of a measurement that states none of its own.
+    #[inline(always)]
+    const fn instrument_variance(&self) -> [f64; 2] {
+        let [_, _, xy, theta] = self.noise.variance;
+        [xy, theta]
+    }
+
     /// Variances of a measurement's position and heading: the instrument's, times what its row states of
     /// itself.
     #[inline(always)]
     fn variance_of(&self, measured: &MeasuredPose) -> [f64; 2] {
-        let [_, _, xy, theta] = self.noise.variance;
+        let [xy, theta] = self.instrument_variance();
         [xy * measured.variance_factor[0], theta * measured.variance_factor[1]]
     }
 
@@ -220,12 +211,24 @@ impl<'f, 'a> Filter<'f, 'a> {
         let pose = Pose::new(measured.x_m, measured.y_m, measured.theta_rad.unwrap_or(free_heading_rad));
         let free = measured.theta_rad.is_none();
         self.start(pose, (xy, if free { 0.0 } else { theta }), next_piece, (propagations, measured.t_s));
+        if let Some(shape) = &measured.shape {
+            let lever = if free { Vector3::zeros() } else { self.lever(&measured) };
+            let [whole, position, heading] = shape.at_start(self.instrument_variance(), lever);
+            self.covariance = Covariance::of([&whole]);
+            self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
+        }
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
             let last = self.j.len() - 1;
-            self.by.set(last, Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0));
+            self.by.set(last, self.lever(&measured));
         }
+    }
+
+    /// How the pose moves as the heading of the measurement that it starts at turns.
+    #[inline(always)]
+    fn lever(&self, measured: &MeasuredPose) -> Vector3<f64> {
+        Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0)
     }
 
     #[inline(always)]
@@ -274,10 +277,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.covariance = Covariance::of([&(position + heading)]);
         self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
         self.pose_by_noise = [[0.0; NOISES]; 3];
-        let [_, _, xy, theta] = self.noise.variance;
         let interpolated_rad2 =
             self.segment.intervals.get(after).map_or(Wheels::both(0.0), |first| first.interpolated_rad2[0]);
-        self.rounding.start([xy, theta], interpolated_rad2, self.model);
+        self.rounding.start(self.instrument_variance(), interpolated_rad2, self.model);
     }
 
     /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion
@@ -372,10 +374,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         // Derivatives of a component of the measurement by the pose; rows: along, across, heading.
         let by_heading = Vector3::new(-ahead.y, ahead.x, 1.0);
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
-        let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };
         let [xy, theta] = variance;
-        let r = [xy, xy, theta];
+        let shape = measured.shape;
+        let Whitened { axes, variance: r } = match shape {
+            Some(shape) => shape.whitened(axes, self.instrument_variance()),
+            None => Whitened { axes, variance: [xy, xy, theta] },
+        };
+        let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
         let measured = [0, 1, 2].map(|component| {
             if component >= components {
@@ -394,6 +400,12 @@ impl<'f, 'a> Filter<'f, 'a> {
         if self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE {
             return false;
         }
+        if let Some(shape) = shape.filter(|_| self.pass_options.noise_score) {
+            let (variance, covariance) = (self.instrument_variance(), self.covariance.matrix(0));
+            let has_heading = components == 3;
+            let joint = JointUpdate { shape, variance, covariance, by_heading, innovation: error, has_heading };
+            self.noise_score.add_joint(&joint, &mut self.covariance_by, &mut self.pose_by_noise);
+        }
         self.covariance = covariance;
         self.samples.extend(sample);
         // The geometry, and a free heading, which is the last column, act through the pose alone.
@@ -401,7 +413,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         for (component, update) in measured.iter().enumerate().take(components) {
             let axis = axes[component];
             let Update { row, gain, v, s } = *update;
-            if self.pass_options.noise_score {
+            if self.pass_options.noise_score && shape.is_none() {
                 self.score_noise(component, update, r[component]);
             }
             for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {

@@ -30,6 +30,8 @@ mod maximum_likelihood;
 mod model;
 mod model_fit;
 mod noise;
+mod noise_score;
+mod noise_shape;
 mod normal_equations;
 mod nuisances;
 mod one_step;

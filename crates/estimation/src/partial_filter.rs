@@ -10,9 +10,9 @@ use kinematics::{Pose, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::filter::NoiseScore;
 use crate::model::{Column, Model};
 use crate::noise::{Noise, NoiseComponent};
+use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_records::{Observation, PartialSegment, Place, Quantity};
 use crate::products::{Products, Sums};

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{ExtraChannel, GyroNoise, Run, RunView, Session};
+use dataset::{GyroNoise, Run, RunView, Session};
 use kinematics::{Pose, Wheels};
 
 use crate::model::Model;
@@ -206,7 +206,16 @@ fn tape_and_walls(run: &Run) -> (Vec<Timed>, usize) {
         timed.extend(of.heading_rad.zip(of.sigma_rad).map(|measured| at(Quantity::WallHeading(wall), measured)));
         timed.extend(of.distance_m.zip(of.sigma_m).map(|measured| at(Quantity::WallDistance(wall), measured)));
     }
-    (timed, walls.len())
+    // A heading in the room is one along a wall of an unknown direction.
+    let compass = walls.len();
+    timed.extend(run.headings.iter().map(|of| Timed {
+        from_s: of.t_s,
+        to_s: of.t_s,
+        quantity: Quantity::WallHeading(compass),
+        value: of.theta_rad,
+        variance: of.sigma_rad * of.sigma_rad,
+    }));
+    (timed, compass + usize::from(!run.headings.is_empty()))
 }
 
 /// The walls by the nominal drive: their directions from a heading where one was measured, else from the
@@ -323,7 +332,9 @@ impl GyroSettings {
 /// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn, and where
 /// rows are without a rate.
 fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool, longest_s: f64) -> Vec<Window> {
-    let Some(rates) = run.odometry.extra.get(&ExtraChannel::GyroYawRate) else { return Vec::new() };
+    let Some(rates) = run.gyro_rates() else { return Vec::new() };
+    // Rates by their own instants have become means over the rows.
+    let is_instantaneous = is_instantaneous && run.gyro.is_empty();
     let (t_s, turns) = (&run.odometry.t_s, track.turns());
     let mut windows: Vec<Window> = Vec::new();
     for row in 1..t_s.len().min(rates.len()) {
@@ -357,7 +368,7 @@ fn noise_from_log(session: &Session<'_>) -> Option<f64> {
     let instantaneous = session.truth_noise.gyro.is_instantaneous;
     let nominal = Model::of(&session.robot.geometry().ok()?, 0);
     let (mut standing, mut moving) = (Vec::new(), Vec::new());
-    let measures = |run: &&RunView<'_>| run.odometry().extra.contains_key(&ExtraChannel::GyroYawRate);
+    let measures = |run: &&RunView<'_>| run.run().has_gyro();
     for run in session.runs.iter().filter(measures) {
         let Some(track) = WheelAngleInterpolator::of(run, session.robot) else { continue };
         let rows = windows(run.run(), &track, instantaneous, 0.0);

@@ -6,11 +6,12 @@ use kinematics::InstructionSet;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, FilterRun, InnovationComponent, NoiseScore};
+use crate::filter::{Filter, FilterRun, InnovationComponent};
 use crate::group_extrinsics::GroupResponse;
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
+use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_filter::filter_partial;
 use crate::pass_options::PassOptions;

@@ -12,6 +12,7 @@ use kinematics::{Increment, Pose};
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
+use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
@@ -276,23 +277,31 @@ fn measured_poses(run: &dataset::RunView<'_>, reference: [f64; 2]) -> Vec<Measur
                 theta_rad: Some(theta_rad),
                 after: 0,
                 variance_factor: [1.0; 2],
+                shape: None,
             })
             .collect();
     }
     let factor = |sigma: Option<f64>, reference: f64| {
         sigma.filter(|sigma| *sigma > 0.0).map_or(1.0, |sigma| (sigma / reference).powi(2))
     };
-    let factor_of = |row: usize| match truth_sigma.as_ref().and_then(|sigmas| sigmas.get(row)) {
-        Some(sigma) => [factor(sigma.sigma_xy_m, reference[0]), factor(sigma.sigma_theta_rad, reference[1])],
-        None => [1.0; 2],
+    let noise_of = |row: usize| {
+        let stated = truth_sigma.as_ref().and_then(|sigmas| sigmas.get(row)).copied().unwrap_or_default();
+        let factors = [factor(stated.sigma_xy_m, reference[0]), factor(stated.sigma_theta_rad, reference[1])];
+        let Some(covariance) = stated.covariance else { return (factors, None) };
+        let shape = NoiseShape::of(&covariance, reference, factors);
+        shape.as_factors().map_or_else(|| (shape.least_factors(), Some(shape)), |factors| (factors, None))
     };
-    let of = |(row, sample): (usize, &TruthSample)| MeasuredPose {
-        t_s: sample.t_s,
-        x_m: sample.x_m,
-        y_m: sample.y_m,
-        theta_rad: sample.theta_rad(),
-        after: 0,
-        variance_factor: factor_of(row),
+    let of = |(row, sample): (usize, &TruthSample)| {
+        let (variance_factor, shape) = noise_of(row);
+        MeasuredPose {
+            t_s: sample.t_s,
+            x_m: sample.x_m,
+            y_m: sample.y_m,
+            theta_rad: sample.theta_rad(),
+            after: 0,
+            variance_factor,
+            shape,
+        }
     };
     truth.iter().enumerate().map(of).collect()
 }
@@ -369,6 +378,7 @@ fn add_displacements<'a>(
                 theta_rad: Some(pose.theta_rad),
                 after: intervals.len(),
                 variance_factor: [1.0; 2],
+                shape: None,
             };
             let continues = (measured.t0_s - last_s).abs() <= TIME_TOLERANCE_S;
             last_s = measured.t1_s;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use kinematics::{Increment, Pose, Side, Wheels};
 use model_term::ModelTerm;
+use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -18,7 +19,7 @@ use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
 use crate::propagation::{CarriedState, Propagator};
 use crate::rounding::PoseVariance;
-use crate::segment::{Segment, Start};
+use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
 
 impl ModelFit<'_> {
@@ -112,11 +113,10 @@ impl ModelFit<'_> {
             at = measurement.after;
             let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
             let seen = pose * off * body_from_sensor;
-            let [xy, theta] = measurement.variance_factor;
-            let (position_m, heading_rad) = ((position_m2 * xy).sqrt(), (heading_rad2 * theta).sqrt());
-            measurement.x_m = seen.x_m + position_m * draws.normal();
-            measurement.y_m = seen.y_m + position_m * draws.normal();
-            measurement.theta_rad = measurement.theta_rad.map(|_| seen.theta_rad + heading_rad * draws.normal());
+            let errors = draws.errors(measurement, [position_m2, heading_rad2]);
+            measurement.x_m = seen.x_m + errors.x;
+            measurement.y_m = seen.y_m + errors.y;
+            measurement.theta_rad = measurement.theta_rad.map(|_| seen.theta_rad + errors.z);
         }
         propagator.carried(pose * body_from_sensor)
     }
@@ -172,6 +172,20 @@ impl Draws {
 
     fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
+    }
+
+    /// Errors of a measurement, for the instrument's variances of position and heading.
+    fn errors(&mut self, measurement: &MeasuredPose, variance: [f64; 2]) -> Vector3<f64> {
+        let mut normal = || self.normal();
+        let draws = Vector3::new(normal(), normal(), if measurement.theta_rad.is_some() { normal() } else { 0.0 });
+        measurement.shape.map_or_else(
+            || {
+                let [xy, theta] = measurement.variance_factor;
+                let (position_m, heading_rad) = ((variance[0] * xy).sqrt(), (variance[1] * theta).sqrt());
+                draws.component_mul(&Vector3::new(position_m, position_m, heading_rad))
+            },
+            |shape| shape.errors(variance, draws),
+        )
     }
 
     fn uniform(&mut self) -> f64 {

@@ -4,6 +4,7 @@ use dataset::RunInfo;
 use kinematics::{Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
+use crate::noise_shape::NoiseShape;
 use crate::settings::{SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S};
 use crate::wheel_angles::WheelInterval;
 
@@ -16,8 +17,11 @@ pub(crate) struct MeasuredPose {
     pub(crate) theta_rad: Option<f64>,
     /// Number of intervals of the segment before it.
     pub(crate) after: usize,
-    /// Variances of position and heading, over those of a measurement that states none of its own.
+    /// Variances of position and heading, over those of a measurement that states none of its own; of a
+    /// shape their lower bounds.
     pub(crate) variance_factor: [f64; 2],
+    /// The covariance, where two factors do not tell it.
+    pub(crate) shape: Option<NoiseShape>,
 }
 
 /// Where a segment starts.

@@ -1,6 +1,6 @@
 //! A run as the checks see it: wheel angles over time without impossible rows, and what the instrument saw.
 
-use dataset::{Displacement, ExtraChannel, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
+use dataset::{Displacement, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
 use kinematics::{Side, Wheels};
 
 use crate::settings::GYRO_TURN_SIGMA_RAD;
@@ -62,8 +62,10 @@ fn partial(run: &Run) -> Vec<PartialRow> {
             rows.extend(a.zip(b).map(|(a, b)| row(before.t_s, of.t_s, part, a.hypot(b))));
         }
     }
-    let has_gyro = run.odometry.extra.contains_key(&ExtraChannel::GyroYawRate);
-    if let (true, [from_s, .., to_s]) = (has_gyro, &run.odometry.t_s[..]) {
+    for pair in run.headings.windows(2) {
+        rows.push(row(pair[0].t_s, pair[1].t_s, Part::Turn, pair[0].sigma_rad.hypot(pair[1].sigma_rad)));
+    }
+    if let (true, [from_s, .., to_s]) = (run.has_gyro(), &run.odometry.t_s[..]) {
         // A minute of a consumer gyroscope whose bias was seen.
         rows.push(row(*from_s, *to_s, Part::GyroTurn, GYRO_TURN_SIGMA_RAD));
     }

@@ -8,17 +8,14 @@
 //! −1 in the covariance's first element says that nothing was measured; at rest the acceleration is +g along
 //! the axis that points up.
 
+use dataset::interval_means;
+
 use crate::clock::seconds;
 use crate::value::Value;
 
 /// The type.
 pub(crate) const IMU: &str = "sensor_msgs/msg/Imu";
 
-/// Longest step between two messages that is bridged, in median steps: a message or two may be lost, and the
-/// rate in between is nearly linear. Source: a robot turns up to some 3 rad/s², an IMU measures 50 times a
-/// second or more; where that sets in half-way, the mean over 3 steps of 20 ms is off by
-/// 3 rad/s² · 60 ms / 8 = 0.02 rad/s.
-const MAX_STEP_IN_MEDIANS: f64 = 3.5;
 /// The mean acceleration holds gravity if it is at least that, m/s²: half of 9.81.
 const MIN_GRAVITY_M_S2: f64 = 4.9;
 /// Least cosine between the z axis and the direction in which gravity is measured: 18°. Further off, a
@@ -60,41 +57,10 @@ pub(crate) fn doubt_of_axis(readings: &[GyroReading]) -> Option<String> {
     })
 }
 
-/// Mean rates over the intervals that end at `rows_ns`; NaN where they are not known. The first row ends
-/// none. `messages` are instants and rates in the order of time.
+/// Mean rates over the intervals that end at `rows_ns`, as [`interval_means`] has them. `messages` are
+/// instants and rates in the order of time.
 pub(crate) fn means(messages: &[(i64, f64)], rows_ns: &[i64]) -> Vec<f64> {
-    let steps_s = || messages.windows(2).map(|pair| seconds(pair[0].0, pair[1].0));
-    let mut sorted: Vec<f64> = steps_s().collect();
-    sorted.sort_by(f64::total_cmp);
-    let longest_s = sorted.get(sorted.len() / 2).map_or(0.0, |median_s| MAX_STEP_IN_MEDIANS * median_s);
-    // The angle up to each message, and how many holes are before it.
-    let mut before: Vec<(f64, usize)> = vec![(0.0, 0)];
-    for (pair, step_s) in messages.windows(2).zip(steps_s()) {
-        let (angle_rad, holes) = before[before.len() - 1];
-        let mean_rad_s = 0.5 * (pair[0].1 + pair[1].1);
-        before.push((angle_rad + mean_rad_s * step_s, holes + usize::from(step_s > longest_s)));
-    }
-    // Angle and holes at an instant between the first and the last message. In a hole there is none.
-    let at = |time_ns: i64| -> Option<(f64, usize)> {
-        let next = messages.partition_point(|(of_ns, _)| *of_ns < time_ns);
-        if messages.get(next).is_some_and(|(of_ns, _)| *of_ns == time_ns) {
-            return Some(before[next]);
-        }
-        let (from, to) = (messages.get(next.checked_sub(1)?)?, messages.get(next)?);
-        let ((angle_rad, holes), step_s) = (before[next - 1], seconds(from.0, to.0));
-        if before[next].1 != holes {
-            return None;
-        }
-        let since_s = seconds(from.0, time_ns);
-        let rate_rad_s = from.1 + (to.1 - from.1) * since_s / step_s;
-        Some((angle_rad + 0.5 * (from.1 + rate_rad_s) * since_s, holes))
-    };
-    let mean = |pair: &[i64]| {
-        let ((from_rad, holes), (to_rad, holes_after)) = (at(pair[0])?, at(pair[1])?);
-        (holes == holes_after).then(|| (to_rad - from_rad) / seconds(pair[0], pair[1]))
-    };
-    let first = rows_ns.iter().take(1).map(|_| f64::NAN);
-    first.chain(rows_ns.windows(2).map(|pair| mean(pair).unwrap_or(f64::NAN))).collect()
+    interval_means(messages, rows_ns, seconds)
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use dataset::import::csv::{Rates, RobotGiven};
 use dataset::{
-    Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma,
-    WheelLog, moving_pieces, wrap_warnings,
+    Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
+    moving_pieces, wrap_warnings,
 };
 use kinematics::{DriveGeometry, Wheels};
 use serde::Serialize;
@@ -21,7 +21,7 @@ use crate::gyro_column::GyroColumn;
 use crate::recorded::recorded;
 use crate::rows::{self, BothRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
 use crate::topics::{Survey, Topic};
-use crate::truth::{TruthReader, TruthReading};
+use crate::truth::{self, TruthReader, TruthReading};
 use crate::wheel_pair::{Resampling, WheelPair};
 use crate::wheels::{WheelFields, WheelQuantity, WheelReader};
 
@@ -321,6 +321,9 @@ fn assemble(
         ));
     }
 
+    let doubt = truth::doubt_of_covariances(&both.truth.values);
+    warnings.extend(doubt.map(|doubt| format!("topic {}: {doubt}", both.truth.topic)));
+
     let step_s = |from: usize, to: usize| seconds(wheel_rows[from].1, wheel_rows[to].1);
     let stands = |from: usize, to: usize| {
         if both.quantity.is_rate() { wheels[to] == [0.0, 0.0] } else { wheels[from] == wheels[to] }
@@ -363,12 +366,7 @@ fn assemble(
             TruthSample::new(seconds(from_ns, *time_ns), reading.x_m, reading.y_m, theta_rad)
         };
         let truth: Vec<TruthSample> = of_run.iter().map(sample).collect();
-        let has_sigma = readings().any(|reading| reading.sigma_xy_m.is_some() || reading.sigma_theta_rad.is_some());
-        let sigma = |reading: &TruthReading| TruthSigma {
-            sigma_xy_m: reading.sigma_xy_m,
-            sigma_theta_rad: reading.sigma_theta_rad.filter(|_| has_heading),
-        };
-        let truth_sigma = has_sigma.then(|| readings().map(sigma).collect());
+        let truth_sigma = truth::precisions(readings(), has_heading);
         let id = format!("run-{:02}", runs.len() + 1);
         let start_s = is_cut.then(|| seconds(session, from_ns)).filter(|start_s| *start_s >= 0.0);
         let info = RunInfo { id, start_s, ..RunInfo::default() };

@@ -1,5 +1,7 @@
 //! Poses of an outside instrument from messages.
 
+use dataset::{PoseCovariance, TruthSigma};
+
 use crate::error::RosBagError;
 use crate::topics::{self, TRANSFORMS, Topic};
 use crate::value::Value;
@@ -20,10 +22,8 @@ pub(crate) const TRUTH_TYPES: [(&str, &str, &str, Option<&str>); 4] = [
     ("geometry_msgs/msg/TransformStamped", "transform.translation", "transform.rotation", None),
 ];
 
-/// Places of xx, yy and that of the yaw in a covariance of 6 × 6.
-const COVARIANCE_XX: usize = 0;
-const COVARIANCE_YY: usize = 7;
-const COVARIANCE_YAW: usize = 35;
+/// Places of [`PoseCovariance::COLUMNS`] in a covariance of 6 × 6: those of x, y and the yaw.
+const COVARIANCE_PLACES: [usize; 6] = [0, 1, 5, 7, 11, 35];
 
 /// Shortest quaternion that has a direction; messages that were never filled have one of length 0, rounded
 /// ones of some 1 ± 1e-3.
@@ -44,9 +44,10 @@ pub(crate) struct TruthReading {
     pub(crate) theta_rad: Option<f64>,
     /// Angle between the robot's vertical and the room's, radians.
     pub(crate) tilt_rad: f64,
-    /// One standard deviation of each position coordinate, where the message says one.
-    pub(crate) sigma_xy_m: Option<f64>,
-    pub(crate) sigma_theta_rad: Option<f64>,
+    /// What the message says of its precision: standard deviations, and the covariance where it is possible.
+    pub(crate) precision: TruthSigma,
+    /// Why its covariance is none.
+    pub(crate) impossible: Option<&'static str>,
 }
 
 impl TruthReader {
@@ -117,17 +118,59 @@ fn pose(message: &Value, position: &str, orientation: &str, covariance: Option<&
     let [x, y, z, w] =
         [number(orientation, "x")?, number(orientation, "y")?, number(orientation, "z")?, number(orientation, "w")?];
     let (theta_rad, tilt_rad) = heading_and_tilt(x, y, z, w).map_or((None, 0.0), |(theta, tilt)| (Some(theta), tilt));
-    let variance = |place: usize| covariance.and_then(|at| message.list(at).get(place)?.number(""));
-    let sigma = |variance: f64| Some(variance.sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0);
-    let both = variance(COVARIANCE_XX).zip(variance(COVARIANCE_YY)).filter(|(xx, yy)| *xx > 0.0 && *yy > 0.0);
+    let element = |place: usize| covariance.and_then(|at| message.list(at).get(place)?.number(""));
+    let (precision, impossible) = precision(COVARIANCE_PLACES.map(|place| element(place).unwrap_or(0.0)));
     Ok(TruthReading {
         x_m: number(position, "x")?,
         y_m: number(position, "y")?,
         theta_rad,
         tilt_rad,
-        sigma_xy_m: both.and_then(|(xx, yy)| sigma(0.5 * (xx + yy))),
-        sigma_theta_rad: variance(COVARIANCE_YAW).and_then(sigma),
+        precision,
+        impossible,
     })
+}
+
+/// The precision that the elements of a covariance state; a part without positive variances is unknown. Where
+/// covariances are impossible the variances count alone.
+fn precision([xx, xy, xt, yy, yt, tt]: [f64; 6]) -> (TruthSigma, Option<&'static str>) {
+    let sigma = |variance: f64| Some(variance.sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0);
+    let (has_position, has_heading) = (sigma(xx).is_some() && sigma(yy).is_some(), sigma(tt).is_some());
+    let sigma_xy_m = if has_position { sigma(0.5 * (xx + yy)) } else { None };
+    let [part_xx, part_xy, part_yy] = if has_position { [xx, xy, yy] } else { [0.0; 3] };
+    let [part_xt, part_yt] = if has_position && has_heading { [xt, yt] } else { [0.0; 2] };
+    let part_tt = if has_heading { tt } else { 0.0 };
+    let stated = PoseCovariance::stated([part_xx, part_xy, part_xt, part_yy, part_yt, part_tt]);
+    let covariance = stated.ok().flatten();
+    (TruthSigma { sigma_xy_m, sigma_theta_rad: sigma(tt), covariance }, stated.err())
+}
+
+/// The precision of each row; `None` where no message states one. Where standard deviations tell all of each,
+/// they are given; else the covariances are.
+pub(crate) fn precisions<'a>(
+    readings: impl Iterator<Item = &'a TruthReading> + Clone,
+    has_heading: bool,
+) -> Option<Vec<TruthSigma>> {
+    let of = |reading: &TruthReading| {
+        let TruthSigma { sigma_xy_m, sigma_theta_rad, covariance } = reading.precision;
+        let has_heading = has_heading && reading.theta_rad.is_some();
+        let covariance = covariance.and_then(|of| if has_heading { Some(of) } else { of.of_position() });
+        TruthSigma { sigma_xy_m, sigma_theta_rad: sigma_theta_rad.filter(|_| has_heading), covariance }
+    };
+    let is_plain = |of: TruthSigma| of.covariance.is_none_or(|covariance| covariance.as_sigmas().is_some());
+    let are_plain = readings.clone().map(of).all(is_plain);
+    let shown = |of: TruthSigma| match of.covariance {
+        Some(_) if !are_plain => TruthSigma { covariance: of.covariance, ..TruthSigma::UNKNOWN },
+        _ => TruthSigma { covariance: None, ..of },
+    };
+    let rows: Vec<TruthSigma> = readings.map(of).map(shown).collect();
+    rows.iter().any(|row| *row != TruthSigma::UNKNOWN).then_some(rows)
+}
+
+/// What is doubtful of the covariances, for the user.
+pub(crate) fn doubt_of_covariances(readings: &[TruthReading]) -> Option<String> {
+    let why = readings.iter().find_map(|reading| reading.impossible)?;
+    let count = readings.iter().filter(|reading| reading.impossible.is_some()).count();
+    Some(format!("{count} of {} covariances cannot be: {why}; of these the variances count alone", readings.len()))
 }
 
 /// Yaw, and the angle of the body's z axis to the room's; none of a quaternion without direction.
@@ -162,30 +205,67 @@ mod tests {
         assert_eq!(heading_and_tilt(f64::NAN, 0.0, 0.0, 1.0), None);
     }
 
-    #[test]
-    fn positive_variances_are_sigmas_and_others_are_unknown() {
+    /// The pose of a message with a covariance whose elements at these places are not zero.
+    fn read_with(elements: &[(usize, f64)]) -> TruthReading {
         let numbers = |names: &str, values: &[f64]| {
             let of = |(name, value): (char, &f64)| (name.to_string(), Value::Float(*value));
             Value::Message(names.chars().zip(values).map(of).collect())
         };
+        let mut covariance = vec![Value::Float(0.0); 36];
+        elements.iter().for_each(|(place, value)| covariance[*place] = Value::Float(*value));
+        let pose = Value::Message(vec![
+            ("position".to_owned(), numbers("xyz", &[1.0, 2.0, 3.0])),
+            ("orientation".to_owned(), numbers("xyzw", &[0.0, 0.0, 0.0, 1.0])),
+        ]);
+        let with_covariance =
+            Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
+        let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
+        let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
+        let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
+        reader.read(&message).expect("a pose")[0].1
+    }
+
+    #[test]
+    fn positive_variances_are_sigmas_and_others_are_unknown() {
         let read = |xx: f64, yy: f64, yaw: f64| {
-            let mut covariance = vec![Value::Float(0.0); 36];
-            (covariance[0], covariance[7], covariance[35]) = (Value::Float(xx), Value::Float(yy), Value::Float(yaw));
-            let pose = Value::Message(vec![
-                ("position".to_owned(), numbers("xyz", &[1.0, 2.0, 3.0])),
-                ("orientation".to_owned(), numbers("xyzw", &[0.0, 0.0, 0.0, 1.0])),
-            ]);
-            let with_covariance =
-                Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
-            let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
-            let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
-            let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
-            let readings = reader.read(&message).expect("a pose");
-            assert_eq!((readings[0].1.x_m, readings[0].1.y_m), (1.0, 2.0));
-            (readings[0].1.sigma_xy_m, readings[0].1.sigma_theta_rad)
+            let reading = read_with(&[(0, xx), (7, yy), (35, yaw)]);
+            assert_eq!((reading.x_m, reading.y_m), (1.0, 2.0));
+            (reading.precision.sigma_xy_m, reading.precision.sigma_theta_rad)
         };
         assert_eq!(read(3.0, 5.0, 0.25), (Some(2.0), Some(0.5)));
         assert_eq!(read(3.0, 0.0, -1.0), (None, None));
         assert_eq!(read(f64::NAN, 1.0, f64::INFINITY), (None, None));
+    }
+
+    #[test]
+    fn covariances_are_kept_where_standard_deviations_do_not_tell_them() {
+        let reading = |elements: [f64; 6]| {
+            let (precision, impossible) = precision(elements);
+            TruthReading { x_m: 0.0, y_m: 0.0, theta_rad: Some(0.0), tilt_rad: 0.0, precision, impossible }
+        };
+        // Row by row of x, y, z and the rotations about these.
+        let upper = [(0, 4.0), (1, 1.0), (5, 0.5), (7, 3.0), (11, 0.25), (35, 1.0)];
+        let read = read_with(&[&upper[..], &[(6, 1.0), (30, 0.5), (31, 0.25)]].concat());
+        let found = read.precision.covariance.map(|of| of.elements());
+        assert_eq!(found, Some([4.0, 1.0, 0.5, 3.0, 0.25, 1.0]));
+        let plain = reading([4.0, 0.0, 0.0, 4.0, 0.0, 0.25]);
+        let correlated = reading([4.0, 1.0, 0.5, 3.0, 0.0, 0.25]);
+        let nothing = reading([0.0; 6]);
+        let sigmas = TruthSigma { sigma_xy_m: Some(2.0), sigma_theta_rad: Some(0.5), covariance: None };
+        let of = |readings: &[&TruthReading], has_heading| precisions(readings.iter().copied(), has_heading);
+        assert_eq!(of(&[&plain, &nothing], true), Some(vec![sigmas, TruthSigma::UNKNOWN]));
+        assert_eq!(of(&[&nothing], true), None);
+        let full = of(&[&plain, &correlated, &nothing], true).expect("two are stated");
+        let elements: Vec<_> = full.iter().map(|row| row.covariance.map(|of| of.elements())).collect();
+        let expected = [Some([4.0, 0.0, 0.0, 4.0, 0.0, 0.25]), Some([4.0, 1.0, 0.5, 3.0, 0.0, 0.25]), None];
+        assert_eq!(elements, expected);
+        let position = of(&[&correlated], false).expect("a position")[0].covariance.expect("correlated");
+        assert_eq!(position.elements(), [4.0, 1.0, 0.0, 3.0, 0.0, 0.0]);
+        // A correlation of 2: the variances alone, and a word of it.
+        let impossible = reading([1.0, 2.0, 0.0, 1.0, 0.0, 0.25]);
+        let alone = TruthSigma { sigma_xy_m: Some(1.0), sigma_theta_rad: Some(0.5), covariance: None };
+        assert_eq!(of(&[&impossible], true), Some(vec![alone]));
+        let doubt = doubt_of_covariances(&[plain, impossible]).expect("one is impossible");
+        assert!(doubt.starts_with("1 of 2 covariances cannot be: it is not positive definite"), "{doubt}");
     }
 }

@@ -145,7 +145,7 @@ impl Observer {
         ));
         if slam.stated_over_true > 0.0 {
             let [xy_m, theta_rad] = slam.sigma().map(|sigma| Some(slam.stated_over_true * sigma));
-            let stated = TruthSigma { sigma_xy_m: xy_m, sigma_theta_rad: theta_rad };
+            let stated = TruthSigma { sigma_xy_m: xy_m, sigma_theta_rad: theta_rad, covariance: None };
             run.truth_sigma.get_or_insert_default().push(stated);
         }
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::columns::PointIndex;
 use super::truth::TruthTable;
-use super::{Opened, has_truth, odometry, without_truth};
+use super::{GYRO, Opened, has_truth, odometry, without_truth};
 use crate::corrections::Corrections;
 use crate::error::DatasetError;
 use crate::record::{Dataset, NominalRobot, Run, RunInfo};
@@ -61,9 +61,10 @@ impl Grouped {
         self.odometry_rows.rows[number]
     }
 
-    /// Rows of all that saw a run.
+    /// Rows of all that saw a run; those of a gyroscope are of the robot itself, as the odometry's are.
     pub(super) fn seen_rows(&self, number: usize) -> usize {
-        self.truths.iter().map(|(_, rows)| rows.rows[number]).sum()
+        let outside = self.truths.iter().filter(|(table, _)| table.name() != GYRO);
+        outside.map(|(_, rows)| rows.rows[number]).sum()
     }
 
     /// In how many blocks of [`MARKED_ROWS`] rows the odometry of a run stands: one where what saw it cannot

@@ -27,7 +27,7 @@ use truth::TruthTable;
 pub use blocks::Blocks;
 pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};
 pub(crate) use odometry::wheel_columns;
-pub(crate) use partial::{DISTANCE, REVISIT, WALL};
+pub(crate) use partial::{DISTANCE, GYRO, REVISIT, WALL};
 pub use run_by_run::RunByRun;
 pub(crate) use truth::{DISPLACEMENT, POINTS, TRUTH, WHEEL_REFERENCE};
 
@@ -125,7 +125,12 @@ impl Opened {
         for (key, value_m, _) in lengths.into_iter().filter(|(_, value_m, largest_m)| value_m > largest_m) {
             warnings.push(Warning::NotMetres { file: manifest_file.clone(), key, value_m });
         }
-        let truths = truth::open_all(dir, odometry.has_gyro(), &mut warnings)?;
+        let truths = truth::open_all(dir, odometry.has_gyro(), truth_noise.sigma_theta_rad, &mut warnings)?;
+
+        if odometry.has_gyro() && truths.iter().any(|table| table.name() == GYRO) {
+            let (file, column) = (dir.join(ODOMETRY), ExtraChannel::GyroYawRate.column());
+            warnings.push(Warning::RedundantColumn { file, column, used: GYRO });
+        }
 
         let index = RunIndex::new(infos.iter().map(|info| info.id.as_str()));
         let runs = infos.into_iter().map(|info| Run { info, ..Run::default() }).collect();
@@ -143,5 +148,6 @@ pub(crate) fn has_truth(run: &Run) -> bool {
         && run.revisits.is_empty()
         && run.distances.is_empty()
         && run.walls.is_empty()
-        && !run.odometry.extra.contains_key(&ExtraChannel::GyroYawRate))
+        && run.headings.is_empty()
+        && !run.has_gyro())
 }

@@ -1,15 +1,16 @@
-//! The tables of partial measurements: revisits, distances and walls.
+//! The tables of partial measurements: revisits, distances, walls, and a gyroscope by its own instants.
 
 use super::columns::{PointIndex, TruthColumns};
 use super::manifest::why_no_id;
 use crate::error::DatasetError;
-use crate::partial::{Revisit, TapeDistance, WallReading};
+use crate::partial::{GyroSample, Revisit, TapeDistance, WallReading};
 use crate::record::Run;
 use crate::table::{Row, Table};
 
 pub(crate) const REVISIT: &str = "revisit.csv";
 pub(crate) const DISTANCE: &str = "distance.csv";
 pub(crate) const WALL: &str = "wall.csv";
+pub(crate) const GYRO: &str = "gyro.csv";
 
 /// Start and end of a row between two instants, in the order of the starts.
 fn interval(row: &Row<'_>, [t0, t1]: [usize; 2], before_s: Option<f64>) -> Result<[f64; 2], DatasetError> {
@@ -82,7 +83,7 @@ impl TruthColumns for RevisitColumns {
     }
 }
 
-fn nothing_measured(row: &Row<'_>, columns: &str) -> DatasetError {
+pub(super) fn nothing_measured(row: &Row<'_>, columns: &str) -> DatasetError {
     let message = format!("the row measures nothing; expected a value and its standard deviation: {columns}");
     DatasetError::Foreign { file: row.file(), line: row.line(), message }
 }
@@ -187,6 +188,36 @@ impl TruthColumns for WallColumns {
         let (distance_m, sigma_m) = distance.unzip();
         let (heading_rad, sigma_rad) = heading.unzip();
         run.walls.push(WallReading { t_s, wall, distance_m, heading_rad, sigma_m, sigma_rad });
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct GyroColumns {
+    t_s: usize,
+    omega_radps: usize,
+}
+
+impl GyroColumns {
+    pub(super) const KNOWN: &[&str] = &["t_s", "omega_radps"];
+
+    pub(super) fn find(table: &Table) -> Result<Self, DatasetError> {
+        Ok(Self { t_s: table.require("t_s")?, omega_radps: table.require("omega_radps")? })
+    }
+}
+
+impl TruthColumns for GyroColumns {
+    fn instant(&self) -> Option<usize> {
+        Some(self.t_s)
+    }
+
+    fn reserve(&self, run: &mut Run, rows: usize) {
+        run.gyro.reserve_exact(rows);
+    }
+
+    fn push(&self, row: &Row<'_>, run: &mut Run, _: &PointIndex) -> Result<(), DatasetError> {
+        let t_s = row.time_after(self.t_s, run.gyro.last().map(|before| before.t_s))?;
+        run.gyro.push(GyroSample { t_s, omega_radps: row.number(self.omega_radps)? });
         Ok(())
     }
 }

@@ -6,8 +6,12 @@ use std::path::Path;
 use kinematics::{Point, Wheels};
 
 use super::columns::{PointIndex, TruthColumns};
-use super::partial::{DISTANCE, DistanceColumns, REVISIT, RevisitColumns, WALL, WallColumns};
+use super::partial::{
+    DISTANCE, DistanceColumns, GYRO, GyroColumns, REVISIT, RevisitColumns, WALL, WallColumns, nothing_measured,
+};
 use crate::error::{DatasetError, shown};
+use crate::partial::HeadingReading;
+use crate::pose_covariance::PoseCovariance;
 use crate::record::{Displacement, PointReading, Run, TruthSample, TruthSigma, WheelSpeed};
 use crate::table::{MARKED_ROWS, RUN_COLUMN, Row, RunIndex, Survey, Table};
 use crate::warning::Warning;
@@ -17,57 +21,80 @@ pub(crate) const DISPLACEMENT: &str = "displacement.csv";
 pub(crate) const POINTS: &str = "points.csv";
 pub(crate) const WHEEL_REFERENCE: &str = "wheel_reference.csv";
 
+/// The columns of a table, or what it lacks.
+type Found = Result<Box<dyn TruthColumns>, DatasetError>;
+
 /// One kind of table: adding one is one line in [`KINDS`] and its columns.
 #[derive(Debug)]
 struct Kind {
     file: &'static str,
     header: &'static str,
     known: &'static [&'static str],
-    find: fn(&Table) -> Result<Box<dyn TruthColumns>, DatasetError>,
+    /// From its header, and the standard deviation of headings that the manifest states.
+    find: fn(&Table, Option<f64>) -> Found,
 }
 
-const KINDS: [Kind; 7] = [
+const KINDS: [Kind; 8] = [
     Kind {
         file: TRUTH,
         header: "a header like run,t_s,x_m,y_m,theta_rad",
-        known: &["t_s", "x_m", "y_m", "theta_rad", "sigma_xy_m", "sigma_theta_rad"],
-        find: |table| Ok(Box::new(PoseColumns::find(table)?)),
+        known: &[
+            "t_s",
+            "x_m",
+            "y_m",
+            "theta_rad",
+            "sigma_xy_m",
+            "sigma_theta_rad",
+            "cov_xx",
+            "cov_xy",
+            "cov_xt",
+            "cov_yy",
+            "cov_yt",
+            "cov_tt",
+        ],
+        find: |table, sigma_rad| Ok(Box::new(PoseColumns::find(table, sigma_rad)?)),
     },
     Kind {
         file: DISPLACEMENT,
         header: "a header like run,t0_s,t1_s,dx_m,dy_m,dtheta_rad",
         known: &["t0_s", "t1_s", "dx_m", "dy_m", "dtheta_rad"],
-        find: |table| Ok(Box::new(DisplacementColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(DisplacementColumns::find(table)?)),
     },
     Kind {
         file: POINTS,
         header: "a header like run,t_s,point,x_m,y_m",
         known: &["t_s", "point", "x_m", "y_m"],
-        find: |table| Ok(Box::new(PointColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(PointColumns::find(table)?)),
     },
     Kind {
         file: WHEEL_REFERENCE,
         header: "a header like run,t_s,left_mps,right_mps",
         known: &["t_s", "left_mps", "right_mps"],
-        find: |table| Ok(Box::new(WheelReferenceColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(WheelReferenceColumns::find(table)?)),
     },
     Kind {
         file: REVISIT,
         header: "a header like run,t0_s,t1_s,sigma_xy_m,sigma_theta_rad",
         known: RevisitColumns::KNOWN,
-        find: |table| Ok(Box::new(RevisitColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(RevisitColumns::find(table)?)),
     },
     Kind {
         file: DISTANCE,
         header: "a header like run,t0_s,t1_s,distance_m,sigma_m",
         known: DistanceColumns::KNOWN,
-        find: |table| Ok(Box::new(DistanceColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(DistanceColumns::find(table)?)),
     },
     Kind {
         file: WALL,
         header: "a header like run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad",
         known: WallColumns::KNOWN,
-        find: |table| Ok(Box::new(WallColumns::find(table)?)),
+        find: |table, _| Ok(Box::new(WallColumns::find(table)?)),
+    },
+    Kind {
+        file: GYRO,
+        header: "a header like run,t_s,omega_radps",
+        known: GyroColumns::KNOWN,
+        find: |table, _| Ok(Box::new(GyroColumns::find(table)?)),
     },
 ];
 
@@ -83,6 +110,7 @@ pub(super) struct TruthTable {
 pub(super) fn open_all(
     dir: &Path,
     has_gyro: bool,
+    heading_sigma_rad: Option<f64>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<TruthTable>, DatasetError> {
     let mut tables = Vec::new();
@@ -91,7 +119,7 @@ pub(super) fn open_all(
         if file.exists() {
             let table = Table::open(&file, kind.header)?;
             table.require(RUN_COLUMN)?;
-            let columns = (kind.find)(&table)?;
+            let columns = (kind.find)(&table, heading_sigma_rad)?;
             table.warn_of_unknown(kind.known, warnings);
             tables.push(TruthTable { name: kind.file, table, columns });
         }
@@ -166,28 +194,76 @@ struct PoseColumns {
     theta_rad: usize,
     sigma_xy_m: Option<usize>,
     sigma_theta_rad: Option<usize>,
+    /// In the order of [`PoseCovariance::COLUMNS`].
+    covariance: Option<[usize; 6]>,
+    /// Standard deviation of a heading whose row states none, radians.
+    stated_sigma_rad: Option<f64>,
 }
 
 impl PoseColumns {
-    fn find(table: &Table) -> Result<Self, DatasetError> {
+    fn find(table: &Table, stated_sigma_rad: Option<f64>) -> Result<Self, DatasetError> {
         Ok(Self {
+            stated_sigma_rad,
             t_s: table.require("t_s")?,
             x_m: table.require("x_m")?,
             y_m: table.require("y_m")?,
             theta_rad: table.require("theta_rad")?,
             sigma_xy_m: table.column("sigma_xy_m"),
             sigma_theta_rad: table.column("sigma_theta_rad"),
+            covariance: Self::covariance_columns(table)?,
         })
     }
 
-    fn sigma(&self, row: &Row<'_>) -> Result<TruthSigma, DatasetError> {
+    /// All six columns, or none.
+    fn covariance_columns(table: &Table) -> Result<Option<[usize; 6]>, DatasetError> {
+        if PoseCovariance::COLUMNS.iter().all(|name| table.column(name).is_none()) {
+            return Ok(None);
+        }
+        let mut columns = [0; 6];
+        for (column, name) in columns.iter_mut().zip(PoseCovariance::COLUMNS) {
+            *column = table.require(name)?;
+        }
+        Ok(Some(columns))
+    }
+
+    fn sigma(&self, row: &Row<'_>, has_heading: bool) -> Result<TruthSigma, DatasetError> {
         let of = |column: Option<usize>| column.map_or(Ok(None), |column| row.sigma(column));
-        Ok(TruthSigma { sigma_xy_m: of(self.sigma_xy_m)?, sigma_theta_rad: of(self.sigma_theta_rad)? })
+        let covariance = self.covariance.map_or(Ok(None), |columns| Self::covariance(row, columns))?;
+        Ok(TruthSigma {
+            sigma_xy_m: of(self.sigma_xy_m)?,
+            sigma_theta_rad: of(self.sigma_theta_rad)?,
+            covariance: covariance.and_then(|stated| if has_heading { Some(stated) } else { stated.of_position() }),
+        })
+    }
+
+    /// A row without a position.
+    fn heading(&self, row: &Row<'_>, t_s: f64, theta_rad: Option<f64>) -> Result<HeadingReading, DatasetError> {
+        let sigma = self.sigma(row, true)?;
+        let of_row = sigma.covariance.map(|of| of.tt_rad2.sqrt()).filter(|sigma| *sigma > 0.0);
+        let sigma_rad = of_row.or(sigma.sigma_theta_rad).or(self.stated_sigma_rad);
+        match theta_rad.zip(sigma_rad) {
+            Some((theta_rad, sigma_rad)) => Ok(HeadingReading { t_s, theta_rad, sigma_rad }),
+            None if theta_rad.is_none() => Err(nothing_measured(row, "x_m and y_m, or theta_rad, or all three")),
+            None => Err(nothing_measured(
+                row,
+                "sigma_theta_rad of a heading without a position, in the row or under [truth] in dataset.toml",
+            )),
+        }
+    }
+
+    /// The row's covariance; an empty cell is a zero.
+    fn covariance(row: &Row<'_>, columns: [usize; 6]) -> Result<Option<PoseCovariance>, DatasetError> {
+        let mut elements = [0.0; 6];
+        for (element, column) in elements.iter_mut().zip(columns) {
+            *element = row.optional_number(column)?.unwrap_or(0.0);
+        }
+        PoseCovariance::stated(elements).map_err(|why| DatasetError::ImpossibleCovariance {
+            file: row.file(),
+            line: row.line(),
+            why,
+        })
     }
 }
-
-/// Nothing is known of a sample's precision.
-pub(crate) const UNKNOWN_SIGMA: TruthSigma = TruthSigma { sigma_xy_m: None, sigma_theta_rad: None };
 
 impl TruthColumns for PoseColumns {
     fn instant(&self) -> Option<usize> {
@@ -199,14 +275,19 @@ impl TruthColumns for PoseColumns {
     }
 
     fn push(&self, row: &Row<'_>, run: &mut Run, _: &PointIndex) -> Result<(), DatasetError> {
-        let t_s = row.time_after(self.t_s, run.truth.last().map(|sample| sample.t_s))?;
+        let last_s = [run.truth.last().map(|sample| sample.t_s), run.headings.last().map(|heading| heading.t_s)];
+        let t_s = row.time_after(self.t_s, last_s.into_iter().flatten().reduce(f64::max))?;
         let theta_rad = row.optional_number(self.theta_rad)?;
+        if row.bytes(self.x_m).is_empty() && row.bytes(self.y_m).is_empty() {
+            run.headings.push(self.heading(row, t_s, theta_rad)?);
+            return Ok(());
+        }
         // A run gets the column once it has something to say: most tables never do.
-        let sigma = self.sigma(row)?;
-        if run.truth_sigma.is_none() && sigma != UNKNOWN_SIGMA {
+        let sigma = self.sigma(row, theta_rad.is_some())?;
+        if run.truth_sigma.is_none() && sigma != TruthSigma::UNKNOWN {
             let mut sigmas = Vec::new();
             sigmas.reserve_exact(run.truth.capacity());
-            sigmas.resize(run.truth.len(), UNKNOWN_SIGMA);
+            sigmas.resize(run.truth.len(), TruthSigma::UNKNOWN);
             run.truth_sigma = Some(sigmas);
         }
         if let Some(sigmas) = &mut run.truth_sigma {

@@ -6,6 +6,7 @@ use std::mem::{Discriminant, discriminant};
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::identity::parse_robot_id;
+use crate::pose_covariance::PoseCovariance;
 use crate::read::{has_truth, is_run_key, meant_quantity, why_no_id};
 use crate::record::{Dataset, Odometry, Run, RunInfo, WheelLog};
 
@@ -114,6 +115,10 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
         for one in sigmas {
             sigma("sigma_xy_m", one.sigma_xy_m)?;
             sigma("sigma_theta_rad", one.sigma_theta_rad)?;
+            if let Some(covariance) = one.covariance {
+                PoseCovariance::stated(covariance.elements())
+                    .map_err(|why| format!("a covariance of truth that is none: {why}"))?;
+            }
         }
     }
     increasing("displacements", run.displacements.iter().map(|step| step.t0_s))?;
@@ -122,6 +127,15 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
         ensure(step.t0_s < step.t1_s, || format!("a displacement from {} s to {} s", step.t0_s, step.t1_s))?;
     }
     check_partial(run)?;
+    increasing("gyro", run.gyro.iter().map(|sample| sample.t_s))?;
+    all_finite("gyro", run.gyro.iter().map(|sample| sample.omega_radps))?;
+    increasing("headings", run.headings.iter().map(|heading| heading.t_s))?;
+    for heading in &run.headings {
+        finite("heading", heading.theta_rad)?;
+        positive("a heading's standard deviation", heading.sigma_rad)?;
+        let is_apart = run.truth.binary_search_by(|sample| sample.t_s.total_cmp(&heading.t_s)).is_err();
+        ensure(is_apart, || format!("a heading and a pose at {} s", heading.t_s))?;
+    }
     increasing("wheel_reference", run.wheel_reference.iter().map(|speed| speed.t_s))?;
     let speeds = run.wheel_reference.iter().flat_map(|speed| [speed.speed_m_s.left, speed.speed_m_s.right]);
     all_finite("wheel_reference", speeds)?;
@@ -304,7 +318,7 @@ mod tests {
         fault("truth = inf", |set| set.runs[1].truth[0].x_m = f64::INFINITY);
         fault("truth at -1 s after 0 s", |set| set.runs[1].truth[1].t_s = -1.0);
         fault("not as long as truth", |set| {
-            set.runs[1].truth_sigma = Some(vec![TruthSigma { sigma_xy_m: None, sigma_theta_rad: None }]);
+            set.runs[1].truth_sigma = Some(vec![TruthSigma::UNKNOWN]);
         });
         fault("does not have", |set| set.runs[1].point_readings[0].point = 1);
         fault("read twice", |set| {

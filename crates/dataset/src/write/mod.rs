@@ -18,12 +18,14 @@ use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
 use crate::read::{
-    DISPLACEMENT, DISTANCE, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE,
+    DISPLACEMENT, DISTANCE, GYRO, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, REVISIT, TRUTH, WALL,
+    WHEEL_REFERENCE,
 };
 use crate::record::{Dataset, Run, RunInfo, WheelLog};
 
 /// Every file that a dataset may have; what [`Existing::ReplaceDataset`] may delete.
-const FILES: [&str; 9] = [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE, REVISIT, DISTANCE, WALL];
+const FILES: [&str; 10] =
+    [MANIFEST, ODOMETRY, TRUTH, DISPLACEMENT, POINTS, WHEEL_REFERENCE, REVISIT, DISTANCE, WALL, GYRO];
 
 /// What to do with something that stands where a dataset is to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,8 +4,12 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
-use crate::read::{DISPLACEMENT, DISTANCE, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE, wheel_columns};
-use crate::record::{ExtraChannel, MarkedPoint, Run, WheelLog};
+use crate::partial::HeadingReading;
+use crate::pose_covariance::PoseCovariance;
+use crate::read::{
+    DISPLACEMENT, DISTANCE, GYRO, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE, wheel_columns,
+};
+use crate::record::{ExtraChannel, MarkedPoint, Run, TruthSigma, WheelLog};
 use crate::table::quoted_where_needed;
 
 /// A table that is being written.
@@ -40,6 +44,7 @@ pub(super) struct OptionalColumns {
     extra: BTreeSet<ExtraChannel>,
     sigma_xy_m: bool,
     sigma_theta_rad: bool,
+    covariance: bool,
 }
 
 impl OptionalColumns {
@@ -50,6 +55,8 @@ impl OptionalColumns {
             let sigmas = || run.truth_sigma.iter().flatten();
             columns.sigma_xy_m |= sigmas().any(|sigma| sigma.sigma_xy_m.is_some());
             columns.sigma_theta_rad |= sigmas().any(|sigma| sigma.sigma_theta_rad.is_some());
+            columns.sigma_theta_rad |= !run.headings.is_empty();
+            columns.covariance |= sigmas().any(|sigma| sigma.covariance.is_some());
         }
         columns
     }
@@ -59,6 +66,7 @@ impl OptionalColumns {
         of_run.extra.is_subset(&self.extra)
             && self.sigma_xy_m >= of_run.sigma_xy_m
             && self.sigma_theta_rad >= of_run.sigma_theta_rad
+            && self.covariance >= of_run.covariance
     }
 }
 
@@ -70,9 +78,14 @@ pub(super) struct TableKind {
     pub(super) rows: fn(&Run, &[MarkedPoint], &OptionalColumns, &mut Out) -> io::Result<()>,
 }
 
-pub(super) const TABLES: [TableKind; 8] = [
+pub(super) const TABLES: [TableKind; 9] = [
     TableKind { file: ODOMETRY, has: |_| true, header: odometry_header, rows: odometry },
-    TableKind { file: TRUTH, has: |run| !run.truth.is_empty(), header: truth_header, rows: truth },
+    TableKind {
+        file: TRUTH,
+        has: |run| !(run.truth.is_empty() && run.headings.is_empty()),
+        header: truth_header,
+        rows: truth,
+    },
     TableKind {
         file: DISPLACEMENT,
         has: |run| !run.displacements.is_empty(),
@@ -108,6 +121,12 @@ pub(super) const TABLES: [TableKind; 8] = [
         has: |run| !run.walls.is_empty(),
         header: |_, _| "run,t_s,wall,distance_m,heading_rad,sigma_m,sigma_rad".to_owned(),
         rows: walls,
+    },
+    TableKind {
+        file: GYRO,
+        has: |run| !run.gyro.is_empty(),
+        header: |_, _| "run,t_s,omega_radps".to_owned(),
+        rows: gyro,
     },
 ];
 
@@ -147,28 +166,50 @@ fn odometry(run: &Run, _: &[MarkedPoint], columns: &OptionalColumns, out: &mut O
 fn truth_header(_: &Run, columns: &OptionalColumns) -> String {
     let sigma_xy_m = if columns.sigma_xy_m { ",sigma_xy_m" } else { "" };
     let sigma_theta_rad = if columns.sigma_theta_rad { ",sigma_theta_rad" } else { "" };
-    format!("run,t_s,x_m,y_m,theta_rad{sigma_xy_m}{sigma_theta_rad}")
+    let covariance = if columns.covariance { format!(",{}", PoseCovariance::COLUMNS.join(",")) } else { String::new() };
+    format!("run,t_s,x_m,y_m,theta_rad{sigma_xy_m}{sigma_theta_rad}{covariance}")
 }
 
+/// Poses and headings without a position, in the order of time.
 fn truth(run: &Run, _: &[MarkedPoint], columns: &OptionalColumns, out: &mut Out) -> io::Result<()> {
     let id = quoted_where_needed(&run.info.id);
+    let mut headings = run.headings.iter().peekable();
+    let heading = |of: &HeadingReading, out: &mut Out| {
+        let sigma = TruthSigma { sigma_theta_rad: Some(of.sigma_rad), ..TruthSigma::UNKNOWN };
+        truth_row(&id, of.t_s, [None, None, Some(of.theta_rad)], sigma, columns, out)
+    };
     for (row, sample) in run.truth.iter().enumerate() {
-        out.write_all(id.as_bytes())?;
-        numbers(out, [sample.t_s, sample.x_m, sample.y_m])?;
-        out.write_all(b",")?;
-        number(out, sample.theta_rad())?;
-        let sigma = run.truth_sigma.as_ref().map(|sigmas| sigmas[row]);
-        if columns.sigma_xy_m {
-            out.write_all(b",")?;
-            number(out, sigma.and_then(|sigma| sigma.sigma_xy_m))?;
+        while let Some(of) = headings.next_if(|of| of.t_s < sample.t_s) {
+            heading(of, out)?;
         }
-        if columns.sigma_theta_rad {
-            out.write_all(b",")?;
-            number(out, sigma.and_then(|sigma| sigma.sigma_theta_rad))?;
-        }
-        out.write_all(b"\n")?;
+        let sigma = run.truth_sigma.as_ref().map_or(TruthSigma::UNKNOWN, |sigmas| sigmas[row]);
+        let pose = [Some(sample.x_m), Some(sample.y_m), sample.theta_rad()];
+        truth_row(&id, sample.t_s, pose, sigma, columns, out)?;
     }
-    Ok(())
+    headings.try_for_each(|of| heading(of, out))
+}
+
+fn truth_row(
+    id: &str,
+    t_s: f64,
+    pose: [Option<f64>; 3],
+    sigma: TruthSigma,
+    columns: &OptionalColumns,
+    out: &mut Out,
+) -> io::Result<()> {
+    out.write_all(id.as_bytes())?;
+    numbers(out, [t_s])?;
+    optional(out, pose)?;
+    if columns.sigma_xy_m {
+        optional(out, [sigma.sigma_xy_m])?;
+    }
+    if columns.sigma_theta_rad {
+        optional(out, [sigma.sigma_theta_rad])?;
+    }
+    if columns.covariance {
+        optional(out, sigma.covariance.map_or([None; 6], |of| of.elements().map(Some)))?;
+    }
+    out.write_all(b"\n")
 }
 
 fn displacement(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
@@ -240,6 +281,16 @@ fn walls(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io
         numbers(out, [of.t_s])?;
         write!(out, ",{}", quoted_where_needed(&of.wall))?;
         optional(out, [of.distance_m, of.heading_rad, of.sigma_m, of.sigma_rad])?;
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+fn gyro(run: &Run, _: &[MarkedPoint], _: &OptionalColumns, out: &mut Out) -> io::Result<()> {
+    let id = quoted_where_needed(&run.info.id);
+    for sample in &run.gyro {
+        out.write_all(id.as_bytes())?;
+        numbers(out, [sample.t_s, sample.omega_radps])?;
         out.write_all(b"\n")?;
     }
     Ok(())

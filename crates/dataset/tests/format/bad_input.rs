@@ -241,7 +241,7 @@ fn unknown_and_redundant_columns_are_warned_of_and_kept_out() {
     let messages: Vec<_> = loaded.warnings.iter().map(ToString::to_string).collect();
     assert_eq!(messages.len(), 2, "{messages:?}");
     assert!(messages[0].contains("odometry.csv: column \"battery_V\" is not known and was left out"), "{messages:?}");
-    assert!(messages[1].contains("column v_mps was left out, because the table also has left_ticks"), "{messages:?}");
+    assert!(messages[1].contains("column v_mps was left out, because the dataset also has left_ticks"), "{messages:?}");
     assert_eq!(loaded.dataset.runs[0].odometry.extra.len(), 1);
     assert_eq!(loaded.dataset.runs[1].odometry.extra.len(), 0);
 }

@@ -63,3 +63,80 @@ fn a_map_is_stated_with_its_length_and_written_as_it_was_read() {
     assert!(with("map_sigma_theta_rad = 0.01").error().to_string().contains("map_length_m is missing"));
     assert!(with("map_sigma_xy_m = -0.01\nmap_length_m = 1.5").error().to_string().contains("map_sigma_xy_m"));
 }
+
+/// What is read, written and read again.
+fn again(dataset: &dataset::Dataset) -> dataset::Dataset {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("again");
+    dataset::write(dataset, &path, dataset::Existing::Refuse).expect("written");
+    read(&path).expect("readable").dataset
+}
+
+/// A row's covariance is read whole, in part or not at all, and what no covariance can be is refused with its
+/// line.
+#[test]
+fn covariances_of_rows_are_read_and_impossible_ones_named() {
+    let header = "run,t_s,x_m,y_m,theta_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt\n";
+    let with = |row: &str| Case::good().with("truth.csv", format!("{header}{row}\nb,0,0,0,0,,,,,,\n"));
+    let elements = |row: &str| {
+        let set = read(with(row).path()).expect("readable").dataset;
+        assert_eq!(again(&set).runs, set.runs, "{row}");
+        set.runs[0].truth_sigma.as_ref().and_then(|rows| rows[0].covariance).map(|of| of.elements())
+    };
+    let full = [4e-4, 1e-4, 2e-5, 1e-4, -1e-5, 1e-4];
+    assert_eq!(elements("a,0,0,0,0,4e-4,1e-4,2e-5,1e-4,-1e-5,1e-4"), Some(full));
+    // Without a heading its part says nothing; zeros are what drivers without a covariance write.
+    let position = [4e-4, 1e-4, 0.0, 1e-4, 0.0, 0.0];
+    assert_eq!(elements("a,0,0,0,,4e-4,1e-4,2e-5,1e-4,-1e-5,1e-4"), Some(position));
+    assert_eq!(elements("a,0,0,0,0,4e-4,1e-4,,1e-4,,"), Some(position));
+    assert_eq!(elements("a,0,0,0,0,0,0,0,0,0,0"), None);
+    let message = |row: &str| with(row).error().to_string();
+    for (row, why) in [
+        ("a,0,0,0,0,1e-4,2e-4,0,1e-4,0,1e-4", "not positive definite"),
+        ("a,0,0,0,0,-1,0,0,1,0,1", "a variance is negative"),
+        ("a,0,0,0,0,1,0,0.5,1,0,0", "beside a variance of zero"),
+    ] {
+        let found = message(row);
+        assert!(found.contains("truth.csv:2: cov_xx to cov_tt are no covariance") && found.contains(why), "{found}");
+    }
+    let lacking = Case::good().with("truth.csv", "run,t_s,x_m,y_m,theta_rad,cov_xx\na,0,0,0,0,1\n");
+    assert!(lacking.error().to_string().contains("cov_xy"));
+}
+
+/// Rows without a position are headings, among poses or alone.
+#[test]
+fn headings_without_a_position_are_read_with_their_sigma() {
+    let header = "run,t_s,x_m,y_m,theta_rad,sigma_theta_rad\n";
+    let rows = "a,0,,,0.5,0.01\na,0.1,1,2,0.6,\na,0.2,,,0.7,\nb,0,0,0,0,\n";
+    let case = |rows: &str| Case::good().with("truth.csv", format!("{header}{rows}"));
+    let toml = TOML.replace("[truth]", "[truth]\nsigma_theta_rad = 0.002");
+    let set = read(case(rows).with("dataset.toml", toml).path()).expect("readable").dataset;
+    let headings: Vec<_> = set.runs[0].headings.iter().map(|of| (of.t_s, of.theta_rad, of.sigma_rad)).collect();
+    // Where the row states none, the standard deviation is that of the manifest.
+    assert_eq!((headings, set.runs[0].truth.len()), (vec![(0.0, 0.5, 0.01), (0.2, 0.7, 0.002)], 1));
+    assert_eq!(again(&set).runs, set.runs);
+    let message = |case: Case| case.error().to_string();
+    assert!(message(case("a,0,,,,\nb,0,0,0,0,\n")).contains("truth.csv:2: the row measures nothing"));
+    assert!(message(case("a,0.1,1,2,0.6,\na,0,,,0.5,\nb,0,0,0,0,\n")).contains("truth.csv:3"));
+    assert!(message(case("a,0,1,,0.6,\nb,0,0,0,0,\n")).contains("y_m"));
+    assert!(message(case(rows)).contains("truth.csv:4: the row measures nothing; expected a value and its standard"));
+}
+
+/// A gyroscope with instants of its own: means over the rows' intervals.
+#[test]
+fn a_gyroscope_may_have_its_own_instants() {
+    let rows = "run,t_s,omega_radps\na,0,0.2\na,0.05,0.4\na,0.1,0.2\nb,0,0\nb,0.1,0.1\n";
+    let set = read(Case::good().with("gyro.csv", rows).without("truth.csv").path()).expect("readable").dataset;
+    let rates = set.runs[0].gyro_rates().expect("a gyroscope");
+    // Two trapezoids of 0.3 rad/s; sums of some 0.01 rad.
+    assert!(rates[0].is_nan() && (rates[1] - 0.3).abs() < 1e-12, "{rates:?}");
+    assert_eq!(again(&set).runs, set.runs);
+    let both = "run,t_s,left_ticks,right_ticks,gyro_radps\na,0,0,0,0\na,0.1,10,12,7\nb,0,5,5,0\nb,0.1,7,7,0\n";
+    let loaded = read(Case::good().with("gyro.csv", rows).with("odometry.csv", both).path()).expect("readable");
+    let rates = loaded.dataset.runs[0].gyro_rates().expect("a gyroscope");
+    assert!((rates[1] - 0.3).abs() < 1e-12, "{rates:?}");
+    let said: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|line| line.contains("gyro_radps") && line.contains("gyro.csv")), "{said:?}");
+    let back = rows.replace("a,0.1,0.2", "a,0.05,0.2");
+    assert!(Case::good().with("gyro.csv", back).error().to_string().contains("gyro.csv:4"));
+}

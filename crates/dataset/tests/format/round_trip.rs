@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use dataset::{
-    Dataset, Displacement, Existing, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, Revisit, Run, RunByRun, RunInfo, TapeDistance, Timestamp, TruthNoise, TruthSample,
-    TruthSigma, WallReading, WheelLog, WheelSpeed, read, write,
+    Dataset, Displacement, Existing, ExtraChannel, GyroSample, MarkedPoint, NominalRobot, Odometry, PointReading,
+    PoseCovariance, Protocol, ProtocolSettings, Provenance, Revisit, Run, RunByRun, RunInfo, TapeDistance, Timestamp,
+    TruthNoise, TruthSample, TruthSigma, WallReading, WheelLog, WheelSpeed, read, write,
 };
 use kinematics::{Point, Wheels};
 use proptest::collection::{btree_map, vec};
@@ -86,20 +86,41 @@ fn odometry(form: Form) -> impl Strategy<Value = Odometry> {
     })
 }
 
+/// L Lᵀ of a lower triangular L.
+fn covariance() -> impl Strategy<Value = PoseCovariance> {
+    ([0.01..10.0, 0.01..10.0, 0.01..10.0], [-1.0..1.0, -1.0..1.0, -1.0..1.0]).prop_map(|([a, c, f], [b, d, e])| {
+        let elements = [a * a, a * b, a * d, b * b + c * c, b * d + c * e, d * d + e * e + f * f];
+        PoseCovariance::stated(elements).expect("possible").expect("stated")
+    })
+}
+
 fn truth() -> impl Strategy<Value = (Vec<TruthSample>, Option<Vec<TruthSigma>>)> {
     (0_usize..5).prop_flat_map(|rows| {
         let poses = vec((number(), number(), option::of(number())), rows);
-        let sigmas = vec((option::of(positive()), option::of(positive())), rows);
+        let sigmas = vec((option::of(positive()), option::of(positive()), option::of(covariance())), rows);
         (times(rows), poses, sigmas).prop_map(|(times_s, poses, sigmas)| {
-            let samples = times_s.iter().zip(poses).map(|(&t_s, (x, y, theta))| TruthSample::new(t_s, x, y, theta));
-            let sigmas: Vec<_> = sigmas
+            let samples: Vec<_> =
+                times_s.iter().zip(poses).map(|(&t_s, (x, y, theta))| TruthSample::new(t_s, x, y, theta)).collect();
+            let mut sigmas: Vec<_> = sigmas
                 .into_iter()
-                .map(|(sigma_xy_m, sigma_theta_rad)| TruthSigma { sigma_xy_m, sigma_theta_rad })
+                .map(|(sigma_xy_m, sigma_theta_rad, covariance)| TruthSigma { sigma_xy_m, sigma_theta_rad, covariance })
                 .collect();
+            // Of a position, what a row states of the heading is left out.
+            for (sigma, _) in sigmas.iter_mut().zip(&samples).filter(|(_, sample)| sample.theta_rad().is_none()) {
+                sigma.covariance = sigma.covariance.and_then(|of| of.of_position());
+            }
             // Sigmas that are all unknown have no form of their own.
-            let known = sigmas.iter().any(|sigma| sigma.sigma_xy_m.is_some() || sigma.sigma_theta_rad.is_some());
-            (samples.collect(), known.then_some(sigmas))
+            let known = sigmas.iter().any(|sigma| *sigma != TruthSigma::UNKNOWN);
+            (samples, known.then_some(sigmas))
         })
+    })
+}
+
+fn gyro() -> impl Strategy<Value = Vec<GyroSample>> {
+    (0_usize..4).prop_flat_map(|rows| {
+        let sample = |(t_s, omega_radps)| GyroSample { t_s, omega_radps };
+        (times(rows), vec(number(), rows))
+            .prop_map(move |(t_s, rates)| t_s.into_iter().zip(rates).map(sample).collect())
     })
 }
 
@@ -195,20 +216,22 @@ fn covariates() -> impl Strategy<Value = BTreeMap<String, f64>> {
 }
 
 fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
-    let seen = (truth(), displacements(), point_readings(points), wheel_reference());
+    let seen = (truth(), displacements(), point_readings(points), wheel_reference(), gyro());
     (info(), odometry(form), seen, partial())
-        .prop_filter("a run needs some truth", |(_, _, ((truth, _), steps, readings, speeds), partial)| {
+        .prop_filter("a run needs some truth", |(_, _, ((truth, _), steps, readings, speeds, _), partial)| {
             let (revisits, distances, walls) = partial;
             !(truth.is_empty() && steps.is_empty() && readings.is_empty() && speeds.is_empty())
                 || !(revisits.is_empty() && distances.is_empty() && walls.is_empty())
         })
         .prop_map(|(info, odometry, seen, (revisits, distances, walls))| {
-            let ((truth, truth_sigma), displacements, point_readings, wheel_reference) = seen;
+            let ((truth, truth_sigma), displacements, point_readings, wheel_reference, gyro) = seen;
             Run {
                 info,
                 odometry,
                 truth,
                 truth_sigma,
+                headings: Vec::new(),
+                gyro,
                 displacements,
                 point_readings,
                 wheel_reference,

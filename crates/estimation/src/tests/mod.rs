@@ -10,6 +10,7 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
+mod correlated;
 mod partial;
 mod path_shape;
 mod rounding;

@@ -2,9 +2,10 @@
 //! differences; and against a robot that is known.
 
 use dataset::{
-    Dataset, Displacement, ExtraChannel, GyroNoise, Revisit, Run, TapeDistance, TruthNoise, WallReading, WheelLog,
+    Dataset, Displacement, ExtraChannel, GyroNoise, GyroSample, HeadingReading, Revisit, Run, TapeDistance, TruthNoise,
+    WallReading, WheelLog,
 };
-use kinematics::{Increment, Pose, Wheels};
+use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 
 use crate::normal_equations::total;
 use crate::pass::pass;
@@ -326,6 +327,48 @@ fn walls_determine_the_robot_with_headings_or_with_distances_alone() {
         assert!(fit.unobservable.is_empty(), "{parts:?} {:?}", fit.unobservable);
         let most = if parts[1] { 10.0 } else { 30.0 } * NOISELESS;
         assert!(errors(&fit).iter().all(|error| error.abs() < most), "{parts:?} {:?}", errors(&fit));
+    }
+}
+
+#[test]
+fn headings_alone_are_as_good_as_those_along_a_wall_whatever_they_count_from() {
+    let headed = |zero_rad: f64| {
+        dataset(NO_GYRO, move |run, poses| {
+            tape(run, poses, [40, 100], 0.0);
+            for row in [0, 100, 190, 280] {
+                let theta_rad = wrap_to_pi(poses[row].theta_rad + zero_rad);
+                run.headings.push(HeadingReading { t_s: run.odometry.t_s[row], theta_rad, sigma_rad: SIGMA_RAD });
+            }
+        })
+    };
+    let [north, east] = [headed(0.3), headed(2.0)];
+    let [north, east] = [fitted(&north), fitted(&east)];
+    assert!(north.unobservable.is_empty(), "{:?}", north.unobservable);
+    assert!(errors(&north).iter().all(|error| error.abs() < 10.0 * NOISELESS), "{:?}", errors(&north));
+    // Both converge to the steps' tolerance, far below the errors.
+    let apart = errors(&north).iter().zip(errors(&east)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart < NOISELESS, "{apart}");
+}
+
+#[test]
+fn rates_by_their_own_instants_are_means_over_the_rows() {
+    let own = |instantaneous: bool| {
+        let gyro = GyroNoise { is_instantaneous: instantaneous, ..GYRO };
+        dataset(gyro, |run, _| {
+            let rate = |number: u32| 0.1 + 0.3 * (0.37 * f64::from(number)).sin();
+            let sample = |number| GyroSample { t_s: 0.033 * f64::from(number) - 0.01, omega_radps: rate(number) };
+            run.gyro = (0..900).map(sample).collect();
+        })
+    };
+    let mut column = own(false);
+    for run in &mut column.runs {
+        let rates = run.gyro_rates().expect("a gyroscope").into_owned();
+        run.gyro.clear();
+        run.odometry.extra.insert(ExtraChannel::GyroYawRate, rates);
+    }
+    let expected = equations(&column, &nominal(), &noise());
+    for instantaneous in [false, true] {
+        assert_eq!(equations(&own(instantaneous), &nominal(), &noise()), expected);
     }
 }
 

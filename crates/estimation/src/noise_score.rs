@@ -1,0 +1,100 @@
+//! The score of the variances: what each measurement says of them.
+//!
+//! Measurements with independent components add theirs in [`crate::filter`], one after the other. Where
+//! errors of position and heading correlate, the components depend on the variances themselves; the whole
+//! measurement is taken at once, as the covariance of its errors alone depends on them.
+
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+
+use crate::covariances::Covariances;
+use crate::noise::{NOISES, NoiseComponent};
+use crate::noise_shape::NoiseShape;
+
+/// Score of the cost by the logarithms of the variances, and its information.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoiseScore {
+    pub(crate) gradient: Vector4<f64>,
+    pub(crate) information: Matrix4<f64>,
+}
+
+/// What the filter knows of a whole measurement before it takes it.
+pub(crate) struct JointUpdate {
+    pub(crate) shape: NoiseShape,
+    /// Variances of position and heading.
+    pub(crate) variance: [f64; 2],
+    /// Covariance of the pose.
+    pub(crate) covariance: Matrix3<f64>,
+    /// How the measured pose moves as the robot turns, in the room.
+    pub(crate) by_heading: Vector3<f64>,
+    /// What was measured less what was expected, in the room.
+    pub(crate) innovation: Vector3<f64>,
+    pub(crate) has_heading: bool,
+}
+
+impl NoiseScore {
+    pub(crate) fn zero() -> Self {
+        Self { gradient: Vector4::zeros(), information: Matrix4::zeros() }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self, weight: f64) {
+        self.gradient += weight * other.gradient;
+        self.information += weight * other.information;
+    }
+
+    /// Adds what a whole measurement says, and takes the derivatives of covariance and pose over it. With
+    /// S = H P Hᵀ + R, K = P Hᵀ S⁻¹ and ′ for a derivative, P′ ← P′ − P′Hᵀ Kᵀ − K H P′ + K S′ Kᵀ; Gupta &
+    /// Mehra 1974.
+    #[cold]
+    pub(crate) fn add_joint(
+        &mut self,
+        joint: &JointUpdate,
+        covariance_by: &mut Covariances<NOISES>,
+        pose_by_noise: &mut [[f64; NOISES]; 3],
+    ) {
+        let JointUpdate { shape, variance, covariance, by_heading, mut innovation, has_heading } = *joint;
+        let mut h = Matrix3::identity();
+        h.set_column(2, &by_heading);
+        let (mut noise, mut noise_by) = (shape.covariance(variance), shape.covariance_by(variance));
+        if !has_heading {
+            // A component of its own that says nothing.
+            h.row_mut(2).fill(0.0);
+            innovation.z = 0.0;
+            for noise in noise_by.iter_mut().chain([&mut noise]) {
+                noise.row_mut(2).fill(0.0);
+                noise.column_mut(2).fill(0.0);
+            }
+            noise[(2, 2)] = 1.0;
+        }
+        // A sum of a covariance and one that is positive definite.
+        let Some(inverse) = (h * covariance * h.transpose() + noise).try_inverse() else { return };
+        let gain = covariance * h.transpose() * inverse;
+        let weighted = inverse * innovation;
+        let (mut s_by, mut v_by) = ([Matrix3::zeros(); NOISES], [Vector3::zeros(); NOISES]);
+        let mut covariances = [Matrix3::zeros(); NOISES];
+        for a in 0..NOISES {
+            let before = covariance_by.matrix(a);
+            let ph = before * h.transpose();
+            s_by[a] = h * ph;
+            if a == NoiseComponent::MeasurementPosition as usize {
+                s_by[a] += noise_by[0];
+            } else if a == NoiseComponent::MeasurementHeading as usize {
+                s_by[a] += noise_by[1];
+            }
+            let pose_by = Vector3::new(pose_by_noise[0][a], pose_by_noise[1][a], pose_by_noise[2][a]);
+            v_by[a] = -(h * pose_by);
+            let moved = pose_by + (ph - gain * s_by[a]) * weighted + gain * v_by[a];
+            for (row, moved) in pose_by_noise.iter_mut().zip(moved.iter()) {
+                row[a] = *moved;
+            }
+            let half = ph * gain.transpose();
+            covariances[a] = before - half - half.transpose() + gain * s_by[a] * gain.transpose();
+        }
+        *covariance_by = Covariances::of(covariances.each_ref());
+        self.gradient += Vector4::from_fn(|a, _| {
+            0.5 * ((inverse * s_by[a]).trace() - weighted.dot(&(s_by[a] * weighted))) + v_by[a].dot(&weighted)
+        });
+        self.information += Matrix4::from_fn(|a, b| {
+            0.5 * (inverse * s_by[a] * inverse * s_by[b]).trace() + v_by[a].dot(&(inverse * v_by[b]))
+        });
+    }
+}
