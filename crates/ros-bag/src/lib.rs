@@ -5,6 +5,7 @@
 //! (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
 //! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
 //! `import` the dataset (`recorded` when).
+//! Every limit stands in `settings`.
 //! `listing` shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 
 mod bag;
@@ -26,6 +27,7 @@ mod recorded;
 mod recorder;
 mod resync;
 mod rows;
+mod settings;
 #[cfg(feature = "db3")]
 mod sqlite_file;
 mod topics;
@@ -33,6 +35,7 @@ mod truth;
 mod value;
 mod wheel_pair;
 mod wheels;
+mod yaml_size;
 
 pub use error::RosBagError;
 pub use import::{FromBag, Options, Took, TookTopic, import};

@@ -21,7 +21,8 @@ use crate::imported::Source;
 use crate::record::{
     Dataset, Displacement, NominalRobot, Odometry, Protocol, Provenance, Run, RunInfo, TruthNoise, WheelLog,
 };
-use crate::table::{LINE_LIMIT_BYTES, open_file};
+use crate::settings::LINE_LIMIT_BYTES;
+use crate::table::open_file;
 
 const EXPECTED: &str =
     "a .tuple file: objects like {\"T\": 0.79, \"phi_l\": 0.1, \"phi_r\": 0.1, \"sm\": [0.0, 0.0, 0.0]}";
