@@ -25,6 +25,17 @@ pub(crate) fn printable_json(text: &str) -> Cow<'_, str> {
     escaped(text, is_kept, |letter| format!("\\u{:04x}", u32::from(letter)))
 }
 
+/// Longest message, characters: the longest good one lists the effects that are known.
+const MAX_MESSAGE_CHARS: usize = 2000;
+
+/// A message as a terminal may have it: parsers show keys of any length.
+pub(crate) fn printable_message(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(MAX_MESSAGE_CHARS) {
+        Some((end, _)) => Cow::Owned(printable(&text[..end]).into_owned() + "…"),
+        None => printable(text),
+    }
+}
+
 fn escaped<'t>(text: &'t str, is_kept: impl Fn(char) -> bool, escape: impl Fn(char) -> String) -> Cow<'t, str> {
     if text.chars().all(&is_kept) {
         return Cow::Borrowed(text);
@@ -51,6 +62,13 @@ mod tests {
     fn no_command_reaches_a_terminal() {
         assert_eq!(printable("a\u{1b}[31m\r\nb\tc\u{9b}2J\u{202e}d"), "a\\u{1b}[31m\\u{d}\nb\tc\\u{9b}2J\\u{202e}d");
         assert!(matches!(printable("– σ² = 1 é 中"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_message_ends() {
+        let long = printable_message(&"é".repeat(100_000)).into_owned();
+        assert_eq!(long.chars().count(), MAX_MESSAGE_CHARS + 1);
+        assert_eq!(printable_message("short\u{7}"), "short\\u{7}");
     }
 
     #[test]

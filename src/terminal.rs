@@ -15,7 +15,7 @@ use dataset::{Dataset, Warning};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
-use crate::plain_text::{printable, printable_json};
+use crate::plain_text::{printable, printable_json, printable_message};
 use crate::sparse_lines::SparseLines;
 use crate::watch::Watch;
 
@@ -123,7 +123,7 @@ impl Terminal {
         if let Some(transcript) = &self.transcript {
             transcript.printed().remarks.push(text.to_owned());
         } else if !self.quiet {
-            let text = &*printable(text);
+            let text = &*printable_message(text);
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
                 Some(("warning", rest)) => format!("{WARNING}warning{WARNING:#}: {rest}"),
@@ -135,12 +135,11 @@ impl Terminal {
 
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
-        let message = in_plain_words(&message.replace('\n', "; "));
+        let message = in_plain_words(&printable_message(&message.replace('\n', "; ")));
         if let Some(transcript) = &self.transcript {
             transcript.printed().failure = Some(message);
             return;
         }
-        let message = printable(&message);
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
     }
 

@@ -109,7 +109,11 @@ fn force_deletes_a_dataset_and_nothing_else() {
     let temp = tempfile::tempdir().expect("a temporary folder");
     let at = temp.path();
     dataset(at, "old", "plain", ["a", "b"]);
-    write(at, "log.csv", "t,x,y,theta,left,right\n0,0,0,0,0,0\n1,0.1,0,0,10,10\n2,0.2,0,0,20,20\n");
+    write(
+        at,
+        "log.csv",
+        "t_s,x_m,y_m,theta_rad,left_ticks,right_ticks\n0,0,0,0,0,0\n1,1,0,0,9000,9000\n2,2,0,0,18000,18000\n",
+    );
     let import = [
         "import",
         "csv",
@@ -129,8 +133,9 @@ fn force_deletes_a_dataset_and_nothing_else() {
     // A folder that has the name of a table holds what nobody knows.
     fs::create_dir(at.join("old/wall.csv")).expect("made");
     write(at, "old/wall.csv/thesis.tex", "years of work");
-    let message = refusal(at, &import);
-    assert!(message.contains("holds more than a dataset"), "{message}");
+    let ended = run_in(at, &import);
+    assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+    assert!(ended.stderr.contains("holds more than a dataset"), "{}", ended.stderr);
     assert!(at.join("old/wall.csv/thesis.tex").exists() && at.join("old/truth.csv").exists());
     fs::remove_dir_all(at.join("old/wall.csv")).expect("removed");
     succeed(at, &import);
@@ -155,6 +160,9 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
     let temp = tempfile::tempdir().expect("a temporary folder");
     let at = temp.path();
     dataset(at, "set", HOSTILE, ["=1+1", "<b>run</b>"]);
+    let manifest = fs::read_to_string(at.join("set/dataset.toml")).expect("there");
+    let with_id = manifest.replace("[robot]\n", "[robot]\nid = \"=cmd|'/C calc'!A0<script>alert(2)</script>\"\n");
+    write(at, "set/dataset.toml", with_id);
     let all = |ended: &Ended| ended.stdout.clone() + &ended.stderr;
     succeed(at, &["calibrate", "set", "--out", "found.toml"]);
     let commands: [&[&str]; 6] = [
@@ -162,7 +170,7 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
         &["calibrate", "set", "--out-dir", "pages"],
         &["evaluate", "set", "--calibration", "found.toml", "--out-dir", "drift"],
         &["evaluate", "set", "--json"],
-        &["fleet", "set", "--calibrate-only", "--out", "fleet"],
+        &["fleet", "set", "--calibrate-only", "--csv", "fleet.csv", "--html", "fleet.html"],
         &["export", "tum", "set", "--out", "tum", "--force"],
     ];
     for command in commands {
@@ -170,7 +178,7 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
         no_command(&command.join(" "), &all(&ended));
         assert!(!all(&ended).contains("panicked"), "{}", ended.stderr);
     }
-    for page in ["pages/report.html", "drift/report.html", "fleet/report.html"] {
+    for page in ["pages/report.html", "drift/report.html", "fleet.html"] {
         let text = fs::read_to_string(at.join(page)).expect("a page");
         assert!(!text.contains("<script>alert") && !text.contains("<b>run</b>"), "{page}");
         assert!(
@@ -178,7 +186,7 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
             "{page}"
         );
     }
-    let table = fs::read_to_string(at.join("fleet/fleet.csv")).expect("a table");
+    let table = fs::read_to_string(at.join("fleet.csv")).expect("a table");
     let mut rows = csv::Reader::from_reader(table.as_bytes());
     for cell in rows.records().flat_map(|row| row.expect("a row").iter().map(str::to_owned).collect::<Vec<_>>()) {
         assert!(!cell.starts_with(['=', '+', '@']), "{cell}");
@@ -188,6 +196,6 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
     assert!(!header.contains("*/ int evil"), "{header}");
     let yaml = succeed(at, &["export", "ros2-yaml", "found.toml"]).stdout;
     yaml_rust2::YamlLoader::load_from_str(&yaml).expect("YAML");
-    // The id of a run is a file's name only where it is a plain one.
-    assert!(!at.join("tum").exists() || at.join("tum").read_dir().expect("readable").count() < 2);
+    // The id of a run is a file's name only where it is a plain one; nothing is written otherwise.
+    assert!(!at.join("tum").exists());
 }

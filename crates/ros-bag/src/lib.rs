@@ -1,6 +1,6 @@
 //! Bags of ROS 2 as datasets.
 //!
-//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`decompress`,
+//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`record_fields`, `decompress`,
 //! `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr` messages
 //! (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
 //! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
@@ -23,6 +23,7 @@ mod known_types;
 mod listing;
 mod mcap_file;
 mod messages;
+mod record_fields;
 mod recorded;
 mod recorder;
 mod resync;

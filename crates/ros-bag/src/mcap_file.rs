@@ -9,11 +9,12 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use mcap::records::{Record, op};
+use mcap::records::op;
 use ruzstd::decoding::StreamingDecoder;
 
 use crate::decompress::{decompress, expansion_limit_bytes};
 use crate::error::RosBagError;
+use crate::record_fields::Fields;
 use crate::resync::next_chunk;
 use crate::settings::{MAX_BREAKS, MAX_CHUNK_BYTES, MAX_DECLARED_BYTES, MAX_TOLD};
 
@@ -294,56 +295,67 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
     }
 
     /// Counts the bytes of a schema or a channel in place of those that it replaces, as writers repeat them in
-    /// every chunk; why it is left out, where it is.
-    fn no_room(&mut self, bytes: usize, replaced_bytes: usize) -> Option<String> {
+    /// every chunk; an error where there is no room for it.
+    fn make_room(&mut self, bytes: usize, replaced_bytes: usize) -> Result<(), String> {
         let declared_bytes = self.declared_bytes.saturating_sub(replaced_bytes) + bytes;
         if declared_bytes > MAX_DECLARED_BYTES {
             let most = MAX_DECLARED_BYTES >> 20;
-            return Some(format!("schemas and channels of more than {most} MiB; one was left out"));
+            return Err(format!("schemas and channels of more than {most} MiB; one was left out"));
         }
         self.declared_bytes = declared_bytes;
-        None
+        Ok(())
     }
 
     /// One record that is no chunk; the inner error is a fault of its bytes.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<Result<(), String>, RosBagError> {
-        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
-            return Ok(Ok(()));
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Schema { header, data }) => {
-                let text = String::from_utf8_lossy(&data).into_owned();
-                let schema = Schema { name: header.name, encoding: header.encoding, text };
-                let replaced_bytes = self.schemas.get(&header.id).map_or(0, Schema::bytes);
-                if let Some(why) = self.no_room(schema.bytes(), replaced_bytes) {
-                    return Ok(Err(why));
+        match opcode {
+            op::SCHEMA => Ok(self.schema(Fields(body))),
+            op::CHANNEL => Ok(self.channel(Fields(body))),
+            op::MESSAGE => {
+                let mut fields = Fields(body);
+                let head = (|| {
+                    let id = fields.u16()?;
+                    // Its number in the sequence.
+                    fields.skip(4)?;
+                    let log_time_ns = fields.u64()?;
+                    // The time of publication.
+                    fields.skip(8)?;
+                    let undeclared = || format!("a message of channel {id}, which was not declared");
+                    Ok((self.channels.get(&id).ok_or_else(undeclared)?, log_time_ns))
+                })();
+                match head {
+                    Ok((channel, log_time_ns)) => (self.visit)(channel, log_time_ns, fields.0).map(Ok),
+                    Err(why) => Ok(Err(why)),
                 }
-                self.schemas.insert(header.id, schema);
             }
-            Ok(Record::Channel(channel)) => {
-                let schema = self.schemas.get(&channel.schema_id);
-                let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
-                let declared = Channel {
-                    topic: channel.topic,
-                    message_encoding: channel.message_encoding,
-                    type_name: of(|schema| &schema.name),
-                    schema_encoding: of(|schema| &schema.encoding),
-                    definition: of(|schema| &schema.text),
-                };
-                let replaced_bytes = self.channels.get(&channel.id).map_or(0, Channel::bytes);
-                if let Some(why) = self.no_room(declared.bytes(), replaced_bytes) {
-                    return Ok(Err(why));
-                }
-                self.channels.insert(channel.id, declared);
-            }
-            Ok(Record::Message { header, data }) => match self.channels.get(&header.channel_id) {
-                Some(channel) => (self.visit)(channel, header.log_time, &data)?,
-                None => return Ok(Err(format!("a message of channel {}, which was not declared", header.channel_id))),
-            },
-            Ok(_) => {}
-            Err(error) => return Ok(Err(format!("a record is damaged: {error}"))),
+            _ => Ok(Ok(())),
         }
-        Ok(Ok(()))
+    }
+
+    fn schema(&mut self, mut fields: Fields<'_>) -> Result<(), String> {
+        let id = fields.u16()?;
+        let (name, encoding) = (fields.text()?, fields.text()?);
+        let schema = Schema { name, encoding, text: String::from_utf8_lossy(fields.bytes()?).into_owned() };
+        self.make_room(schema.bytes(), self.schemas.get(&id).map_or(0, Schema::bytes))?;
+        self.schemas.insert(id, schema);
+        Ok(())
+    }
+
+    fn channel(&mut self, mut fields: Fields<'_>) -> Result<(), String> {
+        let (id, schema) = (fields.u16()?, fields.u16()?);
+        let (topic, message_encoding) = (fields.text()?, fields.text()?);
+        let schema = self.schemas.get(&schema);
+        let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
+        let declared = Channel {
+            topic,
+            message_encoding,
+            type_name: of(|schema| &schema.name),
+            schema_encoding: of(|schema| &schema.encoding),
+            definition: of(|schema| &schema.text),
+        };
+        self.make_room(declared.bytes(), self.channels.get(&id).map_or(0, Channel::bytes))?;
+        self.channels.insert(id, declared);
+        Ok(())
     }
 }
 

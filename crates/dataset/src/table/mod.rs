@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::column_names::{Quantity, likely_mapping};
 use crate::error::{DatasetError, shown};
-use crate::settings::MAX_ROWS;
+use crate::settings::{MAX_COUNT, MAX_ROWS};
 use crate::warning::Warning;
 use fields::Fields;
 use lines::{Line, Lines};
@@ -386,7 +386,9 @@ impl Row<'_> {
             }
             _ => Err(()),
         };
-        text.parse().or_else(whole).map_err(|()| {
+        let is_count = |count: &i64| count.unsigned_abs() <= MAX_COUNT;
+        let parsed = text.parse().or_else(whole);
+        parsed.ok().filter(is_count).ok_or_else(|| {
             let (file, line, column) = (self.file(), self.line(), self.name(column));
             let found = shown(text.as_bytes());
             match text.parse::<f64>() {
