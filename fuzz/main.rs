@@ -34,7 +34,7 @@ const MAX_SECONDS: f64 = 20.0;
 const MAX_BYTES: usize = 1 << 30;
 
 /// Executions of each target in `cargo test`, before its cost divides them.
-const SMOKE_EXECUTIONS: u64 = 120;
+const SMOKE_EXECUTIONS: u64 = 40;
 
 /// How an execution ended.
 enum Ended {
@@ -89,7 +89,7 @@ fn no_reader_and_no_calibrator_falls_over_mutated_input() {
     for target in TARGETS {
         let corpus = (target.corpus)();
         let (mut accepted, mut refused) = (0, 0);
-        for number in 0..(SMOKE_EXECUTIONS / target.cost).max(4) {
+        for number in 0..(SMOKE_EXECUTIONS / target.cost).max(6) {
             match emptied(&folder, |inside| execute(target, &corpus, number, inside)) {
                 Ended::Accepted => accepted += 1,
                 Ended::Refused => refused += 1,

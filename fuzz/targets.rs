@@ -83,7 +83,7 @@ fn refused(error: &dyn std::error::Error) -> bool {
     false
 }
 
-/// What was imported can be written, and reads back equal.
+/// What was read can be written, and reads back equal.
 fn round_trip(dataset: &Dataset, at: &Path) -> bool {
     let out = at.join("again");
     dataset::write(dataset, &out, Existing::Refuse).expect("what was read can be written");
@@ -148,7 +148,11 @@ fn import(format: &str, all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Pa
         Ok(sessions) => sessions.iter().enumerate().all(|(number, session)| {
             let folder = at.join(number.to_string());
             fs::create_dir_all(&folder).expect("made");
-            round_trip(&session.dataset, &folder)
+            // The writer refuses counts that no counter reaches; the sums of a log may.
+            match dataset::check_writable(&session.dataset) {
+                Err(error) if error.to_string().contains("a count beyond") => refused(&error),
+                _ => round_trip(&session.dataset, &folder),
+            }
         }),
     }
 }

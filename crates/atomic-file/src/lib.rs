@@ -1,5 +1,5 @@
-//! Results written in one piece: a file is whole under its name, or it is not there; and files of bounded size
-//! read.
+//! Results written in one piece: a file is whole under its name, or it is not there; and files read up to a
+//! limit.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
