@@ -1,6 +1,6 @@
 //! What `import csv` and `import ros2` ask of the robot, and how they ask for it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -92,7 +92,7 @@ pub(crate) fn rates() -> impl TypedValueParser<Value = Rates> {
 const MAX_ROBOT_BYTES: u64 = 4 << 20;
 
 /// The robot of a dataset.toml.
-fn read_robot(file: &PathBuf) -> Result<NominalRobot, Failure> {
+fn read_robot(file: &Path) -> Result<NominalRobot, Failure> {
     #[derive(Deserialize)]
     struct WithRobot {
         robot: toml::Table,
