@@ -67,3 +67,7 @@ browser:
 # Take the documents' screenshots of the pages anew; needs node and Chromium
 pictures:
     .ci/run pictures
+
+# Mutated input for every reader, 20 minutes of processor time each; docs/reliability.md has its table
+fuzz:
+    .ci/run fuzz

@@ -81,8 +81,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     for file in &files.written {
         let target = out.join(file);
-        let folder = target.parent().unwrap_or(out);
-        let moved = std::fs::create_dir_all(folder).and_then(|()| std::fs::rename(waiting.path().join(file), &target));
+        let inside = file.parent().unwrap_or(Path::new(""));
+        let moved =
+            atomic_file::create_inside(out, inside).and_then(|()| std::fs::rename(waiting.path().join(file), &target));
         moved.map_err(|error| format!("{}: {error}", target.display()))?;
     }
     calibration.remark(terminal);

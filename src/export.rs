@@ -378,9 +378,11 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
     let text = match (&arguments.out, &texts[..]) {
         (Some(out), _) => {
+            // All names before the first file.
+            let files = texts.iter().map(|(id, _)| file_of(out, id, TUM, &place)).collect::<Result<Vec<_>, _>>()?;
             std::fs::create_dir_all(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
-            for (id, text) in &texts {
-                write_whole(&file_of(out, id, TUM, &place)?, text.as_bytes())?;
+            for (file, (_, text)) in files.iter().zip(&texts) {
+                write_whole(file, text.as_bytes())?;
             }
             terminal.say(&format!("{} runs in {}", texts.len(), out.display()))?;
             None

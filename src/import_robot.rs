@@ -1,6 +1,6 @@
 //! What `import csv` and `import ros2` ask of the robot, and how they ask for it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -88,14 +88,19 @@ pub(crate) fn rates() -> impl TypedValueParser<Value = Rates> {
     named(&[Rates::IntervalEnd, Rates::Instantaneous], Rates::name)
 }
 
+/// Longest file of --robot, bytes: that of a dataset.toml.
+const MAX_ROBOT_BYTES: u64 = 4 << 20;
+
 /// The robot of a dataset.toml.
-fn read_robot(file: &PathBuf) -> Result<NominalRobot, Failure> {
+fn read_robot(file: &Path) -> Result<NominalRobot, Failure> {
     #[derive(Deserialize)]
     struct WithRobot {
         robot: toml::Table,
     }
     let no_robot = |error: toml::de::Error| format!("{}: no [robot] of a dataset: {}", file.display(), error.message());
-    let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let bytes = atomic_file::read_at_most(file, MAX_ROBOT_BYTES);
+    let text = bytes.and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
+    let text = text.map_err(|error| format!("{}: {error}", file.display()))?;
     let WithRobot { mut robot } = toml::from_str(&text).map_err(no_robot)?;
     // Robots of one kind may share the file: --robot-id says which one this is.
     robot.remove("id");

@@ -59,6 +59,7 @@ mod import_ros2;
 mod import_tum;
 mod manual;
 mod merge;
+mod plain_text;
 mod plan;
 mod reproduce;
 mod session_identity;

@@ -15,6 +15,7 @@ use dataset::{Dataset, Warning};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
+use crate::plain_text::{printable, printable_json, printable_message};
 use crate::sparse_lines::SparseLines;
 use crate::watch::Watch;
 
@@ -100,7 +101,7 @@ impl Terminal {
     /// A result for people; not printed beside JSON.
     pub(crate) fn say(&self, text: &str) -> Result<(), Failure> {
         if !self.json {
-            writeln_to_stdout(text)?;
+            writeln_to_stdout(&printable(text))?;
         }
         Ok(())
     }
@@ -111,7 +112,7 @@ impl Terminal {
             let text = serde_json::to_string_pretty(document)?;
             match &self.transcript {
                 Some(transcript) => transcript.printed().document = Some(text),
-                None => writeln_to_stdout(&text)?,
+                None => writeln_to_stdout(&printable_json(&text))?,
             }
         }
         Ok(())
@@ -122,6 +123,7 @@ impl Terminal {
         if let Some(transcript) = &self.transcript {
             transcript.printed().remarks.push(text.to_owned());
         } else if !self.quiet {
+            let text = &*printable_message(text);
             let text = match text.split_once(": ") {
                 Some(("error", rest)) => format!("{ERROR}error{ERROR:#}: {rest}"),
                 Some(("warning", rest)) => format!("{WARNING}warning{WARNING:#}: {rest}"),
@@ -133,7 +135,7 @@ impl Terminal {
 
     /// The one message of a failure, on standard error even when quiet.
     pub(crate) fn failure(&self, message: &str) {
-        let message = in_plain_words(&message.replace('\n', "; "));
+        let message = in_plain_words(&printable_message(&message.replace('\n', "; ")));
         if let Some(transcript) = &self.transcript {
             transcript.printed().failure = Some(message);
             return;

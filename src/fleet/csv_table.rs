@@ -2,6 +2,7 @@
 
 use ::fleet::{Fleet, FleetSession, Robot};
 
+use crate::plain_text::spreadsheet_cell;
 use crate::terminal::Failure;
 
 const HEADER: [&str; 18] = [
@@ -44,8 +45,8 @@ fn row(robot: &Robot, session: &FleetSession) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
     let mut row = vec![
         robot.rank.to_string(),
-        robot.id.clone(),
-        session.dataset.clone(),
+        spreadsheet_cell(&robot.id).into_owned(),
+        spreadsheet_cell(&session.dataset).into_owned(),
         result.recorded.map_or_else(String::new, |recorded| recorded.to_string()),
         result.runs.to_string(),
         number(result.drift_percent.nominal),

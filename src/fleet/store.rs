@@ -14,6 +14,9 @@ use crate::terminal::{Failure, is_dataset};
 /// Counts changes of what is found and kept within a version of the program.
 const GENERATION: u32 = 1;
 
+/// Longest result that is kept, bytes; some kilobytes are usual.
+const MAX_RESULT_BYTES: u64 = 64 << 20;
+
 /// Bytes of a file that are hashed at once.
 const BLOCK_BYTES: usize = 1 << 16;
 
@@ -34,7 +37,8 @@ impl SessionStore {
             other => other.to_string(),
         })?;
         let folder = out.join("sessions");
-        std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        atomic_file::create_inside(out, Path::new("sessions"))
+            .map_err(|error| format!("{}: {error}", folder.display()))?;
         Ok(Self { folder, out: out.to_owned(), lock })
     }
 
@@ -51,7 +55,7 @@ impl SessionStore {
 
     /// What is kept; `None` where nothing is, or what is there cannot be read: it is then found anew.
     pub(super) fn read(&self, key: &str) -> Option<SessionResult> {
-        serde_json::from_slice(&std::fs::read(self.file(key)).ok()?).ok()
+        serde_json::from_slice(&atomic_file::read_at_most(&self.file(key), MAX_RESULT_BYTES).ok()?).ok()
     }
 
     /// Keeps what was found.

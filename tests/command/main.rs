@@ -18,6 +18,7 @@ mod import_ros2;
 mod import_tum;
 #[cfg(unix)]
 mod interrupt;
+mod limits;
 mod pages;
 mod partial;
 mod pose_errors;

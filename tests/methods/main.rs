@@ -5,6 +5,7 @@ mod all_methods;
 mod closed_form;
 mod cramer_rao;
 mod fleet_campaign;
+mod invariances;
 mod joint;
 mod khepera_logs;
 mod one_step;

@@ -10,6 +10,8 @@
 //! (k + 1)/(n + 2) of k in n, so that none in n does not forbid the first. Both tests are one-sided. The
 //! former finds less than the latter where all cases are new, and far more where they are the same.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -18,6 +20,9 @@ use super::case::CaseKind;
 use super::error::ChallengeError;
 use super::measure::{is_first_name_right, is_plain};
 use super::result::CaseResult;
+
+/// Longest baseline, bytes; what is longer is cut off, and then no JSON.
+const MAX_BASELINE_BYTES: u64 = 64 << 20;
 
 /// Probability that a whole comparison finds an equally good tool worse.
 pub const FALSE_ALARM_BUDGET: f64 = 0.01;
@@ -126,7 +131,9 @@ impl DiagnosisBaseline {
     /// [`ChallengeError::Baseline`] when it cannot be read or is none.
     pub fn read(path: &Path) -> Result<Self, ChallengeError> {
         let failed = |why: String| ChallengeError::Baseline { path: path.display().to_string(), why };
-        let bytes = std::fs::read(path).map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
+        let mut bytes = Vec::new();
+        let file = File::open(path).map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
+        file.take(MAX_BASELINE_BYTES).read_to_end(&mut bytes).map_err(|error| failed(error.to_string()))?;
         serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))
     }
 

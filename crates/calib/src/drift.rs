@@ -224,6 +224,12 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory, pose_errors: Option<&Pos
     if largest.is_none() {
         return unknown(run, length_m, "the truth does not overlap the odometry in time");
     }
+    // Sums and squares follow.
+    let is_number = |value: f64| (value * value).is_finite();
+    let ends = [largest, last].into_iter().flatten().flat_map(|(position_m, heading_rad)| [position_m, heading_rad]);
+    if !ends.chain([length_m]).all(is_number) {
+        return unknown(run, 0.0, "its lengths are beyond the range of numbers: look for a wrong unit or count");
+    }
     let path_errors = pose_errors.map(|options| PathErrors::of(&reference, &estimate, options));
     let statistics = |of: fn(&PathErrors) -> &Result<PoseErrors, &'static str>| {
         path_errors.as_ref().map(|errors| PoseErrorStatistics::of(of(errors).as_ref().map_err(|why| *why)))

@@ -210,6 +210,8 @@ impl Calibration {
             Parameter::CommonScale => return None,
         };
         let sigma = self.covariance.as_ref().map(|covariance| covariance[(row, row)].sqrt() * factor);
+        // A variance that the arithmetic could not hold tells nothing.
+        let sigma = sigma.filter(|sigma| sigma.is_finite());
         Some(Estimate { parameter, value: value * factor, sigma })
     }
 
@@ -218,6 +220,7 @@ impl Calibration {
         let row = Parameter::EXTRINSICS.iter().position(|of| *of == parameter)?;
         let Pose { x_m, y_m, theta_rad } = extrinsics.body_from_sensor;
         let sigma = extrinsics.covariance.map(|covariance| covariance[(row, row)].sqrt());
+        let sigma = sigma.filter(|sigma| sigma.is_finite());
         Some(Estimate { parameter, value: [x_m, y_m, theta_rad][row], sigma })
     }
 

@@ -6,6 +6,8 @@
 
 use std::path::PathBuf;
 
+use crate::settings::SHOWN_CHARS;
+
 /// Why a dataset was not read, written or imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -74,6 +76,22 @@ pub enum DatasetError {
         file: PathBuf,
         /// The most that is accepted, bytes.
         limit_bytes: u64,
+    },
+    /// A table has more rows than are read.
+    #[error("{file}: more than {max_rows} rows; split the dataset by runs")]
+    TooManyRows {
+        /// The file.
+        file: PathBuf,
+        /// The most that is accepted.
+        max_rows: usize,
+    },
+    /// A link of a dataset leads out of its folder.
+    #[error("{file}: a link to {target}, outside of the dataset; put a copy of the file there")]
+    LinkOutside {
+        /// The link.
+        file: PathBuf,
+        /// Where it leads.
+        target: PathBuf,
     },
     /// A line, or one record of a file that has no lines, is longer than any record can sensibly be.
     #[error("{file}:{line}: line longer than {limit_bytes} bytes; is this the right file?")]
@@ -420,9 +438,6 @@ fn with_comma(found: &str) -> &'static str {
     let is_decimal = found.contains(',') && found.replacen(',', ".", 1).parse::<f64>().is_ok();
     if is_decimal { ", with a decimal point and no comma" } else { "" }
 }
-
-/// Longest text of a file that a message shows, characters.
-const SHOWN_CHARS: usize = 60;
 
 /// Text found in a file as a message may show it: on one line, escaped and clipped.
 pub(crate) fn shown(found: &[u8]) -> String {

@@ -24,6 +24,7 @@ mod record;
 mod row_lengths;
 mod sampling_period;
 mod session;
+mod settings;
 mod standstills;
 mod table;
 mod unit;

@@ -39,11 +39,18 @@ pub(crate) fn p_of_z(z: f64) -> f64 {
 
 /// Two-sided p-value of a Student variable.
 pub(crate) fn p_of_student(t: f64, freedom: f64) -> f64 {
+    // Of columns without scatter there is no statistic, and no evidence.
+    if t.is_nan() {
+        return 1.0;
+    }
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| 2.0 * student.sf(t.abs()))
 }
 
 /// Upper tail of a Student variable.
 pub(crate) fn p_of_upper_student(t: f64, freedom: f64) -> f64 {
+    if t.is_nan() {
+        return 1.0;
+    }
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| student.sf(t))
 }
 

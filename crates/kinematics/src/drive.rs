@@ -10,7 +10,7 @@ use crate::{Frame, Pose, Wheels};
 #[non_exhaustive]
 pub enum GeometryError {
     /// A length or a scale that must be positive and finite is not.
-    #[error("{quantity} is {value}; it must be positive and finite")]
+    #[error("{quantity} {}; it must be positive and finite", if value.is_finite() { format!("is {value}") } else { "has no finite value".to_owned() })]
     NotPositive {
         /// Which quantity, with its unit suffix.
         quantity: &'static str,

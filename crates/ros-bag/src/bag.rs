@@ -6,13 +6,12 @@ use std::path::{Path, PathBuf};
 
 use yaml_rust2::{Yaml, YamlLoader};
 
-use crate::decompress::decompress;
+use crate::decompress::{decompress, expansion_limit_bytes};
 use crate::error::RosBagError;
 use crate::known_types::KnownTypes;
-use crate::mcap_file::{self, Channel, Losses};
-
-/// Longest `metadata.yaml` that is read, bytes: a kilobyte a topic and file, and some ten thousand of these.
-const MAX_METADATA_BYTES: u64 = 16 << 20;
+use crate::mcap_file::{self, Channel, Losses, expands_beyond};
+use crate::settings::MAX_METADATA_BYTES;
+use crate::yaml_size::expanded_nodes;
 
 /// A bag's files in order.
 pub(crate) struct Bag {
@@ -97,8 +96,14 @@ impl Bag {
                 continue;
             }
             let mut faulty = 0_u64;
+            let mut expanded_bytes = 0;
+            let limit_bytes = expansion_limit_bytes(fs::metadata(file).map_or(0, |metadata| metadata.len()));
             let mut decompressed = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
                 let whole = decompress("zstd", message);
+                expanded_bytes += whole.bytes.len() as u64;
+                if expanded_bytes > limit_bytes {
+                    return Err(expands_beyond(file, limit_bytes));
+                }
                 if whole.fault.is_some() {
                     faulty += 1;
                     return Ok(());
@@ -170,6 +175,7 @@ impl Metadata {
             return Err(wrong(format!("longer than {} MiB", MAX_METADATA_BYTES >> 20)));
         }
         let text = String::from_utf8_lossy(&fs::read(file).map_err(io)?).into_owned();
+        expanded_nodes(&text).map_err(&wrong)?;
         let documents = YamlLoader::load_from_str(&text).map_err(|error| wrong(format!("no YAML: {error}")))?;
         let bag = documents.first().map_or(&Yaml::BadValue, |document| &document["rosbag2_bagfile_information"]);
         let files = bag["relative_file_paths"].as_vec().map_or(&[][..], Vec::as_slice);
@@ -206,6 +212,27 @@ mod tests {
         let names: Vec<_> = bag.files.iter().map(|file| file.file_name().unwrap_or_default().to_owned()).collect();
         assert_eq!(names, ["a_2.mcap", "a_10.mcap"]);
         assert!(bag.remarks[0].contains("its 2 files were read as one bag"), "{:?}", bag.remarks);
+    }
+
+    #[test]
+    fn no_path_of_metadata_leaves_the_folder_and_no_alias_multiplies() {
+        let names = |text: &str| {
+            let folder = folder(&[("metadata.yaml", text), ("a.mcap", "")]);
+            let bag = Bag::open(folder.path(), &[])?;
+            assert!(bag.files.iter().all(|file| file.parent() == Some(folder.path())), "{:?}", bag.files);
+            Ok::<_, RosBagError>(bag.files.len())
+        };
+        let yaml = |path: &str| format!("rosbag2_bagfile_information:\n  relative_file_paths: [{path}]\n");
+        assert_eq!(names(&yaml("../../elsewhere/a.mcap")).expect("a bag"), 1);
+        for outside in ["/etc/passwd", "../secret.mcap", ".."] {
+            assert!(names(&yaml(outside)).is_err(), "{outside}");
+        }
+        let mut bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
+        for level in 1..10 {
+            bomb += &format!("a{level}: &a{level} [{}]\n", vec![format!("*a{}", level - 1); 10].join(", "));
+        }
+        let refused = names(&(bomb + &yaml("a.mcap"))).expect_err("10¹⁰ nodes").to_string();
+        assert!(refused.contains("aliases"), "{refused}");
     }
 
     #[test]

@@ -5,13 +5,8 @@
 //! NUL and its bytes. Reference: OMG DDS-XTypes 1.3, 7.4.1 (XCDR version 1, PLAIN_CDR) and 7.6.3.1.2.
 
 use crate::definition::{Arity, Definitions, Field, Kind};
+use crate::settings::{MAX_DEPTH, MAX_MESSAGE_BYTES, MAX_VALUES};
 use crate::value::Value;
-
-/// Deepest nesting of types; a type that holds itself would go on for ever. Standard messages reach 6.
-const MAX_DEPTH: usize = 32;
-/// Longest message that is decoded, 4 MiB: wheels and poses take a few hundred bytes, the frames of a large
-/// robot some 10 kB. Decoded, a message takes up to 40 times its bytes.
-const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
 /// Decodes one message. An error says at which byte what was expected.
 pub(crate) fn decode(definitions: &Definitions, message: &[u8]) -> Result<Value, String> {
@@ -28,13 +23,15 @@ pub(crate) fn decode(definitions: &Definitions, message: &[u8]) -> Result<Value,
             return Err(format!("encapsulation 0x{high:02x}{low:02x} is not read; only plain CDR (0x0000, 0x0001) is"));
         }
     };
-    let mut walker = Walker { payload, at: 0, is_little_endian, definitions };
+    let mut walker = Walker { payload, at: 0, values: 0, is_little_endian, definitions };
     walker.message(&definitions.root, 0)
 }
 
 struct Walker<'a> {
     payload: &'a [u8],
     at: usize,
+    /// Decoded so far.
+    values: usize,
     is_little_endian: bool,
     definitions: &'a Definitions,
 }
@@ -71,6 +68,11 @@ impl<'a> Walker<'a> {
     }
 
     fn element(&mut self, kind: &Kind, depth: usize) -> Result<Value, String> {
+        // Nested types may make many values of one byte.
+        self.values += 1;
+        if self.values > MAX_VALUES {
+            return Err(format!("more than {MAX_VALUES} values in one message"));
+        }
         Ok(match kind {
             Kind::Unsigned(bytes) => Value::Integer(self.unsigned(*bytes)?.into()),
             Kind::Signed(bytes) => {
@@ -195,6 +197,17 @@ mod tests {
         assert!(why.contains("the message ends"), "{why}");
         assert!(decode(&definitions("uint8 s\n"), &[0, 1]).is_err());
         assert!(decode(&definitions("uint8 s\n"), &[0, 3, 0, 0, 1]).expect_err("PL_CDR").contains("0x0003"));
+    }
+
+    #[test]
+    fn nested_types_that_multiply_values_are_refused() {
+        // Thirty types, each around the next, make thirty values of a byte.
+        let chain: String =
+            (0..30).map(|level| format!("===\nMSG: t/L{level}\nL{} next\n", level + 1)).collect::<Vec<_>>().concat();
+        let of = definitions(&format!("L0[40000] all\n{chain}===\nMSG: t/L30\nuint8 x\n"));
+        let message = [&[0, 1, 0, 0][..], &[7; 40_000]].concat();
+        let why = decode(&of, &message).expect_err("1.2 million values");
+        assert!(why.contains("more than 1048576 values"), "{why}");
     }
 
     #[test]

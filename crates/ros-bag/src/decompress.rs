@@ -5,10 +5,13 @@ use std::io::Read;
 use lz4_flex::frame::FrameDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
-/// Largest chunk or message, compressed or not: 256 MiB. Recorders close a chunk once it holds 768 KiB
-/// (rosbag2's default) or 1 MiB (MCAP's writers), a larger one holds a single larger message; the largest of
-/// those are point clouds and raw images of some 100 MB. It bounds memory whatever a file says of itself.
-pub(crate) const MAX_CHUNK_BYTES: u64 = 256 << 20;
+use crate::settings::{MAX_CHUNK_BYTES, MAX_EXPANSION, MIN_EXPANDED_BYTES};
+
+/// How many bytes may come of a file by decompression.
+pub(crate) const fn expansion_limit_bytes(file_bytes: u64) -> u64 {
+    let expanded = file_bytes.saturating_mul(MAX_EXPANSION);
+    if expanded > MIN_EXPANDED_BYTES { expanded } else { MIN_EXPANDED_BYTES }
+}
 
 /// What compressed bytes became.
 pub(crate) struct Decompressed {

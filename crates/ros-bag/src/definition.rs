@@ -7,10 +7,7 @@
 
 use std::collections::BTreeMap;
 
-/// Most types in one schema; the largest in use hold some dozens.
-const MAX_TYPES: usize = 1000;
-/// Most fields of one type.
-const MAX_FIELDS: usize = 1000;
+use crate::settings::{MAX_FIELDS, MAX_TYPES};
 
 /// What a field holds, one element of it.
 #[derive(Debug, Clone, PartialEq, Eq)]

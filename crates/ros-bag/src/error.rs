@@ -47,6 +47,14 @@ pub enum RosBagError {
         /// The file or folder.
         path: PathBuf,
     },
+    /// A file that says little becomes much by decompression.
+    #[error("{file}: it holds more than {} MiB when decompressed; split the recording (`ros2 bag convert`), or leave out the topics of images", limit_bytes >> 20)]
+    TooLarge {
+        /// The file.
+        file: PathBuf,
+        /// How much may come of it, bytes.
+        limit_bytes: u64,
+    },
     /// Not one record could be read.
     #[error("{file}: no message could be read{}", if why.is_empty() { String::new() } else { format!(": {why}") })]
     NoMessages {

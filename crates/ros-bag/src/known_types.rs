@@ -4,13 +4,12 @@
 //! known (ROS 2 Humble to Rolling, in which they are the same), without comments and constants.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::definition::{Definitions, full_name};
 use crate::error::RosBagError;
-
-/// Longest definition file, bytes; the longest in use have some ten thousand.
-const MAX_BYTES: u64 = 1 << 20;
+use crate::settings::MAX_DEFINITION_BYTES;
 
 const HEADER: &str = "std_msgs/Header header\n";
 
@@ -82,10 +81,12 @@ impl KnownTypes {
             let (name, path) = named(file)?;
             let io = |source| RosBagError::Io { path: path.clone(), source };
             let wrong = |why: String| RosBagError::DefinitionFile { file: path.clone(), why };
-            if std::fs::metadata(&path).map_err(io)?.len() > MAX_BYTES {
-                return Err(wrong(format!("longer than {} KiB", MAX_BYTES >> 10)));
+            if std::fs::metadata(&path).map_err(io)?.len() > MAX_DEFINITION_BYTES {
+                return Err(wrong(format!("longer than {} KiB", MAX_DEFINITION_BYTES >> 10)));
             }
-            let text = std::fs::read_to_string(&path).map_err(io)?;
+            let mut text = String::new();
+            let file = std::fs::File::open(&path).map_err(io)?;
+            file.take(MAX_DEFINITION_BYTES).read_to_string(&mut text).map_err(io)?;
             Definitions::fields_of(&name, &text).map_err(wrong)?;
             given.insert(name, text);
         }

@@ -9,15 +9,14 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use mcap::records::{Record, op};
+use mcap::records::op;
 use ruzstd::decoding::StreamingDecoder;
 
-use crate::decompress::{MAX_CHUNK_BYTES, decompress};
+use crate::decompress::{decompress, expansion_limit_bytes};
 use crate::error::RosBagError;
+use crate::record_fields::Fields;
 use crate::resync::next_chunk;
-
-/// Faults that are told one by one; more are counted.
-const MAX_TOLD: usize = 5;
+use crate::settings::{MAX_BREAKS, MAX_CHUNK_BYTES, MAX_DECLARED_BYTES, MAX_TOLD};
 
 /// A topic as a file declares it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,6 +32,12 @@ impl Channel {
     /// Whether the file says how its messages are to be read, in a language that is read here.
     pub(crate) fn is_defined(&self) -> bool {
         self.schema_encoding == "ros2msg" && !self.definition.trim().is_empty()
+    }
+
+    /// Of its texts.
+    fn bytes(&self) -> usize {
+        let Self { topic, type_name, message_encoding, schema_encoding, definition } = self;
+        [topic, type_name, message_encoding, schema_encoding, definition].iter().map(|text| text.len()).sum()
     }
 }
 
@@ -65,12 +70,23 @@ pub(crate) fn visit(
     visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
     losses: &mut Losses,
 ) -> Result<(), RosBagError> {
+    let file_bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    visit_within(path, expansion_limit_bytes(file_bytes), visit, losses)
+}
+
+/// As [`visit`], with so many bytes at most by decompression.
+fn visit_within(
+    path: &Path,
+    limit_bytes: u64,
+    visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
+    losses: &mut Losses,
+) -> Result<(), RosBagError> {
     let io = |source| RosBagError::Io { path: path.to_owned(), source };
     let file = BufReader::new(File::open(path).map_err(io)?);
     let is_compressed = path.extension().is_some_and(|extension| extension == "zstd");
     let mut reader: Box<dyn Read> = if is_compressed {
         let decoder = StreamingDecoder::new(file);
-        Box::new(decoder.map_err(|error| no_bag(path, format!("no zstd: {error}")))?)
+        Box::new(decoder.map_err(|error| no_bag(path, format!("no zstd: {error}")))?.take(limit_bytes))
     } else {
         Box::new(file)
     };
@@ -86,9 +102,27 @@ pub(crate) fn visit(
         }
         _ => return Err(no_bag(path, "no MCAP file by its first bytes".to_owned())),
     }
-    let mut reading =
-        Reading { path, at: magic.len() as u64, schemas: BTreeMap::new(), channels: BTreeMap::new(), visit, losses };
+    let mut reading = Reading {
+        path,
+        at: magic.len() as u64,
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+        declared_bytes: 0,
+        expanded_bytes: 0,
+        limit_bytes,
+        visit,
+        losses,
+    };
+    let mut breaks = 0;
     while let Some(Break { at, why }) = reading.file(&mut *reader)? {
+        if is_compressed && reading.at >= limit_bytes {
+            return Err(expands_beyond(path, limit_bytes));
+        }
+        breaks += 1;
+        if breaks > MAX_BREAKS {
+            reading.lose(at, &format!("{why}; it is the {breaks}th such place, and the rest was left out"));
+            break;
+        }
         // Nothing can be sought in what is compressed as a whole.
         let next = if is_compressed { None } else { next_chunk(path, at + 1).map_err(io)? };
         let Some((next, behind)) = next else {
@@ -112,11 +146,22 @@ fn no_bag(path: &Path, why: String) -> RosBagError {
     RosBagError::NoBag { path: path.to_owned(), why }
 }
 
+/// A file that becomes too large by decompression.
+pub(crate) fn expands_beyond(file: &Path, limit_bytes: u64) -> RosBagError {
+    RosBagError::TooLarge { file: file.to_owned(), limit_bytes }
+}
+
 /// What a schema record says: name, encoding, text.
 struct Schema {
     name: String,
     encoding: String,
     text: String,
+}
+
+impl Schema {
+    const fn bytes(&self) -> usize {
+        self.name.len() + self.encoding.len() + self.text.len()
+    }
 }
 
 struct Reading<'a, V> {
@@ -125,6 +170,12 @@ struct Reading<'a, V> {
     at: u64,
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
+    /// Of schemas and channels.
+    declared_bytes: usize,
+    /// Of chunks.
+    expanded_bytes: u64,
+    /// Of what may come by decompression.
+    limit_bytes: u64,
     visit: V,
     losses: &'a mut Losses,
 }
@@ -205,6 +256,10 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
             return Ok(());
         }
         let whole = decompress(compression, records);
+        self.expanded_bytes += whole.bytes.len() as u64;
+        if self.expanded_bytes > self.limit_bytes {
+            return Err(expands_beyond(self.path, self.limit_bytes));
+        }
         if !is_cut {
             let why = match whole.fault {
                 Some(fault) => Some(fault),
@@ -239,36 +294,68 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
         Ok(())
     }
 
+    /// Counts the bytes of a schema or a channel in place of those that it replaces, as writers repeat them in
+    /// every chunk; an error where there is no room for it.
+    fn make_room(&mut self, bytes: usize, replaced_bytes: usize) -> Result<(), String> {
+        let declared_bytes = self.declared_bytes.saturating_sub(replaced_bytes) + bytes;
+        if declared_bytes > MAX_DECLARED_BYTES {
+            let most = MAX_DECLARED_BYTES >> 20;
+            return Err(format!("schemas and channels of more than {most} MiB; one was left out"));
+        }
+        self.declared_bytes = declared_bytes;
+        Ok(())
+    }
+
     /// One record that is no chunk; the inner error is a fault of its bytes.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<Result<(), String>, RosBagError> {
-        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
-            return Ok(Ok(()));
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Schema { header, data }) => {
-                let text = String::from_utf8_lossy(&data).into_owned();
-                self.schemas.insert(header.id, Schema { name: header.name, encoding: header.encoding, text });
+        match opcode {
+            op::SCHEMA => Ok(self.schema(Fields(body))),
+            op::CHANNEL => Ok(self.channel(Fields(body))),
+            op::MESSAGE => {
+                let mut fields = Fields(body);
+                let head = (|| {
+                    let id = fields.u16()?;
+                    // Its number in the sequence.
+                    fields.skip(4)?;
+                    let log_time_ns = fields.u64()?;
+                    // The time of publication.
+                    fields.skip(8)?;
+                    let undeclared = || format!("a message of channel {id}, which was not declared");
+                    Ok((self.channels.get(&id).ok_or_else(undeclared)?, log_time_ns))
+                })();
+                match head {
+                    Ok((channel, log_time_ns)) => (self.visit)(channel, log_time_ns, fields.0).map(Ok),
+                    Err(why) => Ok(Err(why)),
+                }
             }
-            Ok(Record::Channel(channel)) => {
-                let schema = self.schemas.get(&channel.schema_id);
-                let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
-                let declared = Channel {
-                    topic: channel.topic,
-                    message_encoding: channel.message_encoding,
-                    type_name: of(|schema| &schema.name),
-                    schema_encoding: of(|schema| &schema.encoding),
-                    definition: of(|schema| &schema.text),
-                };
-                self.channels.insert(channel.id, declared);
-            }
-            Ok(Record::Message { header, data }) => match self.channels.get(&header.channel_id) {
-                Some(channel) => (self.visit)(channel, header.log_time, &data)?,
-                None => return Ok(Err(format!("a message of channel {}, which was not declared", header.channel_id))),
-            },
-            Ok(_) => {}
-            Err(error) => return Ok(Err(format!("a record is damaged: {error}"))),
+            _ => Ok(Ok(())),
         }
-        Ok(Ok(()))
+    }
+
+    fn schema(&mut self, mut fields: Fields<'_>) -> Result<(), String> {
+        let id = fields.u16()?;
+        let (name, encoding) = (fields.text()?, fields.text()?);
+        let schema = Schema { name, encoding, text: String::from_utf8_lossy(fields.bytes()?).into_owned() };
+        self.make_room(schema.bytes(), self.schemas.get(&id).map_or(0, Schema::bytes))?;
+        self.schemas.insert(id, schema);
+        Ok(())
+    }
+
+    fn channel(&mut self, mut fields: Fields<'_>) -> Result<(), String> {
+        let (id, schema) = (fields.u16()?, fields.u16()?);
+        let (topic, message_encoding) = (fields.text()?, fields.text()?);
+        let schema = self.schemas.get(&schema);
+        let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
+        let declared = Channel {
+            topic,
+            message_encoding,
+            type_name: of(|schema| &schema.name),
+            schema_encoding: of(|schema| &schema.encoding),
+            definition: of(|schema| &schema.text),
+        };
+        self.make_room(declared.bytes(), self.channels.get(&id).map_or(0, Channel::bytes))?;
+        self.channels.insert(id, declared);
+        Ok(())
     }
 }
 
@@ -303,5 +390,95 @@ impl<'a> ChunkBody<'a> {
             compression: std::str::from_utf8(name).ok()?,
             records,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+        [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+    }
+
+    fn text(text: &str) -> Vec<u8> {
+        [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+    }
+
+    /// A schema whose definition has so many bytes.
+    fn schema(id: u16, bytes: usize) -> Vec<u8> {
+        let definition = text(&"#".repeat(bytes));
+        record(op::SCHEMA, &[&id.to_le_bytes()[..], &text("a/B"), &text("ros2msg"), &definition].concat())
+    }
+
+    fn channel(id: u16, schema: u16) -> Vec<u8> {
+        let ids = [id.to_le_bytes(), schema.to_le_bytes()].concat();
+        record(op::CHANNEL, &[ids, text(&format!("/{id}")), text("cdr"), text("")].concat())
+    }
+
+    /// A chunk that is not compressed, and says so many bytes of itself.
+    fn chunk(records: &[u8], size: u64) -> Vec<u8> {
+        let head = [&[0; 16][..], &size.to_le_bytes(), &[0; 4], &text(""), &(records.len() as u64).to_le_bytes()];
+        record(op::CHUNK, &[&head.concat(), records].concat())
+    }
+
+    /// What is told of a file with these records behind the magic bytes.
+    fn read(records: &[Vec<u8>], name: &str, limit_bytes: u64) -> Result<Vec<String>, RosBagError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        let bytes = [mcap::MAGIC, &records.concat()].concat();
+        let bytes = match name.ends_with("zstd") {
+            true => ruzstd::encoding::compress_to_vec(&bytes[..], ruzstd::encoding::CompressionLevel::Fastest),
+            false => bytes,
+        };
+        std::fs::write(&path, bytes).expect("written");
+        let mut losses = Losses::default();
+        visit_within(&path, limit_bytes, |_, _, _| Ok(()), &mut losses).map(|()| losses.lines())
+    }
+
+    const END: [u8; 9] = [op::DATA_END, 0, 0, 0, 0, 0, 0, 0, 0];
+
+    #[test]
+    fn a_schema_that_thousands_of_channels_repeat_is_held_a_bounded_number_of_times() {
+        let mut records = vec![schema(1, 1 << 20)];
+        records.extend((0..200).map(|id| channel(id, 1)));
+        records.push(END.to_vec());
+        let told = read(&records, "a.mcap", u64::MAX).expect("read").join("\n");
+        assert!(told.contains("schemas and channels of more than 64 MiB"), "{told}");
+        // One that is declared again takes the place of the first.
+        let again: Vec<Vec<u8>> = (0..100).map(|_| schema(1, 1 << 20)).chain([END.to_vec()]).collect();
+        assert_eq!(read(&again, "a.mcap", u64::MAX).expect("read"), Vec::<String>::new());
+    }
+
+    #[test]
+    fn what_becomes_too_large_by_decompression_is_refused() {
+        let skipped = record(0x80, &[7; 50_000]);
+        let records = [skipped.clone(), skipped, END.to_vec()];
+        assert!(read(&records, "a.mcap.zstd", 200_000).is_ok());
+        let refused = read(&records, "a.mcap.zstd", 60_000).expect_err("too large");
+        assert!(refused.to_string().contains("when decompressed"), "{refused}");
+        let inner = record(0x80, &[7; 1000]);
+        let chunks = [chunk(&inner, inner.len() as u64), chunk(&inner, inner.len() as u64), END.to_vec()];
+        assert!(read(&chunks, "a.mcap", 3000).is_ok());
+        assert!(matches!(read(&chunks, "a.mcap", 2000), Err(RosBagError::TooLarge { .. })));
+    }
+
+    #[test]
+    fn lengths_that_lie_lose_their_record_and_cost_no_memory() {
+        let told = |records: &[Vec<u8>]| read(records, "a.mcap", u64::MAX).expect("read").join("\n");
+        assert!(told(&[chunk(&[], u64::MAX), END.to_vec()]).contains("more than 256 MiB"));
+        assert!(told(&[chunk(&[1, 2], 3), END.to_vec()]).contains("2 bytes instead of 3"));
+        let endless = [&[op::MESSAGE][..], &u64::MAX.to_le_bytes(), &[0; 20]].concat();
+        assert!(told(&[endless]).contains("goes beyond its end"));
+    }
+
+    #[test]
+    fn a_file_that_breaks_off_again_and_again_is_left() {
+        // At each break the rest of the file is read: without a limit, a minute for a megabyte.
+        let endless = [&[op::MESSAGE][..], &u64::MAX.to_le_bytes()].concat();
+        let records: Vec<Vec<u8>> = (0..1000).flat_map(|_| [chunk(&[], 0), endless.clone()]).collect();
+        let told = read(&records, "a.mcap", u64::MAX).expect("read");
+        assert_eq!(told.len(), MAX_TOLD + 1);
+        assert!(told[MAX_TOLD].starts_with("96 more places"), "{told:?}");
     }
 }

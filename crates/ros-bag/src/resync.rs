@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mcap::records::op;
 
-use crate::decompress::MAX_CHUNK_BYTES;
+use crate::settings::MAX_CHUNK_BYTES;
 
 /// Bytes that are searched at a time.
 const BLOCK_BYTES: usize = 1 << 20;

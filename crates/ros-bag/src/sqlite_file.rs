@@ -8,10 +8,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, Row};
 
 use crate::error::RosBagError;
 use crate::mcap_file::{Channel, Losses};
+use crate::settings::MAX_CHUNK_BYTES;
 
 /// Whether a file is one of SQLite, by its first bytes.
 pub(crate) fn is_sqlite(path: &Path) -> bool {
@@ -28,6 +30,10 @@ pub(crate) fn visit(
     let no_bag = |error: rusqlite::Error| RosBagError::NoBag { path: path.to_owned(), why: error.to_string() };
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let file = Connection::open_with_flags(path, flags).map_err(no_bag)?;
+    if let Some(name) = computed_table(&file).map_err(no_bag)? {
+        let why = format!("{name} is a view or computed, where a table belongs");
+        return Err(RosBagError::NoBag { path: path.to_owned(), why });
+    }
     let channels = channels(&file).map_err(no_bag)?;
     let mut messages = file.prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id");
     let mut rows = messages
@@ -57,6 +63,19 @@ pub(crate) fn visit(
             Err(error) => losses.add(format!("{}: a message could not be read: {error}", path.display())),
         }
     }
+}
+
+/// What only looks like a table of a bag: a view or a virtual table may make rows without end.
+fn computed_table(file: &Connection) -> rusqlite::Result<Option<String>> {
+    file.pragma_update(None, "trusted_schema", false)?;
+    file.pragma_update(None, "cell_size_check", true)?;
+    file.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_CHUNK_BYTES as i32)?;
+    let mut objects = file.prepare(
+        "SELECT name FROM sqlite_schema WHERE name IN ('topics', 'messages', 'message_definitions') \
+         AND (type <> 'table' OR sql LIKE 'CREATE VIRTUAL%' OR sql LIKE '%GENERATED ALWAYS%')",
+    )?;
+    let mut rows = objects.query([])?;
+    rows.next()?.map(|row| row.get(0)).transpose()
 }
 
 fn channels(file: &Connection) -> rusqlite::Result<BTreeMap<i64, Channel>> {

@@ -17,6 +17,9 @@ use crate::error::BenchError;
 /// Probability that a whole comparison of two honest sweeps finds anything.
 pub const FALSE_ALARM_BUDGET: f64 = 1e-4;
 
+/// Longest result of a sweep, bytes; a baseline has some ten thousand.
+const MAX_RESULT_BYTES: u64 = 1 << 30;
+
 /// One number of a sweep beside the baseline's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
@@ -60,7 +63,8 @@ pub struct AccuracyCheck {
 /// [`BenchError::Baseline`] when it cannot be read or is no sweep's result.
 pub fn read_baseline(path: &Path) -> Result<SweepResult, BenchError> {
     let failed = |why: String| BenchError::Baseline { path: path.display().to_string(), why };
-    let bytes = std::fs::read(path).map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
+    let bytes = atomic_file::read_at_most(path, MAX_RESULT_BYTES)
+        .map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
     serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))
 }
 

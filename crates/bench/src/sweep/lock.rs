@@ -74,6 +74,9 @@ impl Drop for FolderLock {
 }
 
 fn opened(path: &Path) -> io::Result<File> {
+    if path.is_symlink() {
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the lock is a link"));
+    }
     // For writing, as network file systems ask of who locks.
     OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
 }

@@ -17,6 +17,9 @@ use crate::error::BenchError;
 /// The state's file in the folder of results.
 pub(super) const STATE_FILE: &str = "sweep.state.json";
 
+/// Longest state, bytes: that of a campaign of some 10⁵ points.
+const MAX_STATE_BYTES: u64 = 1 << 30;
+
 /// Raised whenever the meaning of the file or the numbers in it change.
 const FORMAT: u32 = 1;
 
@@ -166,7 +169,7 @@ impl State {
     /// Reads a state.
     pub(super) fn read(path: &Path) -> Result<Self, BenchError> {
         let not_a_state = |why: String| BenchError::NotAState { path: path.display().to_string(), why };
-        let bytes = std::fs::read(path).map_err(|error| not_a_state(error.to_string()))?;
+        let bytes = atomic_file::read_at_most(path, MAX_STATE_BYTES).map_err(|error| not_a_state(error.to_string()))?;
         let state: Self = serde_json::from_slice(&bytes).map_err(|error| not_a_state(error.to_string()))?;
         if state.first > state.next || state.next > state.end {
             return Err(not_a_state("its places are out of order".to_owned()));
@@ -180,9 +183,15 @@ impl State {
         let failed = |why: String| BenchError::Write { path: path.display().to_string(), why };
         let bytes = serde_json::to_vec(self).map_err(|error| failed(error.to_string()))?;
         let aside = path.with_extension("part");
-        std::fs::write(&aside, bytes)
-            .and_then(|()| std::fs::rename(&aside, path))
-            .map_err(|error| failed(error.to_string()))
+        // A link in its place is not written through.
+        let write = || {
+            if aside.is_symlink() {
+                std::fs::remove_file(&aside)?;
+            }
+            std::fs::write(&aside, bytes)?;
+            std::fs::rename(&aside, path)
+        };
+        write().map_err(|error| failed(error.to_string()))
     }
 
     /// Refuses a state of another campaign than `ours`.

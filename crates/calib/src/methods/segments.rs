@@ -164,7 +164,9 @@ fn observable(normal: &Matrix3<f64>) -> Result<(), CalibError> {
         return Ok(());
     }
     let (parameter, missing) = unobservable(&eigen.eigenvectors.column(weak).into_owned());
-    let why = format!("{missing} (relative sensitivity {sensitivity:.0e}, at least {MIN_SENSITIVITY:.0e})");
+    // Runs in which nothing moves leave no sensitivity at all.
+    let found = if sensitivity.is_finite() { format!("{sensitivity:.0e}") } else { "none".to_owned() };
+    let why = format!("{missing} (relative sensitivity {found}, at least {MIN_SENSITIVITY:.0e})");
     Err(CalibError::Unobservable { method: Segments::NAME, parameter, why })
 }
 

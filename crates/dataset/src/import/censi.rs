@@ -21,7 +21,8 @@ use crate::imported::Source;
 use crate::record::{
     Dataset, Displacement, NominalRobot, Odometry, Protocol, Provenance, Run, RunInfo, TruthNoise, WheelLog,
 };
-use crate::table::{LINE_LIMIT_BYTES, open_file};
+use crate::settings::LINE_LIMIT_BYTES;
+use crate::table::open_file;
 
 const EXPECTED: &str =
     "a .tuple file: objects like {\"T\": 0.79, \"phi_l\": 0.1, \"phi_r\": 0.1, \"sm\": [0.0, 0.0, 0.0]}";
@@ -79,6 +80,9 @@ pub(super) fn open(source: &Path) -> Result<Vec<Source>, DatasetError> {
         };
         let t0_s = t_s;
         t_s += interval_s;
+        if t_s <= t0_s {
+            return Err(foreign(format!("T = {interval_s:e} s is lost beside the {t0_s:e} s before")));
+        }
         times_s.push(t_s);
         ticks.left.push(total.left);
         ticks.right.push(total.right);

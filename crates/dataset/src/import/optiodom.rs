@@ -117,12 +117,17 @@ impl Metadata {
         let runs = runs.parse().map_err(|_| {
             foreign(runs_line, format!("N = \"{}\"; expected the number of runs", shown(runs.as_bytes())))
         })?;
+        let ticks_per_rev = positive("ngear", 0)? * positive("encRes", 0)?;
+        if !(ticks_per_rev.is_finite() && ticks_per_rev > 0.0) {
+            let (line, _) = field("encRes", 0)?;
+            return Err(foreign(line, "ngear times encRes is no number of counts a turn".to_owned()));
+        }
         let robot = NominalRobot {
             // Di lists the right wheel first, as the counts do.
             right_wheel_diameter_m: positive("Di", 0)?,
             left_wheel_diameter_m: positive("Di", 1)?,
             wheel_separation_m: positive("Li", 0)?,
-            ticks_per_rev: Some(positive("ngear", 0)? * positive("encRes", 0)?),
+            ticks_per_rev: Some(ticks_per_rev),
             counter_bits: None,
         };
         let has_side = values.get("L").is_some_and(|(_, fields)| !fields.is_empty());
@@ -290,6 +295,11 @@ fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
     const SIDES: f64 = 0.1;
     let none = ProtocolSettings::default();
     let free = (Protocol::Free, none);
+    // Counts that are no robot's give lengths that are none.
+    let is_path = motion.path_m.is_finite() && motion.distance_m.is_finite() && motion.turn_rad.is_finite();
+    if !is_path {
+        return free;
+    }
     let turn_rad = motion.turn_rad.abs();
     let turns_one_way = turn_rad >= ONE_WAY * motion.heading_range_rad;
     let clockwise = motion.turn_rad < 0.0;
@@ -320,6 +330,9 @@ fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
         (true, false, true) => {
             let radius_m = (motion.distance_m / motion.turn_rad).abs();
             let radius_m = (radius_m * 1000.0).round() / 1000.0;
+            if !(radius_m.is_finite() && radius_m > 0.0) {
+                return free;
+            }
             let protocol = if clockwise { Protocol::CircleCw } else { Protocol::CircleCcw };
             (protocol, ProtocolSettings { radius_m: Some(radius_m), ..none })
         }

@@ -17,6 +17,7 @@ use crate::identity::{parse_recorded, parse_robot_id};
 use crate::map_distortion::MapDistortion;
 use crate::partial::GyroNoise;
 use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
+use crate::settings::MANIFEST_LIMIT_BYTES;
 use crate::table::open_file;
 
 /// Name of the file.
@@ -24,10 +25,6 @@ pub(crate) const MANIFEST: &str = "dataset.toml";
 
 /// The format that is read and written here.
 pub(crate) const FORMAT: i64 = 1;
-
-/// Longest `dataset.toml`: tens of thousands of runs. The TOML parser may need a hundred times as much memory
-/// for text that is not TOML.
-pub(crate) const MANIFEST_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
 
 const EXPECTED: &str = "a dataset's format, [robot] and one [[run]] for every run";
 

@@ -25,7 +25,7 @@ use odometry::OdometryTable;
 use truth::TruthTable;
 
 pub use blocks::Blocks;
-pub(crate) use manifest::{FORMAT, MANIFEST, MANIFEST_LIMIT_BYTES, is_run_key, meant_quantity, why_no_id};
+pub(crate) use manifest::{FORMAT, MANIFEST, is_run_key, meant_quantity, why_no_id};
 pub(crate) use odometry::wheel_columns;
 pub(crate) use partial::{DISTANCE, GYRO, REVISIT, WALL};
 pub use run_by_run::RunByRun;
@@ -103,6 +103,7 @@ impl Opened {
             let expected = "a dataset: a folder with dataset.toml, odometry.csv and a truth";
             return Err(DatasetError::NotAFolder { path: dir.to_owned(), expected });
         }
+        refuse_links_outside(dir)?;
         let manifest_file = dir.join(MANIFEST);
         let Manifest { provenance, robot, robot_line, truth_noise, corrections, points, runs: infos, run_lines } =
             Manifest::read(&manifest_file)?;
@@ -137,6 +138,24 @@ impl Opened {
         let dataset = Dataset { provenance, robot, truth_noise, points, runs };
         Ok(Self { dataset, manifest_file, run_lines, corrections, odometry, truths, index, warnings })
     }
+}
+
+/// A dataset comes from anywhere; what it does not hold itself is not read in its name.
+fn refuse_links_outside(dir: &Path) -> Result<(), DatasetError> {
+    let io = |source| DatasetError::Io { path: dir.to_owned(), source };
+    let folder = dir.canonicalize().map_err(io)?;
+    for entry in dir.read_dir().map_err(io)? {
+        let file = entry.map_err(io)?.path();
+        let is_part = file.extension().is_some_and(|extension| extension == "csv" || extension == "toml");
+        if is_part
+            && file.is_symlink()
+            && let Ok(target) = file.canonicalize()
+            && !target.starts_with(&folder)
+        {
+            return Err(DatasetError::LinkOutside { file, target });
+        }
+    }
+    Ok(())
 }
 
 /// Whether an instrument beside the wheels saw anything of a run.

@@ -8,10 +8,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::DatasetError;
-
-/// Longest line that any table may have. Ten numbers of 400 digits and an id fit; a binary file rarely gets
-/// this far.
-pub(crate) const LINE_LIMIT_BYTES: usize = 64 * 1024;
+use crate::settings::{LINE_LIMIT_BYTES, SHORT_FILE_LINES};
 
 /// Large enough that system calls and the moving of cut lines cost nothing beside parsing, small beside any
 /// table.
@@ -155,9 +152,6 @@ impl Lines {
         DatasetError::LineTooLong { file: self.path.clone(), line, limit_bytes: LINE_LIMIT_BYTES }
     }
 }
-
-/// Most lines of a file that is read as a whole.
-const SHORT_FILE_LINES: u64 = 1000;
 
 /// All lines of a short text file with their numbers; at least one.
 pub(crate) fn read_all(path: &Path, expected: &'static str) -> Result<Vec<(u64, String)>, DatasetError> {

@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 
 use crate::column_names::{Quantity, likely_mapping};
 use crate::error::{DatasetError, shown};
+use crate::settings::{MAX_COUNT, MAX_ROWS};
 use crate::warning::Warning;
 use fields::Fields;
 use lines::{Line, Lines};
 
 pub(crate) use fields::quoted_where_needed;
-pub(crate) use lines::{LINE_LIMIT_BYTES, Position, open as open_file, read_all as read_lines};
+pub(crate) use lines::{Position, open as open_file, read_all as read_lines};
 
 /// The column that says to which run a row belongs.
 pub(crate) const RUN_COLUMN: &str = "run";
@@ -67,6 +68,7 @@ pub(crate) struct Table {
     columns: Columns,
     lines: Lines,
     fields: Fields,
+    max_rows: usize,
 }
 
 /// Where each run's rows are.
@@ -128,7 +130,7 @@ impl Table {
     pub(crate) fn without_header(file: &Path, columns: &[&str], expected: &'static str) -> Result<Self, DatasetError> {
         let names = columns.iter().map(|&name| name.to_owned()).collect();
         let columns = Columns { file: file.to_owned(), names };
-        Ok(Self { columns, lines: Lines::open(file, expected)?, fields: Fields::default() })
+        Ok(Self { columns, lines: Lines::open(file, expected)?, fields: Fields::default(), max_rows: MAX_ROWS })
     }
 
     pub(crate) fn file(&self) -> &Path {
@@ -207,9 +209,14 @@ impl Table {
         let marks = if marked_by.is_some() { vec![Vec::new(); count] } else { Vec::new() };
         let mut survey = Survey { rows: vec![0; count], first: vec![start; count], is_grouped: true, marks };
         let mut previous = None;
+        let mut rows = 0;
         loop {
             let position = self.lines.position();
             let Some(line) = self.lines.advance()? else { break };
+            rows += 1;
+            if rows > self.max_rows {
+                return Err(DatasetError::TooManyRows { file: self.columns.file.clone(), max_rows: self.max_rows });
+            }
             // The run comes first and without quotes in almost every table: no need to split then.
             let run = if run_column == 0 && !line.bytes.starts_with(b"\"") {
                 let end = memchr::memchr(b',', line.bytes).unwrap_or(line.bytes.len());
@@ -379,7 +386,9 @@ impl Row<'_> {
             }
             _ => Err(()),
         };
-        text.parse().or_else(whole).map_err(|()| {
+        let is_count = |count: &i64| count.unsigned_abs() <= MAX_COUNT;
+        let parsed = text.parse().or_else(whole);
+        parsed.ok().filter(is_count).ok_or_else(|| {
             let (file, line, column) = (self.file(), self.line(), self.name(column));
             let found = shown(text.as_bytes());
             match text.parse::<f64>() {
@@ -426,5 +435,26 @@ impl Row<'_> {
 
     pub(crate) fn duplicate_instant(&self, column: usize, t_s: f64) -> DatasetError {
         DatasetError::DuplicateInstant { file: self.file(), line: self.line(), column: self.name(column), t_s }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_of_more_rows_than_are_read_is_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = folder.path().join("odometry.csv");
+        std::fs::write(&file, "run,t_s\na,0\na,1\na,2\n").expect("written");
+        let runs = RunIndex::new(["a"].into_iter());
+        let survey = |max_rows: usize| {
+            let mut table = Table::open(&file, "a header").expect("a table");
+            table.max_rows = max_rows;
+            table.survey(&runs, None).map(|survey| survey.rows)
+        };
+        assert_eq!(survey(3).expect("read"), [3]);
+        let refused = survey(2).expect_err("too many").to_string();
+        assert!(refused.contains("odometry.csv: more than 2 rows"), "{refused}");
     }
 }

@@ -9,6 +9,7 @@ use crate::identity::parse_robot_id;
 use crate::pose_covariance::PoseCovariance;
 use crate::read::{has_truth, is_run_key, meant_quantity, why_no_id};
 use crate::record::{Dataset, Odometry, Run, RunInfo, WheelLog};
+use crate::settings::MAX_COUNT;
 
 type Check = Result<(), String>;
 
@@ -217,6 +218,9 @@ fn check_odometry(dataset: &Dataset, first: Discriminant<WheelLog>, odometry: &O
     match &odometry.wheels {
         WheelLog::Ticks(ticks) => {
             as_long(&[ticks.left.len(), ticks.right.len()])?;
+            let is_count = |count: &i64| count.unsigned_abs() <= MAX_COUNT;
+            let are_counts = ticks.left.iter().chain(&ticks.right).all(is_count);
+            ensure(are_counts, || format!("a count beyond {MAX_COUNT}; no counter gets so far"))?;
             ensure(dataset.robot.ticks_per_rev.is_some(), || "ticks, but the robot has no ticks_per_rev".to_owned())?;
         }
         WheelLog::Angles(angles) => {

@@ -17,11 +17,9 @@ use tables::{OptionalColumns, Out, TABLES};
 use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
-use crate::read::{
-    DISPLACEMENT, DISTANCE, GYRO, MANIFEST, MANIFEST_LIMIT_BYTES, ODOMETRY, POINTS, REVISIT, TRUTH, WALL,
-    WHEEL_REFERENCE,
-};
+use crate::read::{DISPLACEMENT, DISTANCE, GYRO, MANIFEST, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE};
 use crate::record::{Dataset, Run, RunInfo, WheelLog};
+use crate::settings::MANIFEST_LIMIT_BYTES;
 
 /// Every file that a dataset may have; what [`Existing::ReplaceDataset`] may delete.
 const FILES: [&str; 10] =
@@ -214,7 +212,9 @@ fn may_write(target: &Path, existing: Existing) -> Result<bool, DatasetError> {
     for entry in target.read_dir().map_err(|source| io_error(target, source))? {
         let entry = entry.map_err(|source| io_error(target, source))?;
         is_empty = false;
-        if !FILES.iter().any(|file| entry.file_name() == **file) {
+        // A folder of a table's name may hold anything.
+        let is_file = entry.file_type().map_err(|source| io_error(target, source))?.is_file();
+        if !is_file || !FILES.iter().any(|file| entry.file_name() == **file) {
             foreign = Some(entry.file_name());
         }
     }

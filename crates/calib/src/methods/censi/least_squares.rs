@@ -216,8 +216,10 @@ fn excited(normal: &Matrix2<f64>) -> Result<(), CalibError> {
     } else {
         "the robot drives one arc: add straight runs and spins, or arcs to the other side"
     };
+    // Of motions that are exactly in one proportion the condition has no end.
+    let found = if condition.is_finite() { format!("condition {condition:.0}") } else { "singular".to_owned() };
     let why = format!(
-        "the wheels turn almost always in one proportion (condition {condition:.0}, at most {MAX_TURN_CONDITION}), since {missing}"
+        "the wheels turn almost always in one proportion ({found}; condition at most {MAX_TURN_CONDITION}), since {missing}"
     );
     Err(CalibError::Unobservable { method: NAME, parameter: Parameter::WheelSeparation, why })
 }

@@ -8,6 +8,7 @@ use super::took::{Basis, Confidence};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
 use crate::name_units::unreadable_unit;
+use crate::read::why_no_id;
 use crate::unit::Unit;
 
 /// The column that was taken for a quantity.
@@ -304,6 +305,10 @@ impl Log {
                 let next = known.len() as u32;
                 log.run.push(*known.entry(fields[run]).or_insert(next));
                 if known.len() > log.run_names.len() {
+                    if let Some(expected) = why_no_id(fields[run]) {
+                        let (file, id) = (sheet.file.clone(), shown(fields[run].as_bytes()));
+                        return Err(DatasetError::BadId { file, line, id, expected });
+                    }
                     log.run_names.push(fields[run].to_owned());
                 }
             }

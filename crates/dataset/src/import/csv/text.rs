@@ -1,12 +1,11 @@
 //! The text of a CSV file: delimiters, fields, and numbers as people write them.
 
+use std::io::Read;
 use std::path::Path;
 
 use crate::error::DatasetError;
-use crate::table::{LINE_LIMIT_BYTES, open_file};
-
-/// Largest file: ten million rows. It is held in memory as a whole.
-const FILE_LIMIT_BYTES: u64 = 1 << 30;
+use crate::settings::{FILE_LIMIT_BYTES, LINE_LIMIT_BYTES};
+use crate::table::open_file;
 
 /// A file that is not text shows it within so many bytes.
 const PROBED_BYTES: usize = 64 * 1024;
@@ -163,10 +162,15 @@ pub(super) const EXACT_SCALE: f64 = 1e12;
 pub(super) fn read(file: &Path) -> Result<String, DatasetError> {
     let io = |source| DatasetError::Io { path: file.to_owned(), source };
     let opened = open_file(file, EXPECTED)?;
-    if opened.metadata().map_err(io)?.len() >= FILE_LIMIT_BYTES {
+    if opened.metadata().map_err(io)?.len() > FILE_LIMIT_BYTES {
         return Err(DatasetError::FileTooLong { file: file.to_owned(), limit_bytes: FILE_LIMIT_BYTES });
     }
-    let bytes = std::fs::read(file).map_err(io)?;
+    // Once more while reading, as a file may grow.
+    let mut bytes = Vec::new();
+    opened.take(FILE_LIMIT_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > FILE_LIMIT_BYTES {
+        return Err(DatasetError::FileTooLong { file: file.to_owned(), limit_bytes: FILE_LIMIT_BYTES });
+    }
     let not_text = |at: usize| DatasetError::NotUtf8 {
         file: file.to_owned(),
         line: 1 + memchr::memchr_iter(b'\n', &bytes[..at]).count() as u64,

@@ -14,7 +14,7 @@ use super::columns::{Chosen, Log, PoseColumns, Roles};
 use super::options::Options;
 use super::runs::Part;
 use super::sheet::{Sheet, Writing};
-use super::text::{Decimal, Delimiter};
+use super::text::{self, Decimal, Delimiter};
 use super::times::seconds;
 use super::took::{Basis, Confidence};
 use super::{FromCsv, dataset, parts};
@@ -104,7 +104,7 @@ fn open(file: &Path) -> Result<Sheet, DatasetError> {
     let foreign = |line: u64, message: String| DatasetError::Foreign { file: file.to_owned(), line, message };
     let mut sheet = match Sheet::open(file, writing) {
         Err(DatasetError::Foreign { line, .. }) => {
-            let text = std::fs::read_to_string(file).unwrap_or_default();
+            let text = text::read(file).unwrap_or_default();
             let first = text.lines().nth(line.saturating_sub(1) as usize).unwrap_or_default();
             let hint = if first.contains(',') { "; evo_traj euroc FILE --save_as_tum converts EuRoC's" } else { "" };
             return Err(foreign(line, format!("\"{}\"; {expected}{hint}", shown(first.as_bytes()))));

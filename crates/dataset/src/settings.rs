@@ -1,0 +1,29 @@
+//! Every limit on the files that are read here. Memory stays within them and the files' own sizes.
+
+/// Bytes. Longest line of any table, and longest object of a `.tuple` file.
+/// Budgeted: ten numbers of 400 digits and an id fit; a binary file rarely gets this far.
+pub(crate) const LINE_LIMIT_BYTES: usize = 64 * 1024;
+
+/// Rows of one table of a dataset.
+/// Budgeted: a month at 400 Hz; its columns take 24 GB.
+pub(crate) const MAX_ROWS: usize = 1_000_000_000;
+
+/// Counts. Largest count of a wheel, to either side of zero.
+/// Budgeted: a counter of 10⁹ counts a second runs for two years; sums of a dozen counts stay within 64 bits.
+pub(crate) const MAX_COUNT: u64 = 1 << 56;
+
+/// Bytes. Longest `dataset.toml`; it bounds the number of runs, at 15 bytes each.
+/// Budgeted: tens of thousands of runs with covariates; the parser takes up to a hundred times as much memory.
+pub(crate) const MANIFEST_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
+
+/// Bytes. Largest file of `import csv` and `import tum`, which are held in memory as a whole.
+/// Budgeted: ten million rows.
+pub(crate) const FILE_LIMIT_BYTES: u64 = 1 << 30;
+
+/// Lines of a file of settings beside a log of another format.
+/// Budgeted: they have some dozens.
+pub(crate) const SHORT_FILE_LINES: u64 = 1000;
+
+/// Characters of a file's text that a message shows.
+/// Convention: a message stays on one or two lines.
+pub(crate) const SHOWN_CHARS: usize = 60;

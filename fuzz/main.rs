@@ -1,0 +1,168 @@
+//! Every reader of files, and every calibrator, on input that nobody would write.
+//!
+//! A sample of a target's corpus is mutated with its structure kept (`text`, `bag`), because random bytes
+//! hardly pass a parser's first line; then the target reads it. A finding is a panic, an execution that takes
+//! longer or more memory than [`MAX_SECONDS`] and [`MAX_BYTES`], or a promise of the target that does not hold
+//! (what was read can be written and reads back equal; no number is a NaN). Every execution is a function of
+//! its target and its number, so that a finding is repeated by `YAIR_FUZZ_AT=TARGET:NUMBER`.
+//!
+//! `cargo test` runs a few hundred executions a target. `.ci/run fuzz MINUTES` runs each target for so many
+//! minutes of processor time and prints the executions; it is a campaign by hand.
+
+#![allow(clippy::print_stdout)] // what a campaign found
+
+mod bag;
+mod corpus;
+mod odd_datasets;
+mod targets;
+mod text;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use peak_alloc::PeakAlloc;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use targets::{TARGETS, Target};
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Longest execution, seconds: a hundred times the longest sound one on a busy machine.
+const MAX_SECONDS: f64 = 20.0;
+
+/// Most memory of an execution, bytes: two chunks of a bag at their limit, and its messages.
+const MAX_BYTES: usize = 1 << 30;
+
+/// Executions of each target in `cargo test`, before its cost divides them.
+const SMOKE_EXECUTIONS: u64 = 40;
+
+/// How an execution ended.
+enum Ended {
+    /// The input was read.
+    Accepted,
+    /// The input was refused with a reason.
+    Refused,
+    Finding(String),
+}
+
+fn generator(target: &Target, number: u64) -> Xoshiro256PlusPlus {
+    // FNV-1a, so that targets do not share their mutations.
+    let hash = target
+        .name
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    Xoshiro256PlusPlus::seed_from_u64(hash ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
+/// One execution in a folder, which is emptied after it.
+fn execute(target: &Target, corpus: &[corpus::Sample], number: u64, folder: &Path) -> Ended {
+    let mut random = generator(target, number);
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
+    let started = Instant::now();
+    let ended = catch_unwind(AssertUnwindSafe(|| (target.run)(corpus, &mut random, folder)));
+    let (seconds, bytes) = (started.elapsed().as_secs_f64(), MEMORY.peak_usage().saturating_sub(before));
+    match ended {
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().cloned();
+            let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+            Ended::Finding(text.unwrap_or_else(|| "a panic".to_owned()))
+        }
+        Ok(_) if seconds > MAX_SECONDS => Ended::Finding(format!("{seconds:.1} s")),
+        Ok(_) if bytes > MAX_BYTES => Ended::Finding(format!("{} MiB of memory", bytes >> 20)),
+        Ok(true) => Ended::Accepted,
+        Ok(false) => Ended::Refused,
+    }
+}
+
+fn emptied<T>(folder: &tempfile::TempDir, of: impl FnOnce(&Path) -> T) -> T {
+    let inside = folder.path().join("input");
+    std::fs::create_dir_all(&inside).expect("a folder");
+    let result = of(&inside);
+    std::fs::remove_dir_all(&inside).expect("emptied");
+    result
+}
+
+#[test]
+fn no_reader_and_no_calibrator_falls_over_mutated_input() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for target in TARGETS {
+        let corpus = (target.corpus)();
+        let (mut accepted, mut refused) = (0, 0);
+        for number in 0..(SMOKE_EXECUTIONS / target.cost).max(6) {
+            match emptied(&folder, |inside| execute(target, &corpus, number, inside)) {
+                Ended::Accepted => accepted += 1,
+                Ended::Refused => refused += 1,
+                Ended::Finding(what) => panic!("YAIR_FUZZ_AT={}:{number}: {what}", target.name),
+            }
+        }
+        // A mutator that no parser lets pass, or that changes nothing, finds nothing.
+        assert!(accepted > 0 && refused > 0, "{}: {accepted} accepted, {refused} refused", target.name);
+    }
+}
+
+/// Processor seconds of this process; `None` where the system does not tell.
+fn processor_s() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+    // A hundredth of a second on every Linux.
+    Some(0.01 * ticks as f64)
+}
+
+/// Which number is under way, for executions that end the process: memory that runs out, a stack that does.
+fn note(line: &str) {
+    if let Ok(file) = std::env::var("YAIR_FUZZ_NOTE") {
+        let _ = std::fs::write(file, line);
+    }
+}
+
+#[test]
+#[ignore = "a campaign: .ci/run fuzz MINUTES"]
+fn campaign() {
+    std::panic::set_hook(Box::new(|_| ()));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let only = std::env::var("YAIR_FUZZ_TARGET").ok();
+    if let Some((name, number)) = std::env::var("YAIR_FUZZ_AT").ok().as_deref().and_then(|at| at.split_once(':')) {
+        let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
+        let _ = std::panic::take_hook();
+        let input = Path::new(&std::env::temp_dir()).join("yair-fuzz-finding");
+        std::fs::create_dir_all(&input).expect("a folder");
+        let ended = execute(target, &(target.corpus)(), number.parse().expect("a number"), &input);
+        let what = match ended {
+            Ended::Accepted => "accepted".to_owned(),
+            Ended::Refused => "refused".to_owned(),
+            Ended::Finding(what) => what,
+        };
+        println!("{name}:{number}: {what}; its input is in {}", input.display());
+        return;
+    }
+    let minutes: f64 = std::env::var("YAIR_FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(20.0);
+    let first: u64 = std::env::var("YAIR_FUZZ_FIRST").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000);
+    let mut findings = 0;
+    println!("| target | executions | accepted | processor s | findings |\n| --- | --- | --- | --- | --- |");
+    for target in TARGETS.iter().filter(|target| only.as_ref().is_none_or(|name| name == target.name)) {
+        let corpus = (target.corpus)();
+        let budget = Duration::from_secs_f64(60.0 * minutes).as_secs_f64();
+        let (clock, started_s) = (Instant::now(), processor_s());
+        let spent = || processor_s().zip(started_s).map_or(clock.elapsed().as_secs_f64(), |(now, then)| now - then);
+        let (mut accepted, mut number, mut told) = (0_u64, 0_u64, Vec::new());
+        while spent() < budget {
+            note(&format!("{}:{}", target.name, first + number));
+            match emptied(&folder, |inside| execute(target, &corpus, first + number, inside)) {
+                Ended::Accepted => accepted += 1,
+                Ended::Refused => {}
+                Ended::Finding(what) => told.push((first + number, what)),
+            }
+            number += 1;
+        }
+        println!("| {} | {number} | {accepted} | {:.0} | {} |", target.name, spent(), told.len());
+        for (at, what) in told.iter().take(10) {
+            println!("YAIR_FUZZ_AT={}:{at}: {what}", target.name);
+        }
+        findings += told.len();
+    }
+    assert_eq!(findings, 0, "findings, as listed above");
+}

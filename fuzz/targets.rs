@@ -1,0 +1,241 @@
+//! What is fuzzed: each target makes an input of its corpus, reads it, and holds what it was promised.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rand::{Rng, RngExt};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use yair::calib::CalibrationReport;
+use yair::command::{Watch, call};
+use yair::dataset::import::csv::{Options as CsvOptions, RobotGiven};
+use yair::dataset::{Dataset, Existing, RunByRun};
+use yair::diagnose::ExtendedModel;
+use yair::kinematics::Wheels;
+use yair::scenario::Scenario;
+
+use crate::corpus::{self, Sample};
+use crate::{bag, odd_datasets, text};
+
+/// Something that reads.
+pub(crate) struct Target {
+    pub(crate) name: &'static str,
+    pub(crate) corpus: fn() -> Vec<Sample>,
+    /// Makes an input in the folder and reads it: whether it was accepted. A panic is a finding.
+    pub(crate) run: fn(&[Sample], &mut Xoshiro256PlusPlus, &Path) -> bool,
+    /// What an execution costs, in those of a text file.
+    pub(crate) cost: u64,
+}
+
+pub(crate) const TARGETS: &[Target] = &[
+    Target { name: "dataset", corpus: corpus::datasets, run: read_dataset, cost: 1 },
+    Target { name: "csv", corpus: corpus::tables, run: read_table, cost: 1 },
+    Target { name: "tum", corpus: corpus::trajectories, run: read_trajectories, cost: 1 },
+    Target {
+        name: "optiodom",
+        corpus: corpus::optiodom,
+        run: |all, random, at| import("optiodom", all, random, at),
+        cost: 1,
+    },
+    Target { name: "censi", corpus: corpus::tuples, run: |all, random, at| import("censi", all, random, at), cost: 1 },
+    Target { name: "mcap-and-cdr", corpus: corpus::bags, run: read_bag, cost: 2 },
+    Target { name: "bag-metadata", corpus: corpus::metadata, run: read_metadata, cost: 1 },
+    Target { name: "scenario", corpus: corpus::scenarios, run: read_scenario, cost: 1 },
+    Target { name: "calibration", corpus: corpus::calibrations, run: read_calibration, cost: 1 },
+    Target { name: "extended", corpus: corpus::extended, run: read_extended, cost: 1 },
+    Target { name: "sweep-state", corpus: corpus::states, run: read_states, cost: 2 },
+    Target { name: "calibrators", corpus: corpus::none, run: odd_datasets::calibrated, cost: 4 },
+    Target { name: "diagnosis", corpus: corpus::none, run: odd_datasets::diagnosed, cost: 20 },
+];
+
+fn pick<'l, T>(list: &'l [T], random: &mut impl Rng) -> &'l T {
+    &list[random.random_range(0..list.len())]
+}
+
+/// A sample of which one file is mutated, or left out, or takes the place of another; in the folder.
+fn placed(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> PathBuf {
+    let sample = pick(all, random);
+    let (chosen, other) = (random.random_range(0..sample.len()), random.random_range(0..sample.len()));
+    let (_, elsewhere) = pick(&pick(all, random)[..], random);
+    let (is_gone, is_exchanged) = (random.random_bool(0.02), random.random_bool(0.02));
+    for (number, (name, bytes)) in sample.iter().enumerate() {
+        // Most tables of a dataset are optional: with few, one that is mutated is reached.
+        let is_optional = sample.len() > 4 && !["dataset.toml", "odometry.csv", "truth.csv"].contains(&&name[..]);
+        if number != chosen && is_optional && random.random_bool(0.7) {
+            continue;
+        }
+        let bytes = match number == chosen {
+            true if is_gone => continue,
+            true if is_exchanged => sample[other].1.clone(),
+            true => text::mutated(bytes, elsewhere, random),
+            false => bytes.clone(),
+        };
+        let path = at.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, bytes).expect("written");
+    }
+    at.join(&sample[chosen].0)
+}
+
+/// No message is without words. What a terminal may not have of them is escaped where they are printed.
+fn refused(error: &dyn std::error::Error) -> bool {
+    assert!(error.to_string().len() > 10, "{error}");
+    false
+}
+
+/// What was read can be written, and reads back equal.
+fn round_trip(dataset: &Dataset, at: &Path) -> bool {
+    let out = at.join("again");
+    dataset::write(dataset, &out, Existing::Refuse).expect("what was read can be written");
+    let again = dataset::read(&out).expect("what was written can be read").dataset;
+    assert_eq!(&again, dataset, "it reads back otherwise");
+    true
+}
+
+fn read_dataset(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    let whole = dataset::read(at);
+    // Run by run the same is read, or refused.
+    let by_run =
+        RunByRun::open(at).and_then(|runs| runs.map(|run| run.map(|run| run.dataset)).collect::<Result<Vec<_>, _>>());
+    match (whole, by_run) {
+        (Err(error), _) => refused(&error),
+        (Ok(loaded), by_run) => {
+            let by_run = by_run.expect("run by run as at once");
+            let runs: Vec<_> = by_run.iter().flat_map(|dataset| &dataset.runs).collect();
+            assert_eq!(runs, loaded.dataset.runs.iter().collect::<Vec<_>>(), "run by run it is another dataset");
+            round_trip(&loaded.dataset, at)
+        }
+    }
+}
+
+fn robot() -> RobotGiven {
+    RobotGiven {
+        wheel_diameter_m: Some(Wheels { left: 0.15, right: 0.15 }),
+        wheel_separation_m: Some(0.3),
+        ticks_per_rev: Some(4096.0),
+        counter_bits: None,
+    }
+}
+
+fn read_table(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let file = placed(all, random, at);
+    match dataset::import::csv::read(&[file], &CsvOptions { robot: robot(), ..CsvOptions::default() }) {
+        Err(error) => refused(&error),
+        Ok(found) => round_trip(&found.imported.dataset, at),
+    }
+}
+
+fn read_trajectories(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    let [truth, wheels] = ["truth.txt", "wheels.txt"].map(|name| at.join(name).display().to_string());
+    let out = at.join("out").display().to_string();
+    let arguments =
+        ["yair", "import", "tum", &truth, "--odometry", &wheels, "--out", &out, "--wheel", "0.15", "--base", "0.3"];
+    let done = call(arguments, &Arc::new(Watch::default()));
+    assert!(done.exit_code < 2, "{:?}", done.failure);
+    if done.exit_code == 0 {
+        dataset::read(Path::new(&out)).expect("what was imported can be read");
+    }
+    done.exit_code == 0
+}
+
+fn import(format: &str, all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let file = placed(all, random, at);
+    let source = if format == "optiodom" { at.to_owned() } else { file };
+    match dataset::import::importer(format).expect("a format").read(&source) {
+        Err(error) => refused(&error),
+        Ok(sessions) => sessions.iter().enumerate().all(|(number, session)| {
+            let folder = at.join(number.to_string());
+            fs::create_dir_all(&folder).expect("made");
+            // The writer refuses counts that no counter reaches; the sums of a log may.
+            match dataset::check_writable(&session.dataset) {
+                Err(error) if error.to_string().contains("a count beyond") => refused(&error),
+                _ => round_trip(&session.dataset, &folder),
+            }
+        }),
+    }
+}
+
+fn bag_in(at: &Path) -> bool {
+    let listed = ros_bag::list(at, &[]);
+    let options = ros_bag::Options { robot: robot(), ..Default::default() };
+    match ros_bag::import(at, &options) {
+        Err(error) => refused(&error),
+        Ok(found) => {
+            listed.expect("what is imported can be listed");
+            let folder = at.parent().expect("a folder");
+            round_trip(&found.dataset, folder)
+        }
+    }
+}
+
+fn read_bag(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let (_, bytes) = &pick(all, random)[0];
+    let path = at.join("a.mcap");
+    fs::write(&path, bag::mutated(bytes, random)).expect("written");
+    bag_in(&path)
+}
+
+fn read_metadata(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    // What is asked is which files are opened.
+    fs::write(at.join("a.mcap"), include_bytes!("../tests/ros2/two_topics.mcap")).expect("written");
+    match ros_bag::list(at, &[]) {
+        Err(error) => refused(&error),
+        Ok(_) => true,
+    }
+}
+
+fn read_scenario(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    match Scenario::read(&placed(all, random, at)) {
+        Err(error) => refused(&error),
+        Ok(scenario) => {
+            let toml = scenario.to_toml().expect("it has a form");
+            assert!(!toml.to_lowercase().contains("nan"), "a number that is none: {toml}");
+            let again = Scenario::parse(&toml, "again").expect("it reads back");
+            assert_eq!(again, scenario);
+            true
+        }
+    }
+}
+
+fn read_calibration(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    match CalibrationReport::read(&placed(all, random, at)) {
+        Err(error) => refused(&error),
+        Ok(report) => {
+            let nominal = odd_datasets::nominal();
+            for calibration in report.calibrations() {
+                let geometry = calibration.geometry(&nominal, nominal.geometry().expect("a drive"));
+                assert!(geometry.is_none_or(|geometry| geometry.wheel_separation_m().is_finite()));
+                let (latency_s, sensor) = (calibration.latency_s(), calibration.body_from_sensor());
+                assert!([latency_s, sensor.x_m, sensor.y_m, sensor.theta_rad].iter().all(|value| value.is_finite()));
+                let _ = calibration.implausible_for(&nominal);
+            }
+            report.to_toml().expect("it has a form");
+            true
+        }
+    }
+}
+
+fn read_extended(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let scenario = match Scenario::read(&placed(all, random, at)) {
+        Err(error) => return refused(&error),
+        Ok(scenario) => scenario,
+    };
+    match ExtendedModel::of(&scenario) {
+        Err(error) => refused(&error),
+        Ok(model) => {
+            let _ = model.check(&odd_datasets::nominal());
+            true
+        }
+    }
+}
+
+fn read_states(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    let [one, two, out] = ["1", "2", "out"].map(|name| at.join(name).display().to_string());
+    let done = call(["yair", "merge", &one, &two, "--out", &out], &Arc::new(Watch::default()));
+    assert!(done.exit_code < 2, "{:?}", done.failure);
+    done.exit_code == 0
+}

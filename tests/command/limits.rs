@@ -1,0 +1,201 @@
+//! What input can never do, whatever it says: cost memory or time without bound, lead out of its folder, or
+//! mean more than text where it is printed. docs/reliability.md lists these promises; limits that need no
+//! command are tested beside the readers.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{Ended, refusal, run_in, succeed};
+
+/// Nesting that would end a recursive parser's stack.
+const DEEP: usize = 200_000;
+
+fn write(at: &Path, file: &str, text: impl AsRef<[u8]>) {
+    let path = at.join(file);
+    fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+    fs::write(path, text).expect("written");
+}
+
+const ROBOT: &str = "[robot]\nleft_wheel_diameter_m = 0.15\nright_wheel_diameter_m = 0.15\nwheel_separation_m = 0.3\nticks_per_rev = 4096.0\n";
+
+/// A dataset that can be calibrated, with a name and the ids of two runs.
+fn dataset(at: &Path, folder: &str, name: &str, ids: [&str; 2]) {
+    let quoted = |text: &str| serde_json::to_string(text).expect("JSON");
+    let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let runs: String = ids.iter().map(|id| format!("[[run]]\nid = {}\n", quoted(id))).collect();
+    write(at, &format!("{folder}/dataset.toml"), format!("format = 1\nname = {}\n{ROBOT}{runs}", quoted(name)));
+    let (mut odometry, mut truth) =
+        ("run,t_s,left_ticks,right_ticks\n".to_owned(), "run,t_s,x_m,y_m,theta_rad\n".to_owned());
+    // A quarter of a metre straight on, then about a radian on the spot; counts are rounded as wheels do it.
+    let per_m = 4096.0 / (std::f64::consts::PI * 0.15);
+    for (id, sense) in ids.iter().zip([1.0, -1.0]) {
+        for step in 0..=40_i32 {
+            let t_s = 0.1 * f64::from(step);
+            let (s_m, turn_rad) = (0.0125 * f64::from(step.min(20)), sense * 0.05 * f64::from((step - 20).max(0)));
+            let [left, right] = [-1.0, 1.0].map(|side| (per_m * (s_m + side * 0.15 * turn_rad)).round());
+            odometry += &format!("{},{t_s:.1},{left},{right}\n", cell(id));
+            truth += &format!("{},{t_s:.1},{s_m:.6},0,{turn_rad:.6}\n", cell(id));
+        }
+    }
+    write(at, &format!("{folder}/odometry.csv"), odometry);
+    write(at, &format!("{folder}/truth.csv"), truth);
+}
+
+#[test]
+fn nesting_ends_no_parser() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    for (number, text) in [
+        "a = ".to_owned() + &"[".repeat(DEEP),
+        "a = ".to_owned() + &"{a=".repeat(DEEP),
+        format!("[a{}]", ".a".repeat(DEEP)),
+    ]
+    .iter()
+    .enumerate()
+    {
+        write(at, &format!("{number}.toml"), text);
+        write(at, &format!("set{number}/dataset.toml"), text);
+        refusal(at, &["simulate", &format!("{number}.toml"), "--out", "out"]);
+        refusal(at, &["calibrate", &format!("set{number}")]);
+        refusal(at, &["export", "ros2-yaml", &format!("{number}.toml")]);
+    }
+    write(at, "deep.tuple", "[".repeat(DEEP));
+    refusal(at, &["import", "censi", "deep.tuple", "--out", "out"]);
+    write(at, "deep/metadata.yaml", "[".repeat(DEEP));
+    refusal(at, &["import", "ros2", "deep", "--list"]);
+    for json in ["[".repeat(DEEP), "{\"a\":".repeat(DEEP)] {
+        write(at, "shard/sweep.state.json", json);
+        refusal(at, &["merge", "shard", "--out", "out"]);
+    }
+}
+
+#[test]
+fn more_runs_than_a_manifest_holds_are_refused() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let runs: String = (0..300_000).map(|run| format!("[[run]]\nid=\"{run}\"\n")).collect();
+    write(temp.path(), "set/dataset.toml", format!("format = 1\n{ROBOT}{runs}"));
+    let message = refusal(temp.path(), &["calibrate", "set"]);
+    assert!(message.contains("dataset.toml: longer than 4194304 bytes"), "{message}");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_lead_nowhere_else() {
+    use std::os::unix::fs::symlink;
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    dataset(at, "set", "plain", ["a", "b"]);
+    fs::rename(at.join("set/truth.csv"), at.join("elsewhere.csv")).expect("moved");
+    symlink("../elsewhere.csv", at.join("set/truth.csv")).expect("a link");
+    for command in ["calibrate", "evaluate", "check", "diagnose"] {
+        let message = refusal(at, &[command, "set"]);
+        assert!(message.contains("truth.csv: a link to ") && message.contains("outside of the dataset"), "{message}");
+    }
+    fs::remove_file(at.join("set/truth.csv")).expect("removed");
+    fs::rename(at.join("elsewhere.csv"), at.join("set/measured.csv")).expect("moved");
+    symlink("measured.csv", at.join("set/truth.csv")).expect("a link");
+    succeed(at, &["calibrate", "set", "--out", "found.toml"]);
+    // Into a folder of results through a link of it.
+    fs::create_dir_all(at.join("results")).expect("made");
+    fs::create_dir(at.join("private")).expect("made");
+    symlink("../private", at.join("results/sessions")).expect("a link");
+    let message = refusal(at, &["fleet", "set", "--out", "results"]);
+    assert!(message.contains("is a link"), "{message}");
+    assert_eq!(at.join("private").read_dir().expect("readable").count(), 0);
+}
+
+#[test]
+fn force_deletes_a_dataset_and_nothing_else() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    dataset(at, "old", "plain", ["a", "b"]);
+    write(
+        at,
+        "log.csv",
+        "t_s,x_m,y_m,theta_rad,left_ticks,right_ticks\n0,0,0,0,0,0\n1,1,0,0,9000,9000\n2,2,0,0,18000,18000\n",
+    );
+    let import = [
+        "import",
+        "csv",
+        "log.csv",
+        "--out",
+        "old",
+        "--wheel",
+        "0.15",
+        "--base",
+        "0.3",
+        "--ticks-per-rev",
+        "4096",
+        "--length-unit",
+        "m",
+        "--force",
+    ];
+    // A folder that has the name of a table holds what nobody knows.
+    fs::create_dir(at.join("old/wall.csv")).expect("made");
+    write(at, "old/wall.csv/thesis.tex", "years of work");
+    let ended = run_in(at, &import);
+    assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+    assert!(ended.stderr.contains("holds more than a dataset"), "{}", ended.stderr);
+    assert!(at.join("old/wall.csv/thesis.tex").exists() && at.join("old/truth.csv").exists());
+    fs::remove_dir_all(at.join("old/wall.csv")).expect("removed");
+    succeed(at, &import);
+}
+
+/// What no text of a file may be in any place where it is shown.
+const HOSTILE: &str =
+    "=cmd|'/C calc'!A0 \u{1b}]0;owned\u{7} \u{9b}2J <script>alert(1)</script> */ int evil; /* \u{202e} ' \" \\";
+
+fn no_command(place: &str, text: &str) {
+    let bad: Vec<char> = text
+        .chars()
+        .filter(|letter| {
+            (letter.is_control() && !['\n', '\t'].contains(letter)) || ('\u{202a}'..='\u{202e}').contains(letter)
+        })
+        .collect();
+    assert!(bad.is_empty(), "{place}: {bad:?} in {text}");
+}
+
+#[test]
+fn texts_of_files_are_texts_wherever_they_are_shown() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    dataset(at, "set", HOSTILE, ["=1+1", "<b>run</b>"]);
+    let manifest = fs::read_to_string(at.join("set/dataset.toml")).expect("there");
+    let with_id = manifest.replace("[robot]\n", "[robot]\nid = \"=cmd|'/C calc'!A0<script>alert(2)</script>\"\n");
+    write(at, "set/dataset.toml", with_id);
+    let all = |ended: &Ended| ended.stdout.clone() + &ended.stderr;
+    succeed(at, &["calibrate", "set", "--out", "found.toml"]);
+    let commands: [&[&str]; 6] = [
+        &["check", "set"],
+        &["calibrate", "set", "--out-dir", "pages"],
+        &["evaluate", "set", "--calibration", "found.toml", "--out-dir", "drift"],
+        &["evaluate", "set", "--json"],
+        &["fleet", "set", "--calibrate-only", "--csv", "fleet.csv", "--html", "fleet.html"],
+        &["export", "tum", "set", "--out", "tum", "--force"],
+    ];
+    for command in commands {
+        let ended = run_in(at, command);
+        no_command(&command.join(" "), &all(&ended));
+        assert!(!all(&ended).contains("panicked"), "{}", ended.stderr);
+    }
+    for page in ["pages/report.html", "drift/report.html", "fleet.html"] {
+        let text = fs::read_to_string(at.join(page)).expect("a page");
+        assert!(!text.contains("<script>alert") && !text.contains("<b>run</b>"), "{page}");
+        assert!(
+            text.contains("&lt;script&gt;") || text.contains("&#60;script&#62;") || text.contains("\\u003cscript"),
+            "{page}"
+        );
+    }
+    let table = fs::read_to_string(at.join("fleet.csv")).expect("a table");
+    let mut rows = csv::Reader::from_reader(table.as_bytes());
+    for cell in rows.records().flat_map(|row| row.expect("a row").iter().map(str::to_owned).collect::<Vec<_>>()) {
+        assert!(!cell.starts_with(['=', '+', '@']), "{cell}");
+    }
+    let header = succeed(at, &["export", "c", "found.toml"]).stdout;
+    assert_eq!(header.matches("/*").count(), header.matches("*/").count());
+    assert!(!header.contains("*/ int evil"), "{header}");
+    let yaml = succeed(at, &["export", "ros2-yaml", "found.toml"]).stdout;
+    yaml_rust2::YamlLoader::load_from_str(&yaml).expect("YAML");
+    // The id of a run is a file's name only where it is a plain one; nothing is written otherwise.
+    assert!(!at.join("tum").exists());
+}
