@@ -1,5 +1,5 @@
-//! Mutations of MCAP files by their records: chunks are opened, records changed, and lengths and checksums made
-//! right again, so that what is wrong lies deep inside; now and then they are left wrong.
+//! Mutations of MCAP files by their records: chunks are opened, records changed, and lengths and checksums
+//! made right again, so that what is wrong lies deep inside; now and then they are left wrong.
 
 use std::io::Read;
 

@@ -2,9 +2,9 @@
 //!
 //! A sample of a target's corpus is mutated with its structure kept (`text`, `bag`), because random bytes
 //! hardly pass a parser's first line; then the target reads it. A finding is a panic, an execution that takes
-//! longer or more memory than [`MAX_SECONDS`] and [`MAX_BYTES`], or a promise of the target that does not hold
-//! (what was read can be written and reads back equal; no number is a NaN). Every execution is a function of
-//! its target and its number, so that a finding is repeated by `YAIR_FUZZ_AT=TARGET:NUMBER`.
+//! longer or more memory than [`MAX_SECONDS`] and [`MAX_BYTES`], or a promise of the target that does not
+//! hold (what was read can be written and reads back equal; no number is a NaN). Every execution is a
+//! function of its target and its number, so that a finding is repeated by `YAIR_FUZZ_AT=TARGET:NUMBER`.
 //!
 //! `cargo test` runs a few hundred executions a target. `.ci/run fuzz MINUTES` runs each target for so many
 //! minutes of processor time and prints the executions; it is a campaign by hand.

@@ -1,5 +1,5 @@
-//! What a calibration and a diagnosis may not depend on: where a run starts, the room's frame, the order of the
-//! runs, when it was, the units of a table; and what must scale with lengths and times.
+//! What a calibration and a diagnosis may not depend on: where a run starts, the room's frame, the order of
+//! the runs, when it was, the units of a table; and what must scale with lengths and times.
 
 use yair::calib::{Calibration, method};
 use yair::dataset::import::csv::{Options, RobotGiven};

@@ -1,12 +1,11 @@
 //! Bags of ROS 2 as datasets.
 //!
-//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`record_fields`, `decompress`,
-//! `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr` messages
-//! (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
+//! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`record_fields`,
+//! `decompress`, `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr`
+//! messages (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
 //! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
-//! `import` the dataset (`recorded` when).
-//! Every limit stands in `settings`.
-//! `listing` shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
+//! `import` the dataset (`recorded` when). Every limit stands in `settings`. `listing` shows the topics.
+//! `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 
 mod bag;
 mod cdr;

@@ -294,8 +294,8 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
         Ok(())
     }
 
-    /// Counts the bytes of a schema or a channel in place of those that it replaces, as writers repeat them in
-    /// every chunk; an error where there is no room for it.
+    /// Counts the bytes of a schema or a channel in place of those that it replaces, as writers repeat them
+    /// in every chunk; an error where there is no room for it.
     fn make_room(&mut self, bytes: usize, replaced_bytes: usize) -> Result<(), String> {
         let declared_bytes = self.declared_bytes.saturating_sub(replaced_bytes) + bytes;
         if declared_bytes > MAX_DECLARED_BYTES {
