@@ -53,11 +53,12 @@ impl Interval<'_> {
     }
 
     /// Travel of each wheel at its mean speed, metres: without the rounding of this interval's counts, which
-    /// the residuals have too. What a term multiplies, compares or bends is made of it.
+    /// the residuals have too. What a term multiplies, compares or bends is made of it. An interval of no length
+    /// has no speed: its travel is that of its counts.
     #[inline]
     #[must_use]
     pub fn smooth_travel_m(&self) -> Wheels<f64> {
-        self.speed_m_s.map(|speed_m_s| speed_m_s * self.dt_s)
+        if self.dt_s > 0.0 { self.speed_m_s.map(|speed_m_s| speed_m_s * self.dt_s) } else { self.travel_m }
     }
 
     /// Motion of the drive's centre by the wheels' mean speeds.
