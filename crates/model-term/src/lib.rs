@@ -53,8 +53,8 @@ impl Interval<'_> {
     }
 
     /// Travel of each wheel at its mean speed, metres: without the rounding of this interval's counts, which
-    /// the residuals have too. What a term multiplies, compares or bends is made of it. An interval of no length
-    /// has no speed: its travel is that of its counts.
+    /// the residuals have too. What a term multiplies, compares or bends is made of it. An interval of no
+    /// length has no speed: its travel is that of its counts.
     #[inline]
     #[must_use]
     pub fn smooth_travel_m(&self) -> Wheels<f64> {
