@@ -12,8 +12,9 @@ pub(crate) const MAX_ROWS: usize = 1_000_000_000;
 /// Budgeted: a counter of 10⁹ counts a second runs for two years; sums of a dozen counts stay within 64 bits.
 pub(crate) const MAX_COUNT: u64 = 1 << 56;
 
-/// Bytes. Longest `dataset.toml`; it bounds the number of runs, at 15 bytes each. Budgeted: tens of thousands
-/// of runs with covariates; the parser takes up to a hundred times as much memory.
+/// Bytes. Longest `dataset.toml`; it bounds the number of runs, at 15 bytes each.
+/// Budgeted: tens of thousands of runs with covariates; the parser takes up to a hundred times the
+/// memory.
 pub(crate) const MANIFEST_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
 
 /// Bytes. Largest file of `import csv` and `import tum`, which are held in memory as a whole.

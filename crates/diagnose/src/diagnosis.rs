@@ -174,19 +174,20 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
         error.is_undone_by(&fit).then_some((error, fit))
     });
-    let as_stamped = (records, base.clone());
-    let (stamps, records, base) = match restamped {
-        Some((error, fit)) => (Some(error), &error.records[..], fit),
-        None => (None, records, base),
+    let (stamps, as_stamped, records, base) = match restamped {
+        Some((error, fit)) => (Some(error), Some((records, base)), &error.records[..], fit),
+        None => (None, None, records, base),
     };
     let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
     let restored = faults.iter().any(|fault| fault.is_restored_roughly());
-    let mut structure = mean_structure(records, base.clone(), &catalogue, restored);
+    let uncorrelated = (!is_correlated(&base)).then(|| base.clone());
+    let mut structure = mean_structure(records, base, &catalogue, restored);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
-    let uncorrelated = !is_correlated(&base) && !is_correlated(&structure.found.model.fit);
-    if uncorrelated {
+    let uncorrelated = uncorrelated.filter(|_| !is_correlated(&structure.found.model.fit));
+    let is_uncorrelated = uncorrelated.is_some();
+    if let Some(base) = uncorrelated {
         catalogue.clear();
         structure = mean_structure(records, base, &catalogue, restored);
     }
@@ -205,13 +206,16 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         clocks: &clocks.offsets,
         stamps,
         anomalies,
-        uncorrelated,
+        uncorrelated: is_uncorrelated,
         without: &options.without,
         carry_over: &carry_over,
     });
     begins(Step::Gain);
-    let thinned = structure.correlated.is_some().then(|| THINNED.fit(&sessions(as_stamped.0)).ok()).flatten();
-    let before = stamps.map_or(&structure.base, |_| thinned.as_ref().unwrap_or(&as_stamped.1));
+    let as_stamped = as_stamped.map(|(records, base)| match structure.correlated {
+        Some(_) => THINNED.fit(&sessions(records)).unwrap_or(base),
+        None => base,
+    });
+    let before = as_stamped.as_ref().unwrap_or(&structure.base);
     let nothing_added = model.candidates.is_empty() && stamps.is_none();
     let (gain, gain_why_null) = if nothing_added {
         (None, Some("nothing was added to the calibrated model's mean".to_owned()))

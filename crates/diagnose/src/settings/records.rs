@@ -257,6 +257,6 @@ pub(crate) const MAX_LEAST_EXTRINSICS: f64 = 10.0;
 pub(crate) const MIN_GAP_RATIO: f64 = 1.8;
 
 /// Fraction of what the linear term of a stamp error explains. Restamped records may explain less of the data
-/// by this: rows whose place on the beat is not known stay late. Tuned: by hand, on single cases of the blind
-/// benchmark with stamps of receipt, which lose 2.5 %.
+/// by this: rows whose place on the beat is not known stay late.
+/// Tuned: by hand, on single cases of the blind benchmark with stamps of receipt, which lose 2.5 %.
 pub(crate) const MAX_RESTAMPING_LOSS: f64 = 0.05;
